@@ -183,7 +183,7 @@ class OurMaster:
         }
 
     def read(self, node_ids: list[int], *, at_once: bool) -> None:
-        """Read the position of each drive in a list; ``at_once`` asks all of them together."""
+        """Read the position of each drive in a list; ``at_once`` sends all requests together."""
 
         async def in_turn() -> None:
             for node_id in node_ids:
@@ -235,7 +235,7 @@ def sdo_rates() -> Iterator[Row]:
 
 
 def python_canopen_rates(name: str, jobs: list[list[int]]) -> list[float]:
-    """Let python-canopen do the same; it has no way to ask several devices at once."""
+    """Let python-canopen do the same; it has no way to query several devices at once."""
     network: Any = canopen.Network(ArmCanopenBus(name))
     network.notifier = can.Notifier(network.bus, network.listeners, 0.1)
     try:

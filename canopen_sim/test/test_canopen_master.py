@@ -164,7 +164,7 @@ def test_a_drive_is_enabled_moved_and_read(
         node = network.add_node(2, str(EDS))
         node.sdo.RESPONSE_TIMEOUT = TIMEOUT
         assert node.sdo[0x6064].raw == pytest.approx(3000, abs=10)
-        assert not is_enabled(statusword(network, 3))  # nobody asked for joint2
+        assert not is_enabled(statusword(network, 3))  # joint2 was not requested
 
 
 def test_cyclic_modes_move_too(master: CanopenMaster) -> None:

@@ -47,7 +47,7 @@ DEVICE_INFO = [
     'NrOfTXPDO',
     'LSS_Supported',
 ]
-"""Entries that CiA 306-1, 4.5.2 asks for."""
+"""Entries that CiA 306-1, 4.5.2 requires."""
 
 
 def ini(path: Path) -> configparser.ConfigParser:
@@ -107,7 +107,7 @@ def test_lists_and_sections_agree(path: Path) -> None:
 
 @FILES
 def test_device_info_is_complete_and_true(path: Path) -> None:
-    """The device information has what the standard asks for, and agrees with the objects."""
+    """The device information has what the standard requires, and agrees with the objects."""
     file = ini(path)
     info = file['DeviceInfo']
     assert [key for key in DEVICE_INFO if key not in info] == []

@@ -35,7 +35,7 @@ def guarded_dictionary(error_behaviour: int | None = None) -> ObjectDictionary:
 
 
 def guard(rig: Rig) -> list[int]:
-    """Ask for the state and return the answers."""
+    """Request the state and return the answers."""
     rig.take()
     rig.device.receive(Frame(GUARD, is_remote=True), rig.now)
     return [data[0] for data in rig.take(GUARD)]

@@ -72,7 +72,7 @@ def test_silence_for_a_number_of_requests(rig: Rig) -> None:
 
 
 def test_abort_names_object_and_code(rig: Rig) -> None:
-    """The abort that was asked for comes, at the first frame of a transfer."""
+    """The abort code of the fault comes, at the first frame of a transfer."""
     inject(rig, Fault.SDO_ABORT, object=(0x6098, 0), abort=AbortCode.HARDWARE)
     with pytest.raises(RefusedError) as refused:
         rig.put(0x6098, 35)
@@ -83,7 +83,7 @@ def test_abort_names_object_and_code(rig: Rig) -> None:
 
 
 def test_lost_tpdos_are_the_same_with_the_same_seed() -> None:
-    """Two runs lose the same frames; another seed loses others; about the asked part is lost."""
+    """Two runs lose the same frames; another seed loses others; about the given part is lost."""
 
     def arrivals(seed: int) -> list[int]:
         rig = Rig()

@@ -29,7 +29,7 @@ def make_rig(node_id: int = 255) -> Rig:
     return Rig(DICTIONARY, node_id=node_id)
 
 
-def ask(rig: Rig, command: int, *data: int, word: int | None = None) -> bytes | None:
+def query(rig: Rig, command: int, *data: int, word: int | None = None) -> bytes | None:
     """Send a request; return the answer, None without one."""
     payload = bytes(data) if word is None else struct.pack('<I', word)
     rig.take()
@@ -41,7 +41,7 @@ def ask(rig: Rig, command: int, *data: int, word: int | None = None) -> bytes | 
 
 def select(rig: Rig, identity: tuple[int, ...] = IDENTITY) -> bytes | None:
     """Switch the device with an identity to the configuration state."""
-    answers = [ask(rig, 0x40 + part, word=number) for part, number in enumerate(identity)]
+    answers = [query(rig, 0x40 + part, word=number) for part, number in enumerate(identity)]
     assert answers[:3] == [None] * 3
     return answers[3]
 
@@ -55,8 +55,8 @@ def test_unconfigured_device_waits_for_its_id() -> None:
         rig.send(0, bytes((command, 0)))
     assert rig.sent == []
     assert select(rig) == b'\x44' + bytes(7)
-    assert ask(rig, 0x5E) == b'\x5e\xff' + bytes(6)
-    assert ask(rig, 0x11, 17) == b'\x11' + bytes(7)
+    assert query(rig, 0x5E) == b'\x5e\xff' + bytes(6)
+    assert query(rig, 0x11, 17) == b'\x11' + bytes(7)
     rig.take()
     rig.send(REQUEST, b'\x04\x00' + bytes(6))
     assert rig.take() == [b'\x00']
@@ -71,9 +71,9 @@ def test_unconfigured_device_waits_for_its_id() -> None:
 def test_another_id_from_the_next_reset_on() -> None:
     """A device that has an id keeps it until its communication is reset."""
     rig = make_rig(NODE_ID)
-    ask(rig, 0x04, 1)
-    ask(rig, 0x11, 42)
-    ask(rig, 0x04, 0)
+    query(rig, 0x04, 1)
+    query(rig, 0x11, 42)
+    query(rig, 0x04, 0)
     assert rig.get(0x1000) == 0x20192
     rig.take()
     rig.nmt(NmtCommand.RESET_COMMUNICATION)
@@ -90,10 +90,10 @@ def test_another_id_from_the_next_reset_on() -> None:
 def test_id_after_a_power_cut(stored: bool) -> None:
     """Only what was stored lasts."""
     rig = make_rig(NODE_ID)
-    ask(rig, 0x04, 1)
-    ask(rig, 0x11, 42)
+    query(rig, 0x04, 1)
+    query(rig, 0x11, 42)
     if stored:
-        assert ask(rig, 0x17) == b'\x17' + bytes(7)
+        assert query(rig, 0x17) == b'\x17' + bytes(7)
     rig.nmt(NmtCommand.RESET_COMMUNICATION)
     rig.device.faults.inject(FaultInjection(Fault.REBOOT), rig.now)
     rig.take()
@@ -104,11 +104,11 @@ def test_id_after_a_power_cut(stored: bool) -> None:
 def test_values_out_of_range() -> None:
     """Node ids and bit rates that there are not are refused with error code 1."""
     rig = make_rig()
-    ask(rig, 0x04, 1)
+    query(rig, 0x04, 1)
     for node_id in (0, 128, 254):
-        assert ask(rig, 0x11, node_id) == b'\x11\x01' + bytes(6)
+        assert query(rig, 0x11, node_id) == b'\x11\x01' + bytes(6)
     for table, rate, error in ((0, 0, 0), (0, 8, 0), (0, 5, 1), (0, 9, 1), (1, 0, 1)):
-        assert ask(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
+        assert query(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
 
 
 def test_waiting_device_applies_no_configuration() -> None:
@@ -116,9 +116,9 @@ def test_waiting_device_applies_no_configuration() -> None:
     rig = make_rig()
     assert select(rig, (0x555, 0x1234, 0x10002, 0xBABE)) is None
     for command in (0x11, 0x13, 0x17, 0x5A, 0x5E):
-        assert ask(rig, command, 3) is None
-    ask(rig, 0x04, 1)
-    inquiries = [ask(rig, command) for command in (0x5A, 0x5B, 0x5C, 0x5D)]
+        assert query(rig, command, 3) is None
+    query(rig, 0x04, 1)
+    inquiries = [query(rig, command) for command in (0x5A, 0x5B, 0x5C, 0x5D)]
     assert inquiries == [
         struct.pack('<BI3x', 0x5A + part, number) for part, number in enumerate(IDENTITY)
     ]
@@ -135,11 +135,11 @@ def test_identify(changed: dict[int, int], found: bool) -> None:
         numbers[position] = value
     if 4 in changed:
         numbers[4], numbers[5] = 0xCAFF, 0xFFFF
-    answers = [ask(rig, 0x46 + part, word=number) for part, number in enumerate(numbers)]
+    answers = [query(rig, 0x46 + part, word=number) for part, number in enumerate(numbers)]
     assert answers[:5] == [None] * 5
     assert (answers[5] is not None) is found
-    assert ask(rig, 0x4C) is None
-    assert ask(make_rig(), 0x4C) == b'\x50' + bytes(7)
+    assert query(rig, 0x4C) is None
+    assert query(make_rig(), 0x4C) == b'\x50' + bytes(7)
 
 
 def test_frames_of_other_lengths_are_ignored() -> None:

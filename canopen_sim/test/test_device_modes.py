@@ -75,7 +75,7 @@ def test_without_a_mode_the_axis_is_held() -> None:
 @pytest.mark.parametrize('before', SIMULATED)
 @pytest.mark.parametrize('after', [0, *SIMULATED])
 def test_nothing_moves_at_a_change_of_mode(before: int, after: int) -> None:
-    """At rest, with no velocity asked for, no change of mode moves the axis.
+    """At rest, without a target velocity, no change of mode moves the axis.
 
     A position target that stands in the dictionary is none that was handed over.
     """
@@ -99,7 +99,7 @@ def velocity_rig(target: int = 0) -> Rig:
 
 
 def test_velocity_ramps() -> None:
-    """The velocity rises by 0x6083, falls by 0x6084, and stays where it was asked to be."""
+    """The velocity rises by 0x6083, falls by 0x6084, and stays at its target."""
     rig = velocity_rig()
     rig.put(0x6083, 2000)
     rig.put(0x6084, 4000)

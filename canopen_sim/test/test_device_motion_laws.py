@@ -94,7 +94,7 @@ def test_motor_never_jumps(actions: list[tuple[str, object]]) -> None:
     st.lists(st.tuples(st.integers(-2500, 2500), st.floats(0.01, 0.4)), min_size=1, max_size=10),
     st.integers(2000, 20_000),
 )
-def test_velocity_never_ramps_faster_than_asked(
+def test_velocity_never_ramps_faster_than_its_profile(
     mode: tuple[int, int], commands: list[tuple[int, float]], ramp: int
 ) -> None:
     """In PV and VL the velocity keeps to its ramps, over random targets and halts."""

@@ -103,7 +103,7 @@ def test_all_slaves_of_the_article(
 
 @pytest.mark.scenario
 def test_one_slave(processes: list[subprocess.Popen[str]]) -> None:
-    """One drive with the id that was asked for, made from an EDS."""
+    """One drive with the given id, made from an EDS."""
     name = free_multicast()
     with open_bus(name) as bus:
         process = start('fake_slave', node_id=17, slave_config=str(EDS), can_interface_name=name)

@@ -311,20 +311,20 @@ def test_remote_frames(rig: Rig) -> None:
     rig.nmt(NmtCommand.START)
     rig.take()
 
-    def ask(can_id: int) -> list[bytes]:
+    def query(can_id: int) -> list[bytes]:
         rig.device.receive(Frame(can_id, is_remote=True), rig.now)
         return rig.take(can_id)
 
-    assert ask(0x180 + NODE_ID) == [b'\x50\x02']
-    assert ask(0x280 + NODE_ID) == []  # nothing was sampled yet
+    assert query(0x180 + NODE_ID) == [b'\x50\x02']
+    assert query(0x280 + NODE_ID) == []  # nothing was sampled yet
     rig.sync()
     rig.take()
     rig.command(0x06)
-    assert ask(0x280 + NODE_ID) == [b'\x50\x02']  # as of the last SYNC
-    assert ask(0x180 + NODE_ID) == [b'\x31\x02']
-    assert ask(0x380 + NODE_ID) == []
-    assert ask(0x480 + NODE_ID) == []
-    assert ask(0x701) == []
+    assert query(0x280 + NODE_ID) == [b'\x50\x02']  # as of the last SYNC
+    assert query(0x180 + NODE_ID) == [b'\x31\x02']
+    assert query(0x380 + NODE_ID) == []
+    assert query(0x480 + NODE_ID) == []
+    assert query(0x701) == []
 
 
 def test_full_frame_of_eight_objects(rig: Rig) -> None:

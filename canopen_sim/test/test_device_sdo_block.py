@@ -39,7 +39,7 @@ def make_rig() -> Rig:
     return rig
 
 
-def ask(rig: Rig, data: bytes) -> list[bytes]:
+def query(rig: Rig, data: bytes) -> list[bytes]:
     """Send a frame on the default channel and return all answers."""
     rig.take()
     rig.send(0x600 + NODE_ID, data)
@@ -58,7 +58,7 @@ def segments(data: bytes) -> list[bytes]:
 def begin_download(rig: Rig, size: int) -> None:
     """Initiate a block download of the file, with its length and a checksum."""
     begin = struct.pack('<B3sI', 0xC6, FILE_NAME, size)
-    assert ask(rig, begin) == [struct.pack('<B3sB3x', 0xA4, FILE_NAME, 127)]
+    assert query(rig, begin) == [struct.pack('<B3sB3x', 0xA4, FILE_NAME, 127)]
 
 
 def end_of(data: bytes, crc: int | None = None) -> bytes:
@@ -73,9 +73,9 @@ def download(rig: Rig, data: bytes) -> None:
     begin_download(rig, len(data))
     frames = segments_of_blocks(data)
     for block in frames:
-        answers = [answer for frame in block for answer in ask(rig, frame)]
+        answers = [answer for frame in block for answer in query(rig, frame)]
         assert answers == [bytes((0xA2, len(block), 127, 0, 0, 0, 0, 0))]
-    assert ask(rig, end_of(data)) == [b'\xa1' + bytes(7)]
+    assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
 
 
 def segments_of_blocks(data: bytes) -> list[list[bytes]]:
@@ -92,25 +92,25 @@ def segments_of_blocks(data: bytes) -> list[list[bytes]]:
 
 def upload(rig: Rig, block_size: int = 127, *, damage: int | None = None) -> bytes:
     """Read the file by blocks; of the first block the segments after ``damage`` get lost."""
-    (answer,) = ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, block_size, 0))
+    (answer,) = query(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, block_size, 0))
     command, name, size = struct.unpack('<B3sI', answer)
     assert (command, name) == (0xC6, FILE_NAME)
     data = b''
-    frames = ask(rig, b'\xa3' + bytes(7))
+    frames = query(rig, b'\xa3' + bytes(7))
     while frames[0][0] & 0xE3 != 0xC1 or len(frames) > 1:
         assert [frame[0] & 0x7F for frame in frames] == list(range(1, len(frames) + 1))
         assert len(frames) <= block_size
         taken = len(frames) if damage is None else min(damage, len(frames))
         damage = None
         data += b''.join(frame[1:] for frame in frames[:taken])
-        frames = ask(rig, bytes((0xA2, taken, block_size)) + bytes(5))
+        frames = query(rig, bytes((0xA2, taken, block_size)) + bytes(5))
         if len(data) >= size and len(frames) == 1 and frames[0][0] & 0xE3 == 0xC1:
             break
     unused, crc = frames[0][0] >> 2 & 0x07, struct.unpack_from('<xH', frames[0])[0]
     data = data[: len(data) - unused]
     assert crc == crc_hqx(data, 0)
     assert len(data) == size
-    assert ask(rig, b'\xa1' + bytes(7)) == []
+    assert query(rig, b'\xa1' + bytes(7)) == []
     return data
 
 
@@ -139,12 +139,12 @@ def test_lost_segment_of_a_download_is_sent_again() -> None:
     data = bytes(range(70))
     begin_download(rig, len(data))
     frames = segments(data)
-    answers = [answer for frame in frames[:3] + frames[4:] for answer in ask(rig, frame)]
+    answers = [answer for frame in frames[:3] + frames[4:] for answer in query(rig, frame)]
     assert answers == [bytes((0xA2, 3, 127, 0, 0, 0, 0, 0))]
     again = segments(data[21:])
-    answers = [answer for frame in again for answer in ask(rig, frame)]
+    answers = [answer for frame in again for answer in query(rig, frame)]
     assert answers == [bytes((0xA2, 7, 127, 0, 0, 0, 0, 0))]
-    assert ask(rig, end_of(data)) == [b'\xa1' + bytes(7)]
+    assert query(rig, end_of(data)) == [b'\xa1' + bytes(7)]
     assert rig.read(FILE) == data
 
 
@@ -169,8 +169,8 @@ def test_wrong_checksum() -> None:
     rig = make_rig()
     download(rig, b'before')
     begin_download(rig, 6)
-    ask(rig, segments(b'after!')[0])
-    assert abort_code(ask(rig, end_of(b'after!', crc=0x1234))) == AbortCode.CRC
+    query(rig, segments(b'after!')[0])
+    assert abort_code(query(rig, end_of(b'after!', crc=0x1234))) == AbortCode.CRC
     assert rig.read(FILE) == b'before'
 
 
@@ -178,28 +178,28 @@ def test_wrong_lengths() -> None:
     """Less or more than was announced is refused."""
     rig = make_rig()
     begin_download(rig, 20)
-    ask(rig, segments(b'short')[0])
-    assert abort_code(ask(rig, end_of(b'short'))) == AbortCode.LENGTH_LOW
+    query(rig, segments(b'short')[0])
+    assert abort_code(query(rig, end_of(b'short'))) == AbortCode.LENGTH_LOW
     begin_download(rig, 3)
-    ask(rig, b'\x01' + bytes(7))
-    assert abort_code(ask(rig, b'\x82' + bytes(7))) == AbortCode.LENGTH_HIGH
+    query(rig, b'\x01' + bytes(7))
+    assert abort_code(query(rig, b'\x82' + bytes(7))) == AbortCode.LENGTH_HIGH
 
 
 def test_nonsense_in_a_transfer() -> None:
     """Sequence number 0, blocks without length and commands out of turn are aborted."""
     rig = make_rig()
     begin_download(rig, 20)
-    assert abort_code(ask(rig, bytes(8))) == AbortCode.SEQUENCE_NUMBER
+    assert abort_code(query(rig, bytes(8))) == AbortCode.SEQUENCE_NUMBER
     begin = struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 0, 0)
-    assert abort_code(ask(rig, begin)) == AbortCode.BLOCK_SIZE
+    assert abort_code(query(rig, begin)) == AbortCode.BLOCK_SIZE
     download(rig, b'0123456789')
-    ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
-    ask(rig, b'\xa3' + bytes(7))
-    assert abort_code(ask(rig, b'\xa2\x7f\x0a' + bytes(5))) == AbortCode.SEQUENCE_NUMBER
-    ask(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
-    assert abort_code(ask(rig, b'\xa1' + bytes(7))) == AbortCode.COMMAND_SPECIFIER
+    query(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
+    query(rig, b'\xa3' + bytes(7))
+    assert abort_code(query(rig, b'\xa2\x7f\x0a' + bytes(5))) == AbortCode.SEQUENCE_NUMBER
+    query(rig, struct.pack('<B3sBB2x', 0xA4, FILE_NAME, 10, 0))
+    assert abort_code(query(rig, b'\xa1' + bytes(7))) == AbortCode.COMMAND_SPECIFIER
     for orphan in (b'\xa3', b'\xa2', b'\xa1', b'\xc1'):
-        (answer,) = ask(rig, orphan + bytes(7))
+        (answer,) = query(rig, orphan + bytes(7))
         assert struct.unpack_from('<I', answer, 4)[0] == AbortCode.COMMAND_SPECIFIER
 
 
@@ -207,8 +207,8 @@ def test_abort_by_the_client_in_the_stream() -> None:
     """An abort between segments ends the transfer, although segments have no command byte."""
     rig = make_rig()
     begin_download(rig, 20)
-    ask(rig, b'\x01' + bytes(7))
-    assert ask(rig, b'\x80' + FILE_NAME + bytes(4)) == []
+    query(rig, b'\x01' + bytes(7))
+    assert query(rig, b'\x80' + FILE_NAME + bytes(4)) == []
     rig.run(5.0)
     assert rig.take() == []
     assert rig.read(FILE) == b''
@@ -226,7 +226,7 @@ def test_little_data_by_the_other_protocol() -> None:
     """Below the client's threshold the device answers as to a normal upload."""
     rig = make_rig()
     begin = struct.pack('<BHBBB2x', 0xA4, 0x1000, 0, 127, 4)
-    (answer,) = ask(rig, begin)
+    (answer,) = query(rig, begin)
     assert decode_response(answer) == UploadResponse(0x1000, 0, b'\x92\x01\x02\x00', 4)
 
 

@@ -48,7 +48,7 @@ class LssNetwork:
             values = {(0x1018, part + 1): number for part, number in enumerate(address)}
             self.host.add(next(ids, UNCONFIGURED), with_defaults(drive_dictionary(), values))
         self.host.advance(1.0)
-        self.master = LssMaster(self._scheduler, self._ask)
+        self.master = LssMaster(self._scheduler, self._send)
 
     @property
     def now(self) -> float:
@@ -72,7 +72,7 @@ class LssNetwork:
             self._scheduler.advance(self.now)
         return task.result()
 
-    def _ask(self, frame: Frame) -> None:
+    def _send(self, frame: Frame) -> None:
         self.host.receive(frame, self.now)
 
     def _answer(self, frame: Frame) -> None:

@@ -29,7 +29,7 @@ OTHER = 9 << 16 | 500  # an entry of 0x1016 that watches node 9
 
 
 def sample_node() -> NodeConfig:
-    """Return a drive that the files ask for all kinds of things."""
+    """Return a drive for which the files configure all kinds of objects."""
     node = drive_config('joint1', 2, identity=Identity(0x20192, 0xFFFF, 0x402))
     timed = replace(node.tpdos[0], inhibit_time=0.002, event_time=0.5, transmission=255)
     fixed = replace(node.tpdos[1], fixed_mapping=True)

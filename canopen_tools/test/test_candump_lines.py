@@ -58,7 +58,7 @@ def test_29_bits_and_remote_requests_have_their_columns() -> None:
 
 
 def test_colors_paint_the_meaning_and_alerts_are_red() -> None:
-    """Escape codes appear only when asked for, and end with the line."""
+    """Escape codes appear only on request, and end with the line."""
     alert = Description(FrameKind.EMCY, 'EMCY', 'joint1', 'over current', is_alert=True)
     plain = LineFormat(TimeStyle.NONE, 0.0)
     colored = LineFormat(TimeStyle.NONE, 0.0, color=True)

@@ -138,7 +138,7 @@ def test_scan_compares_with_bus_yml(
 def test_scan_leaves_the_sdo_channels_to_a_master(
     name: str, witness: Bus, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Beside a master it only listens, and says so; --ask asks, with a warning."""
+    """Beside a master it only listens, and says so; --query reads, with a warning."""
     assert main(['scan', '--can', name, *LISTEN]) == 1
     assert 'no device has sent a frame' in capsys.readouterr().err
     main(['write', '3', '0x1017', '50', '--type', 'u16', '--can', name])
@@ -149,7 +149,7 @@ def test_scan_leaves_the_sdo_channels_to_a_master(
     captured = capsys.readouterr()
     assert captured.out.splitlines()[1].split() == ['3', 'pre-operational']
     assert 'a master is on this bus (SYNC), so devices are not queried' in captured.err
-    assert main(['scan', '--can', name, *LISTEN, '--ask']) == 0
+    assert main(['scan', '--can', name, *LISTEN, '--query']) == 0
     assert 'its transfers may fail' in capsys.readouterr().err
     assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}
 

@@ -66,7 +66,7 @@ def test_other_lengths_are_none(data: bytes) -> None:
     )
 )
 def test_a_step_of_fast_scan_survives(step: FastScan) -> None:
-    """What a master asks is what a device reads."""
+    """What a master sends is what a device reads."""
     message = decode_lss(step.message().encode())
     assert message is not None
     assert fast_scan(message) == step

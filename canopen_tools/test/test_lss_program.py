@@ -194,7 +194,7 @@ class Slave:
 
 
 def answers(bus: Bus, request: bytes) -> bool:
-    """Ask until somebody answers."""
+    """Send until a device answers."""
     for _ in range(int(DEADLINE / 0.1)):
         bus.send(Frame(0x7E5, request))
         if any(frame.can_id == 0x7E4 for frame in bus.receive(0.1)):

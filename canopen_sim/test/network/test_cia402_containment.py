@@ -213,7 +213,7 @@ NARROW = {
 
 
 @pytest.mark.parametrize('mode', NARROW, ids=lambda mode: mode.name)
-def test_a_target_beyond_the_type_of_its_object_is_refused_when_it_is_asked_for(
+def test_a_target_beyond_the_type_of_its_object_is_refused_at_the_call(
     mode: OperationMode,
 ) -> None:
     """By the range of the mapped type, before anything moves; the drive stays enabled."""

@@ -205,7 +205,7 @@ class Script:
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[float | None]:
-        """Hold, then answer what was asked for."""
+        """Hold, then answer the given set-points."""
         self._cycle += 1
         if self._position is None:
             self._position = feedback[0].setpoint

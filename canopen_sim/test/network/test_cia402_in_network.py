@@ -65,7 +65,7 @@ def test_a_target_is_reached_exactly(net: VirtualNetwork, mode: OperationMode) -
 
 
 def test_a_velocity_is_reached_and_stopped(net: VirtualNetwork) -> None:
-    """Mode 3 runs at the velocity that is asked for, and stands at 0."""
+    """Mode 3 runs at the target velocity, and stands at 0."""
     enabled(net, OperationMode.PROFILE_VELOCITY)
     net.commands[JOINT].set_target(0.2)
     net.run(1.0)

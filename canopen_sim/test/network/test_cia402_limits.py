@@ -54,7 +54,7 @@ def test_limits_that_are_written_through_the_master_hold_at_once() -> None:
 
 
 def test_a_write_that_the_drive_refuses_changes_nothing() -> None:
-    """And one of an object that is no limit asks the drive nothing."""
+    """And one of an object that is no limit reads nothing from the drive."""
     net = enabled(drive_config(JOINT, NODE_ID), OperationMode.CYCLIC_POSITION)
     before = net.drives[JOINT].view.parameters
     begin = net.now

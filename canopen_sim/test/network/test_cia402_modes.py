@@ -370,18 +370,18 @@ def test_homing_is_cancelled_by_a_halt() -> None:
     assert speed(net) == pytest.approx(0.0, abs=0.01)
 
 
-@pytest.mark.parametrize('asked', [True, False])
-def test_init_homes_only_where_bus_yml_asks(asked: bool) -> None:
+@pytest.mark.parametrize('requested', [True, False])
+def test_init_homes_only_where_bus_yml_configures_it(requested: bool) -> None:
     """A method that is merely stored in the drive is named, not run."""
-    writes = (*MOTION_WRITES, sdo_write(0x6098, 0, 37)) if asked else MOTION_WRITES
+    writes = (*MOTION_WRITES, sdo_write(0x6098, 0, 37)) if requested else MOTION_WRITES
     dictionary = drive_dictionary().for_node(NODE_ID)
     stored = with_defaults(dictionary, {(0x6098, 0): 37})
     config = full_drive(sdo_writes=writes)
     net = VirtualNetwork(bus_config(config), dictionaries={JOINT: stored})
     net.boot()
     answer = net.do(JOINT, 'init')
-    assert ('homed by method 37' in answer) is asked
-    assert ('call ~/home' in answer) is not asked
+    assert ('homed by method 37' in answer) is requested
+    assert ('call ~/home' in answer) is not requested
 
 
 def test_init_homes_by_the_method_of_bus_yml_whatever_was_tried_before() -> None:

@@ -189,7 +189,7 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     failing.net.do(JOINT, 'enable')
 
 
-def test_a_drive_that_could_not_be_stopped_is_stopped_when_it_is_asked_for_again(
+def test_a_drive_that_could_not_be_stopped_is_stopped_by_the_next_request(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Neither RPDO nor SDO reaches it at first, which is reported with the remedy."""

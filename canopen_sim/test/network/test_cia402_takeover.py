@@ -79,7 +79,7 @@ def test_a_move_on_its_way_is_brought_to_its_end() -> None:
 
 
 def test_a_drive_that_is_not_enabled_is_not_enabled() -> None:
-    """Taking over asks for nothing."""
+    """Taking over requests nothing."""
     net = kept_alive()
     net.do('a', 'disable')
     net.replace_master()

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Devices that refuse a part of the boot plan: what nobody asked for does not stop the boot."""
+"""Devices that refuse a part of the boot plan: what no file configures does not stop the boot."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Refusing:
 
 @pytest.mark.parametrize('code', [TOO_HIGH, NO_SUBINDEX])
 def test_a_device_that_cannot_watch_the_master_boots(code: int) -> None:
-    """Nobody asked for it: one warning with the consequence and the key."""
+    """No file configures it: one warning with the consequence and the key."""
     scene = Refusing(io_config(heartbeat_consumer=True), refuses={(0x1016, 1): code})
     (warning,) = scene.boot()
     assert '0x1016:01' in warning
@@ -83,29 +83,29 @@ def test_a_device_that_watches_the_master_already_is_left_in_peace_at_the_end() 
 
 
 def test_a_device_that_shall_watch_the_master_has_to() -> None:
-    """Where bus.yml asks for it, the device is not started; the key is named."""
+    """Where bus.yml configures it, the device is not started; the key is named."""
     config = io_config(heartbeat_consumer=True)
     scene = Refusing(config, 'heartbeat_consumer', refuses={(0x1016, 1): TOO_HIGH})
     assert 'heartbeat_consumer: false' in scene.fail()
 
 
 def test_a_cob_id_that_is_right_already_is_not_written() -> None:
-    """A device whose COB-ID is read-only boots with the PDO that it has, and is not asked."""
+    """A device whose COB-ID is read-only boots with the PDO that it has, and gets no write."""
     config = io_config()
     rpdo = replace(config.rpdos[0], cob_id=0x200 + NODE_ID)
     config = replace(config, rpdos=(rpdo,), tpdos=())
     scene = Refusing(config, 'rpdo.1.mapping', refuses={(0x1400, 1): READ_ONLY})
-    asked: list[bytes] = []
-    scene.device.on_request = asked.append
+    requested: list[bytes] = []
+    scene.device.on_request = requested.append
     assert scene.boot() == []
     assert (0x1600, 0, 2) in scene.device.writes
     right = struct.pack('<I', 0x200 + NODE_ID)  # with bit 31 it is off while its mapping changes
-    written = [request[4:] for request in asked if request[:4] == b'\x23\x00\x14\x01']
+    written = [request[4:] for request in requested if request[:4] == b'\x23\x00\x14\x01']
     assert right not in written
 
 
 def test_a_cob_id_that_is_wrong_and_fixed_is_refused_with_the_key() -> None:
-    """bus.yml asks for another identifier than the device can have."""
+    """bus.yml has another identifier than the device can have."""
     config = replace(io_config(), tpdos=())
     refuses = {(0x1400, 1): READ_ONLY}
     reason = Refusing(config, 'rpdo.1.cob_id', refuses=refuses).fail()
@@ -130,7 +130,7 @@ def test_a_default_that_the_device_refuses_is_a_warning() -> None:
     assert 'rpdo.1.transmission' in warning
 
 
-def test_a_heartbeat_that_bus_yml_asks_for_has_to_be() -> None:
+def test_a_heartbeat_of_bus_yml_has_to_be() -> None:
     """Its refusal names the key."""
     scene = Refusing(io_config(), 'heartbeat_producer', refuses={(0x1017, 0): OUT_OF_RANGE})
     assert 'heartbeat_producer' in scene.fail()

@@ -75,7 +75,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
     ids=['device', 'guarding', 'tpdo', 'sdo', 'lss', 'extended'],
 )
 def test_devices_and_tools_are_no_master(frame: Frame) -> None:
-    """What a device or somebody who only asks may send does not hold up the start."""
+    """What a device or a tool that only reads may send does not hold up the start."""
     with SharedBus(frame) as bus:
         refuse_other_master(bus, BUS)
         assert bus.counters.received > 0

@@ -239,7 +239,7 @@ def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:
     assert speeds(net, since=begin)[-1] == 4_000
 
 
-def test_a_device_that_restarts_is_asked_again() -> None:
+def test_a_device_that_restarts_is_read_again() -> None:
     """What was published to the one before is not sent to the new one."""
     net = booted(outputs=0x11)
     publish(net, OUTPUTS, 0x99)

@@ -126,7 +126,7 @@ def test_lost_segments_are_sent_again(losses: set[int], write: bool) -> None:
 
 
 def test_one_lost_segment_costs_no_transfer() -> None:
-    """Of a block with a gap the rest is asked for again."""
+    """Of a block with a gap the rest is requested again."""
     line = BlockLine()
     value = bytes(range(256)) * 4
     line.store.find(BLOB).value = value
@@ -158,7 +158,7 @@ def test_changed_data_are_noticed_by_the_checksum() -> None:
 
 
 def test_a_server_without_blocks_gets_segments() -> None:
-    """It is asked for blocks once, and then never again."""
+    """Blocks are requested once, and then never again."""
     line = BlockLine()
     sent: list[bytes] = []
     client = SdoClient(NODE, 'joint1', line.scheduler, lambda frame: sent.append(frame.data))

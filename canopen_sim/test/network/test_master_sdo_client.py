@@ -64,7 +64,7 @@ class Line:
         self.scheduler.advance(self.scheduler.now + duration)
 
     def serve(self, answer: Callable[[bytes], bytes | None]) -> None:
-        """Answer until the client asks no more."""
+        """Answer until the client requests no more."""
         for _ in range(1000):
             if not self.sent:
                 return
@@ -315,7 +315,7 @@ def test_transfers_go_one_after_another_in_their_order() -> None:
     assert order == [0x1000, 0x1001, 0x1002]
 
 
-def test_a_transfer_may_be_asked_for_when_another_one_ends() -> None:
+def test_a_transfer_may_be_requested_when_another_one_ends() -> None:
     """A callback that reads again finds the client ready."""
     line = Line()
     second: list[Promise[bytes]] = []
@@ -383,7 +383,7 @@ def test_a_silent_device_is_not_written_to_blindly() -> None:
 
 @given(st.lists(st.sampled_from(['answer', 'late', 'silence']), min_size=1, max_size=6))
 def test_every_answer_belongs_to_its_question(fates: list[str]) -> None:
-    """Whatever comes late or never: a value that is returned was read after it was asked for."""
+    """Whatever comes late or never: a value that is returned was read after its request."""
     line = Line()
     late: list[bytes] = []
     for number, fate in enumerate(fates):
@@ -554,7 +554,9 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
     assert line.defects == []
 
 
-@pytest.mark.parametrize('progress', [0, 1, 2], ids=['asked', 'first segment', 'second segment'])
+@pytest.mark.parametrize(
+    'progress', [0, 1, 2], ids=['requested', 'first segment', 'second segment']
+)
 def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> None:
     """Those that wait come after it; the one that ran gets the reason."""
     line = Line()
@@ -592,7 +594,7 @@ def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_owed() -> 
         line.sent.clear()
 
 
-def test_who_asks_again_when_cancelled_is_served_after_it() -> None:
+def test_who_requests_again_when_cancelled_is_served_after_it() -> None:
     """A caller that repeats at once does not get lost in the clearing."""
     line = Line()
     again: list[Promise[bytes]] = []

@@ -23,7 +23,7 @@ GUARD_TIME = 0.05  # [s]
 
 
 def guarded_config(**changes: object) -> NodeConfig:
-    """Return a drive without heartbeat, which is asked for its state."""
+    """Return a drive without heartbeat, whose state is requested."""
     own = {
         'heartbeat_producer': 0.0,
         'heartbeat_timeout': 0.0,
@@ -34,7 +34,7 @@ def guarded_config(**changes: object) -> NodeConfig:
     return replace(drive_config('a', 2), **{**own, **changes})  # type: ignore[arg-type]
 
 
-def test_a_device_without_heartbeat_is_asked() -> None:
+def test_a_device_without_heartbeat_is_guarded() -> None:
     """Every guard time; its answers keep it online and report its NMT state."""
     net = VirtualNetwork(bus_config(guarded_config()))
     net.boot()
@@ -90,8 +90,8 @@ def test_a_device_that_never_answers_guarding_is_reported_once_and_left_in_peace
 
 def test_an_answer_that_is_repeated_is_none() -> None:
     """The toggle bit distinguishes a new answer from an old one."""
-    asked: list[Frame] = []
-    guarding = Guarding(5, 0.1, 2, asked.append)
+    requested: list[Frame] = []
+    guarding = Guarding(5, 0.1, 2, requested.append)
     guarding.start(0.0)
     assert not guarding.advance(0.0)
     assert guarding.receive(b'\x05')
@@ -101,7 +101,7 @@ def test_an_answer_that_is_repeated_is_none() -> None:
     assert not guarding.receive(b'\x85')
     assert not guarding.advance(0.2)
     assert guarding.advance(0.31)
-    assert asked == [Frame(0x705, is_remote=True)] * 3
+    assert requested == [Frame(0x705, is_remote=True)] * 3
 
 
 def test_an_emergency_is_received_where_the_device_sends_it() -> None:
@@ -175,7 +175,7 @@ def test_pdos_that_come_after_the_window_are_counted() -> None:
     assert patient.network.late_pdos == 0
 
 
-def test_time_is_sent_as_often_as_asked() -> None:
+def test_time_is_sent_as_often_as_configured() -> None:
     """TIME carries the time of day in milliseconds since midnight and days since 1984."""
     moment = datetime(2026, 11, 21, 7, 30, 0, 250_000, tzinfo=timezone.utc)
     sent: list[Frame] = []

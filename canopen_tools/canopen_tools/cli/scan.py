@@ -93,7 +93,10 @@ def add_parser(parsers: SubParsers) -> None:
         help=f'how long to listen first in s (default: {LISTEN})',
     )
     parser.add_argument(
-        '--ask', action='store_true', help='read the identities, also beside a running master'
+        '--query',
+        '--ask',  # codespell:ignore ask
+        action='store_true',
+        help='read the identities, also beside a running master',
     )
     parser.set_defaults(run=run)
 
@@ -106,12 +109,12 @@ def run(options: argparse.Namespace) -> int:
         warn(f'listening on {bus.name} for {options.listen:g} s')
         session.listen(options.listen)
         found = _frames(session, config)
-        if _may_query(session, ask=options.ask):
+        if _may_query(session, query=options.query):
             _find_silent(session, found)
             for device in found.values():
                 _identify(session, device)
             _find_unconfigured(session)
-        return _show(found, config, queried=options.ask or not session.masters)
+        return _show(found, config, queried=options.query or not session.masters)
 
 
 def _frames(session: Session, config: BusConfig | None) -> dict[int, Found]:
@@ -122,18 +125,18 @@ def _frames(session: Session, config: BusConfig | None) -> dict[int, Found]:
     }
 
 
-def _may_query(session: Session, *, ask: bool) -> bool:
+def _may_query(session: Session, *, query: bool) -> bool:
     if not session.masters:
         return True
     signs = ', '.join(sorted(session.masters))
-    if ask:
+    if query:
         warn(
             f'a master is on this bus ({signs}); while devices are queried, its transfers may fail'
         )
         return True
     warn(
         f'a master is on this bus ({signs}), so devices are not queried for their identity: each '
-        "has one SDO channel, which is the master's; --ask queries them nevertheless"
+        "has one SDO channel, which is the master's; --query reads them nevertheless"
     )
     return False
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A connection to a bus for as long as a verb runs: one loop, one thread, no background.
 
-Beside a running master it only listens, unless `--ask` is given: a device has one SDO channel
+Beside a running master it only listens, unless `--query` is given: a device has one SDO channel
 by default, which belongs to the master (CiA 301, 7.2.4.1).
 """
 
