@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a viewer needs of a robot: /tf from its description and its joint positions.
 
-:class:`StatePublisher` says which transforms follow from a JointState, as ROS'
+:class:`StatePublisher` computes which transforms follow from a JointState, as ROS'
 robot_state_publisher does; :class:`JointWatch` finds joints that are missing. Neither knows ROS;
 the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
 """

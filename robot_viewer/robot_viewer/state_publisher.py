@@ -127,7 +127,7 @@ def _sum(
 
 
 class StatePublisher:
-    """Says which transforms are to be published when joint positions come in."""
+    """Computes which transforms are to be published when joint positions come in."""
 
     def __init__(self, model: KinematicTree, settings: Settings | None = None) -> None:
         """Take a robot.

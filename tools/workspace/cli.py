@@ -76,7 +76,7 @@ def main(arguments: Sequence[str]) -> int:
         arguments: What stood behind the program's name.
 
     Returns:
-        The exit code: 0 done, 1 not done and said why, 130 interrupted.
+        The exit code: 0 done, 1 failed with the reason, 130 interrupted.
     """
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)

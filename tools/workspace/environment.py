@@ -80,7 +80,7 @@ class Environment:
         any kind leads to a new environment.
 
         Args:
-            state: What the environment says that it holds.
+            state: What the environment holds by its record.
             names: What is needed besides: `DEV`, and packages, of which some have a requirements
                 file of their own.
         """

@@ -13,7 +13,7 @@ WorkspaceError
 
 
 class WorkspaceError(Exception):
-    """Base of all: the message says what is wrong, `remedy` what to do about it.
+    """Base of all: the message has what is wrong, `remedy` what to do about it.
 
     Attributes:
         remedy: What a person can do, in one or more lines.
@@ -54,7 +54,7 @@ class NetworkError(WorkspaceError):
     """A download failed because there is no connection."""
 
     def __init__(self, what: str) -> None:
-        """Say what was to be downloaded."""
+        """Name what was to be downloaded."""
         super().__init__(
             f'No network: {what} could not be downloaded.',
             'Connect this machine to the network and run again; what is already there is kept.\n'

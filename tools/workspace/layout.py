@@ -35,7 +35,7 @@ class Layout:
 
     @property
     def state(self) -> Path:
-        """File that says what the virtual environment holds; absent while it is being changed."""
+        """File with what the virtual environment holds; absent while it is being changed."""
         return self.venv / '.workspace.json'
 
     @property

@@ -13,7 +13,7 @@ from pathlib import Path
 
 @contextlib.contextmanager
 def exclusive(path: Path) -> Iterator[int]:
-    """Hold the lock file locked; wait for another holder and say so.
+    """Hold the lock file locked; wait for another holder and print that.
 
     The lock goes away with its last holder, however that ends. Programs that are given the
     descriptor hold it too, so a killed set-up's orphans keep the next one waiting.

@@ -64,7 +64,7 @@ class Session(KeyboardSession[Jog, Request]):
         """
         super().__init__(keyboard, node.teleop, HELP, stop)
         self._teleop = node.teleop
-        self._link = ServoLink(node, node.link, self.line.say)
+        self._link = ServoLink(node, node.link, self.line.message)
 
     def publish(self, command: Jog) -> None:
         """Publish a motion."""

@@ -40,7 +40,7 @@ class View(Protocol[FiguresT_contra]):
         """What runs, and where."""
 
     def fits(self, width: int, height: int) -> bool:
-        """Say whether a terminal of so many columns and lines has room for the table."""
+        """Return whether a terminal of so many columns and lines has room for the table."""
 
     def render(
         self, figures: FiguresT_contra, status: DemoStatus, width: int, height: int
@@ -48,7 +48,7 @@ class View(Protocol[FiguresT_contra]):
         """Draw the table into so many columns and lines."""
 
     def progress(self, figures: FiguresT_contra) -> str:
-        """Say in a line how it goes."""
+        """Return one line of progress."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Display(Protocol[FiguresT_contra]):
     """What a demo needs of its place to show things."""
 
     def phase(self, text: str) -> None:
-        """Say what is going on now."""
+        """Return what is going on now."""
 
     def show(self, figures: FiguresT_contra) -> None:
         """Show the latest figures; called several times a second."""
@@ -135,7 +135,7 @@ class LineDisplay(Generic[FiguresT]):
         """Write it.
 
         Args:
-            notice: What is to be said.
+            notice: The notice.
         """
         self._write(self._setting.painter.notice(notice))
 
@@ -147,7 +147,7 @@ class LineDisplay(Generic[FiguresT]):
 
 
 class TableDisplay(Generic[FiguresT]):
-    """A live table; what the processes say is kept below it when it is a warning."""
+    """A live table; warnings of the processes are kept below it."""
 
     def __init__(self, setting: Setting[FiguresT], console: Console) -> None:
         """Begin with an empty table.
@@ -200,7 +200,7 @@ class TableDisplay(Generic[FiguresT]):
         """Keep it.
 
         Args:
-            notice: What is to be said.
+            notice: The notice.
         """
         self._keep(notice.severity, notice.text)
         self._refresh()

@@ -22,7 +22,7 @@ class DemoStatus:
     Attributes:
         elapsed: Time since the start in [s].
         phase: What is going on.
-        messages: What was said last.
+        messages: The last messages.
         commands: Commands to try in a second terminal.
     """
 

@@ -85,7 +85,7 @@ def run_demo(
 def conclude(
     write: LineWriter, scenario: DemoScenario[Any], outcome: Outcome, *, with_summary: bool
 ) -> int:
-    """Say how it went.
+    """Report how it went.
 
     Args:
         write: Takes the lines.

@@ -28,7 +28,7 @@ def refuse_misspelt(node: Node, is_known: Callable[[str], bool] = lambda _: Fals
         The names that were given and are known so; they have no effect.
 
     Raises:
-        ParameterError: There is one; the message says what was meant.
+        ParameterError: There is one; the message names the likely one.
     """
     given = node._parameter_overrides  # noqa: SLF001  # there is no public way to read it
     others = [name for name in given if not node.has_parameter(name)]
@@ -50,7 +50,7 @@ def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
         known: Names that there are.
 
     Raises:
-        ParameterError: There is one; the message says what was meant.
+        ParameterError: There is one; the message names the likely one.
     """
     names = list(known)
     for name in sorted(unknown):

@@ -90,7 +90,7 @@ def choice(name: str, value: object, values: Mapping[str, Choice]) -> Choice:
     """Return what one of several names stands for.
 
     Raises:
-        ParameterError: It is none of them; the message says which one was meant.
+        ParameterError: It is none of them; the message names the likely one.
     """
     chosen = text(name, value)
     if chosen not in values:

@@ -24,7 +24,7 @@ def declare_thread_priority(read: ParameterReader, default: int) -> int:
 
 
 def raise_thread_priority(node: Node, priority: int, what: str) -> None:
-    """Give the calling thread its priority; a refusal is a warning that says how to get it."""
+    """Give the calling thread its priority; a refusal is a warning with the remedy."""
     _log(node, raise_priority(priority, what), refused=node.get_logger().warning)
 
 

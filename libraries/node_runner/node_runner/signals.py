@@ -24,7 +24,7 @@ def stop_on_signals(
     """Set an event at the first signal of :data:`ENDING`; nothing is torn in the middle.
 
     A second SIGINT, later than :data:`ECHO_TIME`, ends the process at once. A SIGTERM or SIGHUP
-    does not: what stops processes (``ros2 launch``, say) sends one when the first signal seems to
+    does not: ``ros2 launch`` and its like send one when the first signal seems to
     do nothing, while a robot comes to rest. A SIGHUP that is ignored already stays so, as
     ``nohup`` wants it.
 

@@ -54,7 +54,7 @@ class AutoRepeat:
         return max(self._guess, SLOWEST_DELAY * MARGIN, self.repeat)
 
     def is_new_stroke(self, gap: float) -> bool:
-        """Say whether the same character came from a finger, not from the keyboard's repeat.
+        """Return whether the same character came from a finger, not from the keyboard's repeat.
 
         Only a learned delay can decide: what comes much before it is no repeat.
 

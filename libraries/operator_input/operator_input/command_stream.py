@@ -64,7 +64,7 @@ class CommandStream(Generic[T]):
             self.stop()
 
     def step(self, wanted: T | None, now: float) -> T | None:
-        """Say what to publish now.
+        """Return what to publish now.
 
         Args:
             wanted: Command; None when the source is not active.

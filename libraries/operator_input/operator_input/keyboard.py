@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class ReleaseSource(Enum):
-    """Who says when a key goes up."""
+    """Source of key releases."""
 
     TERMINAL = 'terminal'
     """The Kitty keyboard protocol."""
@@ -67,7 +67,7 @@ class Keyboard:
 
     @property
     def release_source(self) -> ReleaseSource:
-        """Who says at the moment when a key goes up."""
+        """Source of key releases at the moment."""
         if self._terminal.stage is Stage.ACTIVE:
             return ReleaseSource.TERMINAL
         return ReleaseSource.KEYBOARD if self._keyboards.names else ReleaseSource.TIME_OUT

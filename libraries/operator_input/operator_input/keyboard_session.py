@@ -73,8 +73,8 @@ class KeyboardSession(Session[Command], Generic[Command, Request]):
         """
 
     def begin(self) -> None:
-        """Say which keys there are."""
-        self.line.say(self._introduction)
+        """Show which keys there are."""
+        self.line.message(self._introduction)
 
     def serve(self) -> None:
         """Wait for keys, publish, show."""
@@ -100,7 +100,7 @@ class KeyboardSession(Session[Command], Generic[Command, Request]):
     def _do(self, request: Request) -> None:
         match request:
             case Note(text):
-                self.line.say(text)
+                self.line.message(text)
             case Quit():
                 self._stop.set()
             case Suspend():
@@ -112,4 +112,4 @@ class KeyboardSession(Session[Command], Generic[Command, Request]):
         self.end()
         with self.keyboard.paused():
             os.killpg(0, signal.SIGTSTP)  # goes on here after the shell's fg
-        self.line.say('going on')
+        self.line.message('going on')

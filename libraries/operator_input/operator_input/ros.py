@@ -26,7 +26,7 @@ from .session import Session
 
 @dataclass(frozen=True, slots=True)
 class KeyboardSettings:
-    """What the parameters say of the keyboard.
+    """Parameters of the keyboard.
 
     Attributes:
         auto_repeat: Time-outs of keys whose release is not reported.

@@ -22,7 +22,7 @@ class Teleop(Protocol[Command_co]):
     """Decides what to publish; pure, time is handed in."""
 
     def step(self, now: float) -> Command_co | None:
-        """Say what to publish now; None for nothing."""
+        """Return what to publish now; None for nothing."""
 
     def due(self, now: float) -> float:
         """Return when step() has to be called at the latest [s]; may be infinite."""
@@ -67,7 +67,7 @@ class Session(ABC, Generic[Command]):
 
     @abstractmethod
     def begin(self) -> None:
-        """Say what there is to say at the start."""
+        """Show the introduction."""
 
     @abstractmethod
     def serve(self) -> None:

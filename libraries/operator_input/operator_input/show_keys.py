@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run operator_input show_keys``: what this terminal says about its keys."""
+"""``ros2 run operator_input show_keys``: how this terminal reports its keys."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def main() -> None:
 
 def _show(keyboard: Keyboard) -> None:
     line, held = keyboard.status_line(), HeldKeys()
-    line.say('press and hold keys; q or Ctrl-C ends')
+    line.message('press and hold keys; q or Ctrl-C ends')
     while True:
         for event in keyboard.wait(0.05):
             held.feed(event)
-            line.say(f'{event.time:12.3f}  {event.key:10}  {event.action.value}')
+            line.message(f'{event.time:12.3f}  {event.key:10}  {event.action.value}')
             if event.is_stroke and event.key in {'q', 'ctrl+c'}:
                 line.end()
                 return

@@ -43,7 +43,7 @@ def test_message_stays_above_the_line() -> None:
     paper = Paper(40)
     line = StatusLine(paper)
     line.show('status')
-    line.say('message')
+    line.message('message')
     assert paper.text.endswith('\r\x1b[Kmessage\nstatus')
 
 

@@ -26,11 +26,11 @@ REPORTED_STATES = {Phase.RUNNING: 'READY=1', Phase.STOPPING: 'STOPPING=1'}
 class Shutdown(Protocol):
     """What is done at the first Ctrl-C, while all processes still run."""
 
-    def __call__(self, say: Callable[[str], None], given_up: Callable[[], bool]) -> None:
+    def __call__(self, log: Callable[[str], None], given_up: Callable[[], bool], /) -> None:
         """Do it; everything is stopped when this returns.
 
         Args:
-            say: Shows the user a message.
+            log: Shows the user a message.
             given_up: True when it is no longer wanted: Ctrl-C again, or a process has ended.
         """
 
@@ -123,7 +123,7 @@ class _ShutdownThread:
 
 
 def explain(outcome: Outcome) -> str:
-    """Say why a bring-up failed, with what the process wrote last.
+    """Return why a bring-up failed, with what the process wrote last.
 
     Args:
         outcome: How it ended.

@@ -30,7 +30,7 @@ class StartError(SupervisorError, OSError):
 class CallError(SupervisorError):
     """What runs refused something, did not answer in time, or is in a fault.
 
-    Scenarios: a drive that does not enable says why, a mode that is not accepted, a robot that has
+    Scenarios: a drive that does not enable, a mode that is not accepted, a robot that has
     fallen, a service that is not there.
     """
 

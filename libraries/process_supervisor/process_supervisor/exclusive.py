@@ -30,7 +30,7 @@ def exclusive(thing: str, remedy: str) -> Iterator[None]:
         remedy: What to take instead, for the message: ``another bus with --can``.
 
     Raises:
-        StartError: Another process holds it; the message says which.
+        StartError: Another process holds it; the message names it.
     """
     name = f'\0bringup {thing}'.encode()[:_LONGEST]
     with socket.socket(socket.AF_UNIX) as holder:

@@ -27,7 +27,7 @@ LOG_FORMAT = {
 ANY_NODE = '/**'
 EVERY_NODE = f'{ANY_NODE}{ANY_NODE}'
 """All nodes, in files of our own. rcl keeps one entry per spelling, and a later entry counts more:
-what a person says by -p or of /**, which is the same, comes behind ours in this way."""
+what a person sets by -p or for /**, which is the same, comes behind ours in this way."""
 VALUES = 'ros__parameters'
 YAML_TAG = 'tag:yaml.org,2002:'
 
@@ -106,13 +106,13 @@ def node_argv(
         values: ROS parameters as the command line takes them.
         parameters: ROS parameter files, of this program's own or of
             :func:`namespaced_parameters`; a later one counts more.
-        ros: Options of all nodes; what a person says there counts most.
+        ros: Options of all nodes; what a person sets there counts most.
 
     Returns:
         Program and arguments.
 
     Raises:
-        StartError: The executable is missing; the message says how to get it.
+        StartError: The executable is missing; the message has the remedy.
     """
     file = find(executable.package, executable.name)
     if file is None:

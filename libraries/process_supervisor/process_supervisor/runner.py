@@ -154,7 +154,7 @@ class Runner:
         for number in LEAVE_SIGNALS:
             if number is signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN:
                 continue  # started by nohup
-            handler = signal.signal(number, lambda *_: None)  # the wake-up byte says which
+            handler = signal.signal(number, lambda *_: None)  # the wake-up byte is its number
             self._restore.append(partial(signal.signal, number, handler))
 
     @property

@@ -306,7 +306,7 @@ def _severity(returncode: int) -> Severity:
 
 
 def describe_exit(returncode: int) -> str:
-    """Say in words how a process ended.
+    """Return in words how a process ended.
 
     Args:
         returncode: Exit code; negative for the signal that killed it.

@@ -37,7 +37,7 @@ SEVERITIES = {
 
 
 def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
-    """Say whether output shall be coloured.
+    """Return whether output shall be coloured.
 
     Args:
         stream: Where it goes.
@@ -47,7 +47,7 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
 
 
 def is_smart(environment: Mapping[str, str]) -> bool:
-    """Say whether the terminal understands more than plain text.
+    """Return whether the terminal understands more than plain text.
 
     Args:
         environment: Variables: TERM counts.
@@ -56,7 +56,7 @@ def is_smart(environment: Mapping[str, str]) -> bool:
 
 
 def severity_of(line: str) -> Severity:
-    """Say how loud a line of a ROS node's output is.
+    """Return how loud a line of a ROS node's output is.
 
     Args:
         line: A line of its output; one that is no log line, such as that of a traceback, is a
@@ -98,7 +98,7 @@ class Painter:
         """Format a notice of the program itself.
 
         Args:
-            notice: What is to be said.
+            notice: The notice.
         """
         prefix = self._prefix(self.own)
         if not self.colour:

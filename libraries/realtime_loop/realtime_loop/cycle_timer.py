@@ -22,7 +22,7 @@ class Cycle(NamedTuple):
 
 
 class CycleTimer:
-    """Says when the next cycle is due; after a stall cycles are skipped, and never made up for.
+    """When the next cycle is due; after a stall cycles are skipped, and never made up for.
 
     So each cycle has a place of its own on the grid, and what is commanded in a cycle lasts for a
     period: a motion is late after a stall, but not faster.

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real-time priority, locked memory and a frozen garbage collector, where the system grants them.
 
-A process does without what is refused; the outcome says in one line what that means and how to
+A process does without what is refused; the outcome is one line with what that means and how to
 get it.
 """
 

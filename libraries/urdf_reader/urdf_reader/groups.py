@@ -102,7 +102,7 @@ def _joints(tree: KinematicTree, semantic: SemanticDescription, group: Group) ->
             )
     above = {joint.child: joint for joint in tree.joints}
     for link in group.links:
-        tree.chain(tree.root, link)  # or says that there is no such link
+        tree.chain(tree.root, link)  # or raises: there is no such link
         if link in above:
             yield above[link]
 
@@ -145,5 +145,5 @@ def _ends(
     base = next((link for link in bases if link in inward), bases[0])
     moving = [joint for joint in tree.chain(tree.root, base) if joint.name in joints]
     base = moving[0].parent if moving else base  # a lift below the chain of the arm
-    tree.chain(base, end)  # or says why not
+    tree.chain(base, end)  # or raises with the reason
     return base, end

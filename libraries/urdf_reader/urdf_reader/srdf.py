@@ -41,7 +41,7 @@ class EndEffector:
         name: Its name.
         group: Group of its joints and links.
         parent_link: Link of the arm to which it is fixed.
-        parent_group: Group of that arm, if it says so.
+        parent_group: Group of that arm, if it is named.
     """
 
     name: str
@@ -52,7 +52,7 @@ class EndEffector:
 
 @dataclass(frozen=True, slots=True)
 class SemanticDescription:
-    """What an SRDF says.
+    """Contents of an SRDF.
 
     Attributes:
         groups: Groups by name.

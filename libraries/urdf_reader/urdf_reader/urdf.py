@@ -131,7 +131,7 @@ class Collision:
 
     Attributes:
         link: Name of the link.
-        shape: What it is: box, cylinder, sphere, mesh, or empty where nothing is said.
+        shape: What it is: box, cylinder, sphere, mesh, or empty where there is none.
         attributes: Its attributes as they are written.
         origin: Where it is in the link's frame.
     """
@@ -157,7 +157,7 @@ class Collision:
 
 @dataclass(frozen=True, slots=True)
 class KinematicTree:
-    """What a URDF says.
+    """Contents of a URDF.
 
     Attributes:
         name: Name of the robot.
@@ -257,7 +257,7 @@ def read_urdf(text: str) -> KinematicTree:
         text: The URDF as XML text.
 
     Returns:
-        What it says.
+        Its contents.
 
     Raises:
         DescriptionError: The text is empty or no URDF, or its joints make no tree; the message

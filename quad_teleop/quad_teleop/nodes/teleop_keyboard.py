@@ -64,7 +64,7 @@ class Session(KeyboardSession[Velocity, Request]):
         """
         super().__init__(keyboard, node.teleop, HELP, stop)
         self._node = node
-        self._controller = Controller(node, self.line.say)
+        self._controller = Controller(node, self.line.message)
         self._hint = ''
 
     def publish(self, command: Velocity) -> None:
@@ -99,7 +99,7 @@ class Session(KeyboardSession[Velocity, Request]):
         )
         text = hint(view)
         if text and text != self._hint:
-            self.line.say(text)
+            self.line.message(text)
         if text or view.velocity:  # said once for each reason, and again after the next motion
             self._hint = text
         self.line.show(status(view, self.colour))

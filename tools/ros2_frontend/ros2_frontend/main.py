@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _leave(int(signal.SIGINT))
     except BrokenPipeError:
         return _leave(_BROKEN_PIPE)
-    except RuntimeError as error:  # a FrontendError, or what rcl says of a bad ROS_DOMAIN_ID
+    except RuntimeError as error:  # a FrontendError, or the error of rcl for a bad ROS_DOMAIN_ID
         print(error, file=sys.stderr)
         return _leave(1)
     return code

@@ -32,7 +32,7 @@ class InputEvent:
 
 @dataclass(frozen=True, slots=True)
 class AxisRange:
-    """What the device says about an axis.
+    """Range and position of an axis, as the device reports them.
 
     Attributes:
         minimum: Smallest value [device units].

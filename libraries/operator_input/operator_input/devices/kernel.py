@@ -28,7 +28,7 @@ class KernelDevice:
         """Open it.
 
         Args:
-            path: ``/dev/input/event3``, say.
+            path: such as ``/dev/input/event3``.
 
         Raises:
             DeviceError: It is gone, or may not be read, or the package evdev is missing.
@@ -124,7 +124,7 @@ class KernelDevices:
         return KernelDevice(path)
 
     def problem(self) -> str:
-        """Say why nothing can be read, and what helps; empty when something can."""
+        """Return why nothing can be read, and what helps; empty when something can."""
         if importlib.util.find_spec('evdev') is None:
             return MISSING
         folder = Path(self._folder)

@@ -14,7 +14,7 @@ def is_local(
     environment: Mapping[str, str],
     read_tmux: Callable[[], str] | None = None,
 ) -> bool:
-    """Say whether keys come from a keyboard of this machine.
+    """Return whether keys come from a keyboard of this machine.
 
     Inside tmux the person may have come by SSH after the shell was started; tmux knows.
 
@@ -22,7 +22,7 @@ def is_local(
         environment: Variables of this process.
         read_tmux: Returns tmux's record of SSH_CONNECTION; replaced in tests.
     """
-    if environment.get('STY'):  # screen does not say who is attached
+    if environment.get('STY'):  # screen does not report who is attached
         return False
     if environment.get('TMUX'):
         answer = (read_tmux or _read_tmux)()

@@ -90,7 +90,7 @@ class ReleaseMatcher:
         return [event]
 
     def lose_all(self, now: float) -> list[KeyEvent]:
-        """Take the loss of a keyboard: nothing will say when its keys go up.
+        """Take the loss of a keyboard: its keys will not be reported as released.
 
         Args:
             now: Time [s].

@@ -33,7 +33,7 @@ class Timeout:
     """How long something may last.
 
     Attributes:
-        parameter: Name of the parameter that says so.
+        parameter: Name of its parameter.
         duration: Time [s].
     """
 
@@ -70,7 +70,7 @@ class Deadman:
             )
 
     def grip(self, state: GamepadState) -> Grip:
-        """Say what the person allows.
+        """Return what the person allows.
 
         Args:
             state: The gamepad.
@@ -89,7 +89,7 @@ class Deadman:
 
 
 def is_pressed(button: Button, state: GamepadState) -> bool:
-    """Say whether a button is pressed; a trigger is, too, when its axis is beyond the middle.
+    """Return whether a button is pressed; a trigger is, too, when its axis is beyond the middle.
 
     Args:
         button: Which.

@@ -115,7 +115,7 @@ class Preset:
     buttons: Mapping[int, Button]
 
     def fits(self, info: DeviceInfo) -> bool:
-        """Say whether a device is of this kind.
+        """Return whether a device is of this kind.
 
         Args:
             info: The device.
@@ -153,7 +153,7 @@ AUTO = 'auto'
 
 
 def is_gamepad(info: DeviceInfo) -> bool:
-    """Say whether a device is a gamepad or joystick, not a keyboard, mouse or tilt sensor.
+    """Return whether a device is a gamepad or joystick, not a keyboard, mouse or tilt sensor.
 
     Args:
         info: The device.

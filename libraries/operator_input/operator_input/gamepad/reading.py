@@ -67,7 +67,7 @@ class GamepadReading:
         """Take the whole state, as at the start and after events were lost.
 
         Args:
-            state: What the device says.
+            state: As the device reports it.
         """
         self._buttons = {
             self._preset.buttons[code] for code in state.keys if code in self._preset.buttons
@@ -91,7 +91,7 @@ def position(axis: Axis, span: AxisRange, value: int, dead_zone: float) -> float
 
     Args:
         axis: Which; a trigger rests at its minimum, all others in the middle.
-        span: What the device says about it.
+        span: Its range, as the device reports it.
         value: What it reports [device units].
         dead_zone: Share of the way that counts as rest.
 

@@ -43,7 +43,7 @@ class GamepadSession(Session[Command]):
         """Warn the person."""
 
     def begin(self) -> None:
-        """Say why there is no gamepad, if there is none."""
+        """Return why there is no gamepad, if there is none."""
         self._gamepad.scan(time.monotonic())
         if not self._gamepad.is_connected:
             problem = KernelDevices().problem() or 'plug one in, or switch it on'

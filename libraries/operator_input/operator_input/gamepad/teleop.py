@@ -21,7 +21,7 @@ class DeadmanTeleop(ABC, Generic[Command]):
     deadman has to be released and pressed anew then.
 
     Attributes:
-        state: What the gamepad said last.
+        state: Last state of the gamepad.
         expired: Whether a motion has ended so, and the deadman was not released since.
     """
 
@@ -64,7 +64,7 @@ class DeadmanTeleop(ABC, Generic[Command]):
         return before
 
     def step(self, now: float) -> Command | None:
-        """Say what to publish now; call it after every state and when it is due.
+        """Return what to publish now; call it after every state and when it is due.
 
         Args:
             now: Time [s].

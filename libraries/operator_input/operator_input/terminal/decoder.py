@@ -17,7 +17,7 @@ class KeyDecoder:
     """Turns bytes into key events, of every encoding that terminals use.
 
     Attributes:
-        reports_releases: Whether the terminal said that it will report releases; then a key is
+        reports_releases: Whether the terminal has confirmed to report releases; then a key is
             PRESSED, otherwise TYPED.
     """
 

@@ -32,7 +32,7 @@ class KittyKey:
     Attributes:
         code: Identifies the key while it is down, whatever the modifiers do.
         name: Name of the key with its modifiers; empty for a modifier itself or an unknown key.
-        event: 1 press, 2 repeat, 3 release; None where the sequence does not say.
+        event: 1 press, 2 repeat, 3 release; None where the sequence has none.
     """
 
     code: str

@@ -30,7 +30,7 @@ class Liveness:
         return self._unanswered_since is not None
 
     def probe_due(self, now: float) -> bool:
-        """Say whether to send a probe now, and take it as sent.
+        """Return whether to send a probe now, and take it as sent.
 
         Args:
             now: Time [s].
@@ -43,7 +43,7 @@ class Liveness:
         return True
 
     def is_lost(self, now: float) -> bool:
-        """Say whether the terminal has been silent for too long.
+        """Return whether the terminal has been silent for too long.
 
         Args:
             now: Time [s].

@@ -45,7 +45,7 @@ class StatusLine:
             self._output.write(CLEAR_LINE + line)
             self._shown = line
 
-    def say(self, text: str) -> None:
+    def message(self, text: str) -> None:
         """Write lines above it, which stay.
 
         Args:

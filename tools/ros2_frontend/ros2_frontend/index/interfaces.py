@@ -90,7 +90,7 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
     Args:
         name: `package/kind/Name`, or `package/Name`.
         kind: The wanted kind.
-        refusal: What ros2cli says when the type is not good, e.g. `The passed message type is
+        refusal: Message of ros2cli when the type is not good, e.g. `The passed message type is
             invalid`.
 
     Returns:

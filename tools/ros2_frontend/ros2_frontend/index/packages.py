@@ -36,7 +36,7 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
 
     Args:
         package: Its name.
-        message: What to say when it is not there; `{0}` stands for the name.
+        message: The error when it is not there; `{0}` stands for the name.
 
     Returns:
         Its prefix path.

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a message to plain Python data, abbreviated as the options say.
+"""From a message to plain Python data, abbreviated as the options set.
 
 The rules are those that `ros2 topic echo` shows: bytes become text of the same code points, long
-values end in `...`, left-out values say what they are. Nothing here imports rclpy: a message is
+values end in `...`, left-out values are named by type. Nothing here imports rclpy: a message is
 anything with `get_fields_and_field_types()` and `SLOT_TYPES`.
 """
 

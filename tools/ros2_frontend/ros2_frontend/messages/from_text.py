@@ -17,10 +17,10 @@ def parse_yaml(text: str) -> Document:
         text: For example `{ target: 10.0 }`.
 
     Returns:
-        What it says; None for an empty text.
+        The data; None for an empty text.
 
     Raises:
-        FieldValueError: When it is no YAML; it says where.
+        FieldValueError: When it is no YAML, with the place.
     """
     import yaml
 

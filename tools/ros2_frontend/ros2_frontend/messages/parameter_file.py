@@ -43,12 +43,12 @@ def dump(node: str, values: Mapping[str, object]) -> str:
 
 
 def values_for(node: str, text: str, *, use_wildcard: bool = True) -> dict[str, object]:
-    """Read what a parameter file says for one node.
+    """Read the parameters of one node in a parameter file.
 
     Args:
         node: The node's full name.
         text: The file's content.
-        use_wildcard: Whether what it says for all nodes (`/**`) counts, too.
+        use_wildcard: Whether those for all nodes (`/**`) counts, too.
 
     Returns:
         The values by parameter name. What names the node goes before what is for all nodes.

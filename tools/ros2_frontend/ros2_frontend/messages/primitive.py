@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a YAML scalar to a value of a primitive ROS type, or an error that says what is taken."""
+"""From a YAML scalar to a value of a primitive ROS type, or an error with what is accepted."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 
 Every participant listens for discovery traffic on one UDP port whose number follows from the
 domain (DDSI-RTPS 2.2, 9.6.1.1). Counting these ports shows whether discovery is complete, which
-DDS itself cannot say.
+DDS itself cannot count.
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ def profile_of(args: Namespace) -> QosProfile:
 
 
 def matching_profile(
-    args: Namespace, graph: Graph, topic: str, say: Callable[[str], None]
+    args: Namespace, graph: Graph, topic: str, report: Callable[[str], None]
 ) -> QosProfile:
     """The profile that connects to all publishers of a topic, unless the options name one.
 
@@ -126,7 +126,7 @@ def matching_profile(
         args: Parsed arguments of `add_qos_arguments`.
         graph: The graph with the publishers.
         topic: The topic's absolute name.
-        say: Called with a message when the publishers differ.
+        report: Called with a message when the publishers differ.
 
     Returns:
         Reliable when all publishers are, transient local when all are; else what connects to all.
@@ -143,7 +143,7 @@ def matching_profile(
     ):
         offered = [getattr(publisher, name) == strong for publisher in publishers]
         if any(offered) and not all(offered):
-            say(_FALL_BACK.format(_policy_name(strong), _policy_name(weak)))
+            report(_FALL_BACK.format(_policy_name(strong), _policy_name(weak)))
         setattr(profile, name, strong if all(offered) else weak)
     return profile
 

@@ -56,7 +56,7 @@ _DISPOSED_AND_UNREGISTERED = bytes((0, 0, 0, 3))
 
 @dataclass(frozen=True, slots=True)
 class ProbeParticipant:
-    """A participant that exists only in what it says.
+    """A participant that exists only in its messages.
 
     Attributes:
         prefix: Its GUID prefix, 12 bytes.
@@ -72,7 +72,7 @@ class ProbeParticipant:
         return self.prefix + _PARTICIPANT
 
     def announcement(self) -> bytes:
-        """The RTPS message that says it is here."""
+        """The RTPS message that announces it."""
         locator = struct.pack('<iI', _LOCATOR_KIND_UDPV4, self.port) + _ipv4(_LOOPBACK)
         parameters = (
             _parameter(_PID_PROTOCOL_VERSION, bytes((2, 2, 0, 0))),
@@ -86,7 +86,7 @@ class ProbeParticipant:
         return self._message(1, _WITH_DATA, b'', _PL_CDR_LE + _list(parameters))
 
     def disposal(self) -> bytes:
-        """The RTPS message that says it is gone."""
+        """The RTPS message that disposes it."""
         inline = _list(
             (
                 _parameter(_PID_KEY_HASH, self.guid),

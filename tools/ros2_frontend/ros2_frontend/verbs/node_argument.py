@@ -50,7 +50,7 @@ def find_node(name: str, graph: Graph, hidden: bool, message: str = _NOT_FOUND) 
         name: Its name as typed.
         graph: The graph to look into.
         hidden: Whether hidden nodes count.
-        message: What ros2cli says when it is not there.
+        message: Message of ros2cli when it is not there.
 
     Returns:
         Its full name.

@@ -20,7 +20,7 @@ from ..ros.graph import Graph, open_graph
 from ..ros.names import absolute, is_hidden
 from .service import SERVICES
 
-_GRACE = 0.02  # [s]; ros2cli, too, says nothing when the service is there at once
+_GRACE = 0.02  # [s]; ros2cli, too, prints nothing when the service is there at once
 
 
 @verb(
@@ -72,7 +72,7 @@ def call(args: Namespace) -> None:
 
 
 def _await(client: Client, graph: Graph, args: Namespace) -> None:
-    """Wait for the service; say so when it is not there at once, and what else is."""
+    """Wait for the service; print it when it is not there at once, and what else is."""
     if client.wait(_GRACE):
         return
     print('waiting for service to become available...')

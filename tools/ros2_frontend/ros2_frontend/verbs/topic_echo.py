@@ -116,7 +116,7 @@ def echo(args: Namespace) -> None:
 
 
 class Printer:
-    """Prints messages as the options say.
+    """Prints messages as the options set.
 
     Attributes:
         count: How many were printed.

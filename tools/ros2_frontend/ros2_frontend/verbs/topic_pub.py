@@ -23,7 +23,7 @@ from ..ros.session import open_session, Session
 from .topic import TOPICS
 from .topic_types import message_class
 
-_REMINDER = 1.0  # [s] between two lines that say what is waited for
+_REMINDER = 1.0  # [s] between two lines about what is waited for
 _KEEP_ALIVE = 0.1  # [s]
 
 
@@ -129,7 +129,7 @@ def pub(args: Namespace) -> None:
 def _await_subscriptions(
     session: Session, graph: Graph, publisher: Handle, wanted: int, longest: float | None
 ) -> None:
-    """Wait for subscriptions, with a line each second that says so."""
+    """Wait for subscriptions, with a line each second."""
     deadline = time.monotonic() + (math.inf if longest is None else longest)
 
     def enough() -> bool | None:
