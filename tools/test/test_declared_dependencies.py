@@ -93,8 +93,8 @@ def test_what_pip_installs_is_declared_for_colcon_and_rosdep(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What setup.py names package.xml names, too, but for what is optional or has no key."""
-    asked = {*declared(name, monkeypatch)}
-    keys = asked & PACKAGES.keys() | {ROSDEP[each] for each in asked & ROSDEP.keys()}
+    named = {*declared(name, monkeypatch)}
+    keys = named & PACKAGES.keys() | {ROSDEP[each] for each in named & ROSDEP.keys()}
     missing = keys - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
     assert not missing, f'add an exec_depend to {name}/package.xml'
 
