@@ -7,7 +7,7 @@ import sys
 
 from setuptools import find_packages, setup
 
-# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+# colcon runs one of these commands; pip builds a wheel, and what needs `ros2 run` is not in it
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [

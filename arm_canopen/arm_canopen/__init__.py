@@ -3,7 +3,7 @@
 """CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
 The names here are the public API. Those that need ROS, or take long, are loaded when they are
-asked for. Public besides, for tools and simulated devices: the modules of `standard`, `config` and
+used. Public besides, for tools and simulated devices: the modules of `standard`, `config` and
 `can`, `exceptions`, and what `master` names.
 """
 

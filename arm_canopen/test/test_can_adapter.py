@@ -61,7 +61,7 @@ def opened_with(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
 def test_a_name_is_interface_channel_and_bit_rate(
     opened_with: dict[str, object], name: str, interface: str, channel: str, bitrate: int | None
 ) -> None:
-    """The parts of the name reach the driver, own messages are not asked for."""
+    """The parts of the name reach the driver, own messages are not requested."""
     with open_bus(name) as bus:
         assert bus.name == name
     assert opened_with['interface'] == interface

@@ -110,7 +110,7 @@ def test_the_window_slides() -> None:
     """Only the last second counts: a bus that went silent shows nothing after it."""
     load = BusLoad(500_000, now=0.0)
     now = 0.0
-    for _ in range(30):  # 3 s at 50 frames/s, asked every 0.1 s
+    for _ in range(30):  # 3 s at 50 frames/s, read every 0.1 s
         for _ in range(5):
             load.count(Frame(1, b'12345678'))
         now += 0.1

@@ -70,7 +70,7 @@ def test_what_one_means(
 
 
 def test_an_eds_without_factor_group_has_no_radians(tmp_path: Path) -> None:
-    """Then nobody knows what an increment is, and the group cannot be asked for."""
+    """Then nobody knows what an increment is, and the group cannot be used."""
     assert units_of(tmp_path, 'mandatory: false', eds=eds_text()).radians is None
     text = added(JOINT, 'scale_from_factor_group: true')
     (error,) = check_file(write_bus(tmp_path, text)).errors
@@ -134,7 +134,7 @@ def test_a_position_within_the_tolerance_is_taken(
 @pytest.mark.parametrize(
     ('scale', 'target', 'taken'),
     [
-        (0.3, 5.1, True),  # 1.53 device units; a whole number is not what was asked for
+        (0.3, 5.1, True),  # 1.53 device units; a whole number is not the target
         (0.3, -1.7, True),
         (0.3, 1.6, False),
         (0.3, -1.6, False),

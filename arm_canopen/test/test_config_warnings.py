@@ -66,7 +66,7 @@ def test_scales_of_a_channel_are_checked_as_those_of_a_device(tmp_path: Path) ->
         ('master', 'boot_time: 0'),
     ],
 )
-def test_what_asks_for_nothing_is_no_warning(tmp_path: Path, section: str, piece: str) -> None:
+def test_what_requests_nothing_is_no_warning(tmp_path: Path, section: str, piece: str) -> None:
     """Keys whose request is met anyway, or that say the default, are taken silently."""
     assert load_text(tmp_path, added(section, piece)).warnings == ()
 

@@ -103,7 +103,7 @@ def test_each_transition_from_each_state(state: LifecycleState, transition: Tran
 
 @pytest.mark.parametrize('transition', TRANSITIONS, ids=lambda t: f'{t.number}')
 def test_a_transition_that_fails_has_its_own_end(transition: Transition) -> None:
-    """Back where it began, or finalized; the reason reaches who asked."""
+    """Back where it began, or finalized; the reason reaches the caller."""
     scheduler = Scheduler()
     entity = Recorder(scheduler)
     entity.fails = {transition.verb}

@@ -153,21 +153,21 @@ def test_a_round_is_complete_when_its_last_answer_comes(
 ) -> None:
     """Whatever comes how often: complete exactly once, and only when all that answered do again.
 
-    TPDO 3 is of a device that is sometimes not asked for an answer, as one that is offline.
+    TPDO 3 is of a device that sometimes gets no request, as one that is offline.
     """
     complete: list[int] = []
     sync = SyncRound(lambda: complete.append(1))
     entries = [ReceivedTpdo(replace(TPDOS[0], number=n), sync) for n in range(1, 5)]
     known: set[int] = set()
-    for third_asked, arrivals in rounds:
+    for third_requested, arrivals in rounds:
         complete.clear()
         sync.start(0.0)
-        asked = [n for n in range(4) if n != 2 or third_asked]
-        for n in asked:
+        requested = [n for n in range(4) if n != 2 or third_requested]
+        for n in requested:
             entries[n].expect()
-        if not third_asked:
+        if not third_requested:
             entries[2].awaited = False
-        expected = known & set(asked)
+        expected = known & set(requested)
         for count, n in enumerate(arrivals):
             answered(entries[n])
             there = set(arrivals[: count + 1])

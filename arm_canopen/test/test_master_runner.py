@@ -104,7 +104,7 @@ def test_an_error_of_a_call_belongs_to_its_caller(bench: Bench) -> None:
 
 
 def test_nobody_waits_for_a_thread_that_has_ended(bench: Bench) -> None:
-    """What runs, and what is asked for afterwards, ends with the reason."""
+    """What runs, and what is requested afterwards, ends with the reason."""
     never: Promise[None] = Promise()
     running = bench.thread.run(lambda: never)
     bench.thread.call(lambda: None).result(TIMEOUT)

@@ -28,7 +28,7 @@ def test_a_promise_keeps_its_first_result() -> None:
 
 
 def test_a_rejected_promise_raises_each_time() -> None:
-    """The error is raised as often as the result is asked for."""
+    """The error is raised as often as the result is read."""
     promise: Promise[int] = Promise()
     promise.reject(SdoError('no'))
     for _ in range(2):
@@ -135,7 +135,7 @@ def test_what_ends_well_or_on_purpose_in_the_background_is_no_defect() -> None:
 
 
 def test_timers_resume_in_the_order_of_their_times() -> None:
-    """Equal times resume in the order in which they were asked for, none too early."""
+    """Equal times resume in the order in which they were requested, none too early."""
     scheduler = Scheduler(10.0)
     order: list[str] = []
 
@@ -236,20 +236,20 @@ def test_until_looks_whenever_time_advances() -> None:
 
 
 def test_until_times_out_and_is_forgotten() -> None:
-    """After the time-out the condition is not asked again."""
+    """After the time-out the condition is not checked again."""
     scheduler = Scheduler()
-    asked: list[float] = []
+    checked: list[float] = []
 
     def condition() -> bool:
-        asked.append(scheduler.now)
+        checked.append(scheduler.now)
         return False
 
     task = scheduler.spawn(scheduler.until(condition, 1.0))
     scheduler.advance(1.0)
     assert isinstance(task.error, TimeoutError)
-    count = len(asked)
+    count = len(checked)
     scheduler.advance(2.0)
-    assert len(asked) == count
+    assert len(checked) == count
 
 
 def test_a_condition_that_raises_ends_its_own_task_only() -> None:

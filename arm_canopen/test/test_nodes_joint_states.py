@@ -102,7 +102,7 @@ def test_each_channel_has_the_joint_states_of_a_drive(scene: Scene) -> None:
     assert [*elbow.name] == ['elbow']
     assert [elbow.position[0], elbow.velocity[0]] == [0.4, 0.5]
     assert [*shoulder.effort] == [0.3]
-    assert not scene.node.get_publishers_info_by_topic('/joint_states')  # unless it is asked for
+    assert not scene.node.get_publishers_info_by_topic('/joint_states')  # by default
 
 
 def test_the_joints_of_the_robot_have_the_stamp_of_the_sync(scene: Scene) -> None:

@@ -48,16 +48,16 @@ def can_interfaces() -> dict[str, CanInterface]:
 
 
 def _inspect(probe: socket.socket, name: str) -> CanInterface | None:
-    if _ask(probe, _SIOCGIFHWADDR, name, '=H') != _ARPHRD_CAN:
+    if _request(probe, _SIOCGIFHWADDR, name, '=H') != _ARPHRD_CAN:
         return None
     return CanInterface(
         name,
-        is_up=bool(_ask(probe, _SIOCGIFFLAGS, name, '=H') & _IFF_UP),
-        queue_length=_ask(probe, _SIOCGIFTXQLEN, name, '=i'),
+        is_up=bool(_request(probe, _SIOCGIFFLAGS, name, '=H') & _IFF_UP),
+        queue_length=_request(probe, _SIOCGIFTXQLEN, name, '=i'),
     )
 
 
-def _ask(probe: socket.socket, request: int, name: str, layout: str) -> int:
+def _request(probe: socket.socket, request: int, name: str, layout: str) -> int:
     answer = fcntl.ioctl(probe.fileno(), request, _REQUEST.pack(name.encode()))
     return int(struct.unpack_from(layout, answer, 16)[0])
 

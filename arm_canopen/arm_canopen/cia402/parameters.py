@@ -94,7 +94,7 @@ class ParameterReader:
         self._units_from = '' if config.scale_from_factor_group else 'bus.yml'
 
     def forget(self) -> None:
-        """Ask for the units again; they do not change while a device runs."""
+        """Read the units again; they do not change while a device runs."""
         self._units_from = '' if self._config.scale_from_factor_group else 'bus.yml'
 
     async def read(self) -> DriveParameters:

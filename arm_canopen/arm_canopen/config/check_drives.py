@@ -123,7 +123,7 @@ def _check_support(subject: Subject, used: UsedMode) -> None:
             subject.place(used.key),
             f'mode {used.mode.value} ({mode_title(used.mode).lower()}) is not among the modes '
             f'that the EDS names in 0x{index:04X} (0x{supported:X})',
-            'take another mode, or ask the drive with `canopen read`: EDS files err here',
+            'take another mode, or read the drive with `canopen read`: EDS files err here',
         )
 
 

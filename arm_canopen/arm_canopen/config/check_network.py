@@ -77,7 +77,7 @@ def _check_watches_master(subject: Subject) -> None:
             remedy = 'its EDS has no 0x1016:01; have an emergency stop that needs no bus'
         elif node.reset_communication:
             remedy = 'remove heartbeat_consumer: false'
-        else:  # reset_communication: false asks for that
+        else:  # reset_communication: false demands that
             remedy = 'it waits for the next one to take it over; have an emergency stop'
         what = 'the drive does not watch the master, and goes on when that dies'
         subject.findings.warning(subject.place('heartbeat_consumer'), what, remedy)

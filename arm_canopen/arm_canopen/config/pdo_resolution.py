@@ -187,7 +187,7 @@ class PdoReader:
         if isinstance(transmission, int) and SYNCHRONOUS_MAX < transmission < EVENT_TYPES[0]:
             self._findings.error(
                 section.entries['transmission'].place,
-                f'transmission type {transmission} is reserved or asks for remote frames',
+                f'transmission type {transmission} is reserved or requires remote frames',
                 'take 0 to 240 (with SYNC), or 254 or 255 (on events)',
             )
 

@@ -83,7 +83,7 @@ class CanopenDrive:
         return self._thread.call(lambda: self._drive.control.mode.number).result()
 
     def init(self) -> str:
-        """Reset a fault, enable, home where bus.yml asks for it; no mode is selected then."""
+        """Reset a fault, enable, home where bus.yml has a method; no mode is selected then."""
         return self._run('init', self._commands.init)
 
     def enable(self) -> str:

@@ -68,7 +68,7 @@ class Configurator:
         """Write everything; the device must not process PDOs meanwhile.
 
         Raises:
-            SdoError: The device refused something that bus.yml asks for, or does not answer.
+            SdoError: The device refused something that bus.yml requests, or does not answer.
         """
         for write in await self._writes():
             await self._bring(write)
@@ -150,7 +150,7 @@ class Configurator:
                 raise SdoError(reason) from error
             self._warn(reason)
             return
-        reason = f'{error}; {write.key} asks for {write.text()}'
+        reason = f'{error}; {write.key} requests {write.text()}'
         if write.requested:
             raise SdoError(f'{reason}: correct or remove it there') from error
         self._warn(f'{reason} by default only, so it goes on with what it has')

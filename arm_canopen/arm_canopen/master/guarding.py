@@ -18,7 +18,7 @@ def guarding_request(node_id: int) -> Frame:
 
 
 class Guarding:
-    """Asks one device for its state, again and again, and counts the answers that do not come."""
+    """Requests the state of one device, again and again, and counts the missing answers."""
 
     def __init__(
         self, node_id: int, guard_time: float, retry_factor: int, send: Callable[[Frame], None]
@@ -44,7 +44,7 @@ class Guarding:
         self._due, self._unanswered, self._toggle = now, 0, None
 
     def stop(self) -> None:
-        """Ask no more."""
+        """Send no more requests."""
         self._due = None
 
     def receive(self, data: bytes) -> bool:

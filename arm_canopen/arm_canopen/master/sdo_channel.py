@@ -133,7 +133,7 @@ class SdoChannel:
     async def exchange(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool = False
     ) -> T:
-        """Ask, and wait for the answer.
+        """Send a request, and wait for the answer.
 
         Args:
             question: The frame; None only waits for the next answer.

@@ -116,7 +116,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class UploadSegmentRequest:
-    """Ask for the next segment of a read."""
+    """Request the next segment of a read."""
 
     toggle: bool
 
