@@ -361,14 +361,14 @@ def test_events_are_handed_over_and_one_that_fails_harms_nobody(
     drives: object, bus_yml: Path, bus: str
 ) -> None:
     """The boot of each drive comes as an event, in the thread of the cycle."""
-    heard = []
+    received = []
 
     def on_event(event: Event) -> None:
-        heard.append((event.kind, event.node, threading.current_thread().name))
+        received.append((event.kind, event.node, threading.current_thread().name))
         raise ZeroDivisionError
 
     with CanopenMaster.from_bus_yml(bus_yml, bus, on_event=on_event) as master:
         master.boot(TIMEOUT)
         master.drive('joint1').enable()
-    booted = {entry for entry in heard if entry[0] is EventKind.BOOT}
+    booted = {entry for entry in received if entry[0] is EventKind.BOOT}
     assert booted == {(EventKind.BOOT, name, 'canopen') for name in ('joint1', 'joint2')}
