@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 import sys
 
-from arm_model import ArmError, load_limits, RobotModel, start_pose
+from arm_model import ArmError, load_limits, RobotModel
 from demo_runner import run_demo
 from process_supervisor import (
     namespaced_parameters,
@@ -39,6 +39,7 @@ from ...stack import MOTION_NODE
 from ..table import ArmView
 from .client import MotionClient
 from .figures import MotionFigures
+from .poses import choose_start
 from .scenario import MotionScenario
 from .view import MotionView
 
@@ -135,7 +136,7 @@ def run(arm: Session, groups: MovedGroups, duration: float | None) -> int:
     from arm_canopen import load_bus
 
     model = build_model(arm.robot, arm.urdf, groups.arms[0])
-    start = start_pose(model)
+    start = choose_start(model)
     period = load_bus(arm.robot.bus_config).master.sync_period
     controller = controller_name(arm.robot, groups)
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}

@@ -15,7 +15,8 @@ from arm_model import Array, RobotModel
 from process_supervisor import CallError
 
 from .client import GoalRun, MotionClient
-from .goals import beside, duration
+from .goals import duration
+from .poses import free_end, free_way, SIDE, SIDES, SPEED, square_fits
 from .results import Results, Square, WORST_PATH
 from .samples import away_from_line, peak_jerk, tool_speed, tracking_error
 
@@ -25,10 +26,6 @@ SETTLE = 0.35
 """Least pause after a motion in [s]."""
 FRESH = 0.1
 """Age in [s] up to which a state says where the arm is now."""
-SPEED = 0.1
-"""Speed of the squares in [m/s]."""
-SIDE = 0.8
-"""Time of a side of a square in [s]."""
 FAST = 0.2
 """Speed of the way to the singular pose in [m/s]."""
 OUT, DOWN = 0.866, 0.5
@@ -37,8 +34,6 @@ STUCK = 0.05
 """Speed below which the tool has come to its end in [m/s]."""
 LONGEST = 6.0
 """Longest time of the way to the singular pose in [s]; the way back may take twice as long."""
-WAY = 0.5
-"""How far each joint goes in the trajectories in [rad]."""
 SLOW = 0.3
 """Speed override."""
 EARLY, HALF, LATE = 0.2, 0.4, 0.6
@@ -82,8 +77,11 @@ class MotionSequence:
             EndRequested: The user asked for the end.
         """
         self.go_to_start()
-        self.square('base frame', self.model.base)
-        self.square('tool frame', self.model.tip)
+        if square_fits(self.model, self.start):
+            self.square('base frame', self.model.base)
+            self.square('tool frame', self.model.tip)
+        else:
+            self.results.add('squares', 'left out: no pose was found from which they are possible')
         self.singularity()
         self.go_to_start()
         self.trajectory()
@@ -95,8 +93,10 @@ class MotionSequence:
         self._wait(SETTLE)
         end = self.start
         begin = self.client.last.position if self.client.samples else np.zeros(len(self.model))
-        self._finish(self.client.send(end, duration(begin, end, self.model.limits)))
-        self._rest()
+        for pose in free_way(self.model, begin, end):
+            self._finish(self.client.send(pose, duration(begin, pose, self.model.limits)))
+            self._rest()
+            begin = pose
 
     def square(self, name: str, frame: str) -> None:
         """Jog the tool along the sides of a square.
@@ -108,7 +108,7 @@ class MotionSequence:
         self.enter(f'a square in the {name}')
         speeds, commanded, measured = [], 0.0, 0.0
         missed = self.client.figures.bus.missed_pdos
-        for way in ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0)):
+        for way in SIDES:
             begin = self.client.last
             axes = self.model.pose(begin.position, frame).rotation
             direction = axes @ np.array(way, dtype=float)
@@ -209,7 +209,7 @@ class MotionSequence:
     def _plan(self) -> tuple[Array, Array, float]:
         """Return begin, end and time of a trajectory from where the arm is."""
         begin = self.client.last.position
-        end = beside(begin, self.model.limits, WAY)
+        end = free_end(self.model, begin)
         return begin, end, duration(begin, end, self.model.limits)
 
     def _path_error(self, first: int, begin: Array, end: Array) -> float:
