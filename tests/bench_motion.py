@@ -283,12 +283,12 @@ def loop(period: float) -> Rows:
     )
     gateway = CommandGateway(MotionCore(model), start_worker())
     feedback = JointFeedback(model.joints, 1e9)
-    feedback.take(model.joints, READY, [0.0] * len(READY), time.monotonic())
+    feedback.receive(model.joints, READY, [0.0] * len(READY), time.monotonic())
     late: list[float] = []
     begin = [time.monotonic()]
 
     def put(point: SetPoint) -> None:
-        feedback.take(
+        feedback.receive(
             model.joints,
             point.state.position.tolist(),
             point.state.velocity.tolist(),

@@ -69,7 +69,7 @@ class Elsewhere:
             self.now += PERIOD
             if self.heard:
                 at = (self.at - self.sag).tolist()
-                self.feedback.take(self.gateway.model.joints, at, [], self.now)
+                self.feedback.receive(self.gateway.model.joints, at, [], self.now)
             self.cycle.step(self.now, PERIOD)
 
     def path(self) -> Array:

@@ -318,11 +318,11 @@ BAD: dict[str, tuple[Callable[[MotionCore], object], str]] = {
     'no joint': (lambda c: core_commands.jog(c, {}, 0.0), 'no joint'),
     'no rotation': (
         lambda c: core_commands.track(c, Pose(np.ones((3, 3)), np.zeros(3)), 0.0),
-        'no rotation',
+        'not a rotation',
     ),
     'reflected': (
         lambda c: core_commands.twist(c, [0.1] * 6, 0.0, axes=-np.eye(3)),
-        'axes: it is no rotation',
+        'axes: not a rotation',
     ),
     'nan duration': (
         lambda c: core_commands.twist(c, [0.1] * 6, 0.0, duration=math.nan),

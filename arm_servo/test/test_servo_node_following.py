@@ -117,7 +117,7 @@ def test_a_noisy_arm_at_rest_was_not_moved(noise: float) -> None:
         for _ in range(cycles):
             arm.now += PERIOD
             noisy = arm.at + rng.normal(0.0, noise, len(arm.at))
-            arm.feedback.take(arm.gateway.model.joints, noisy.tolist(), [], arm.now)
+            arm.feedback.receive(arm.gateway.model.joints, noisy.tolist(), [], arm.now)
             arm.cycle.step(arm.now, PERIOD)
 
     run(100)

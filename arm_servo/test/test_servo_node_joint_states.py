@@ -60,7 +60,7 @@ def test_a_drive_that_is_silent_is_left_out() -> None:
 def test_drives_beside_the_arm_are_there() -> None:
     """A gripper is no joint of the group, and a joint of the robot."""
     drives, samples = ready()
-    samples.hear('gripper', replace(GRIPPER, time=drives.now))
+    samples.receive('gripper', replace(GRIPPER, time=drives.now))
     found = samples.fresh(drives.gateway.snapshot, drives.now)
     assert list(found) == [*drives.source.axes, 'gripper']
     assert found['gripper'].position == 0.04

@@ -163,11 +163,11 @@ def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
 def test_numbers_that_are_none_do_not_count() -> None:
     """A joint that only publishes NaN is silent."""
     feedback = JointFeedback(['a', 'b'], 0.2)
-    feedback.take(['b', 'a', 'other'], [math.nan, 1.0, 2.0], [0.0, math.nan, 0.0], 1.0)
+    feedback.receive(['b', 'a', 'other'], [math.nan, 1.0, 2.0], [0.0, math.nan, 0.0], 1.0)
     state, blocked = feedback.state(1.0)
     assert state is None
     assert 'of b for' in blocked
-    feedback.take(['b'], [0.5], [], 1.1)
+    feedback.receive(['b'], [0.5], [], 1.1)
     state, blocked = feedback.state(1.15)
     assert blocked == ''
     assert state is not None

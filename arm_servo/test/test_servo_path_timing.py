@@ -204,7 +204,7 @@ def test_a_little_haste_is_late_and_says_so() -> None:
     assert execution.ending is not None
     assert execution.ending.code is GoalCode.SUCCESSFUL
     assert re.search(
-        r'reached, 0\.\d\d s later than asked, for the acceleration of panda_joint1',
+        r'reached, 0\.\d\d s later than requested, for the acceleration of panda_joint1',
         execution.ending.reason,
     )
     kept(robot('panda').limits, states)
@@ -308,6 +308,6 @@ def test_what_is_late_counts_from_the_last_time_from_start(
     assert execution.duration <= 1.1 * asked + 0.5 + 1e-9
     follow(core, execution)
     assert execution.ending is not None
-    found = re.search(r'(\S+) s later than asked', execution.ending.reason)
+    found = re.search(r'(\S+) s later than requested', execution.ending.reason)
     told = float(found[1]) if found else 0.0
     assert told == pytest.approx(execution.duration - asked, abs=0.011)

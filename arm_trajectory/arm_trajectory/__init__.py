@@ -11,15 +11,15 @@ state.
 
 from __future__ import annotations
 
-from .catch_up import CatchUpInterpolator
 from .exceptions import GoalCode, GoalError, StateMovedError
+from .execution.catch_up import CatchUpInterpolator
+from .execution.speed_scaling import TimerState, TrajectoryTimer
+from .execution.tolerances import merge_tolerances, Tolerances
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
-from .goal_path import build_path
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
-from .path import Path
-from .path_check import PathCheck, PathContact
-from .tolerances import merge_tolerances, Tolerances
-from .trajectory_timer import TimerState, TrajectoryTimer
+from .paths.goal_path import build_path
+from .paths.path import Path
+from .paths.path_check import PathCheck, PathContact
 
 __all__ = [
     'CatchUpInterpolator',

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from arm_trajectory import JointTolerance, merge_tolerances, Path
-from arm_trajectory.path import cubic, linear, PathPoint, quintic
-from arm_trajectory.path_rounding import rounded
-from arm_trajectory.path_timing import Timing
+from arm_trajectory.paths.path import cubic, linear, PathPoint, quintic
+from arm_trajectory.paths.rounding import rounded
+from arm_trajectory.paths.time_scaling import Timing
 
 pytestmark = pytest.mark.slow
 
@@ -95,7 +95,7 @@ def test_time_scaled_paths_lead_through_the_same_places(seed: int) -> None:
     scaled = Timing(given_path, limits).time_scaled()
     assume(scaled is not None and scaled is not given_path)
     assert scaled is not None
-    assert Timing(scaled, limits).demand.share <= 1.0
+    assert Timing(scaled, limits).demand.time_factor <= 1.0
     there = given_path.positions(np.linspace(0.0, given_path.duration, 3000))
     for place in scaled.positions(np.linspace(0.0, scaled.duration, 60)):
         assert np.abs(there - place).max(axis=1).min() < 2e-3  # as dense as the places are

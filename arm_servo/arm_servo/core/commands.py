@@ -87,4 +87,4 @@ def _check_rotation(values: Array, what: str) -> None:
     rotation = checked(np.ravel(values), 9, what).reshape(3, 3)
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if off > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0.0:
-        raise CommandError(f'{what}: it is no rotation; is the quaternion of unit length?')
+        raise CommandError(f'{what}: not a rotation; is the quaternion of unit length?')

@@ -30,7 +30,7 @@ class JointFeedback:
         # one tuple per joint: position, velocity, time; each is replaced as a whole
         self._values = [(math.nan, 0.0, -math.inf)] * len(self._joints)
 
-    def take(
+    def receive(
         self,
         names: Sequence[str],
         positions: Sequence[float],

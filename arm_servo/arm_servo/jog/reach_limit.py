@@ -150,7 +150,7 @@ class ReachLimit:
         self._sense = None if way is None else way * self._oriented(way, position)
         if self._sense is None:
             return None
-        fade = 1.0 - float(found.share[-1]) / LOST_SPEED_FACTOR
+        fade = 1.0 - float(found.speed_factors[-1]) / LOST_SPEED_FACTOR
         return WayOut(self._sense, fade * self._speed(self._sense, command), fade)
 
     def _remember(self, position: Array, good: bool) -> None:

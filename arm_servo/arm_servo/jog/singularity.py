@@ -50,14 +50,14 @@ class Directions:
         joints: Directions of the joints v_i, as rows (r, n).
         values: Singular values s_i (r).
         damping: Squares of the damping of each direction (r).
-        share: What is left of the speed along each direction (r), 0 to 1.
+        speed_factors: What is left of the speed along each direction (r), 0 to 1.
     """
 
     tool: Array
     joints: Array
     values: Array
     damping: Array
-    share: Array
+    speed_factors: Array
 
     @property
     def damped(self) -> bool:
@@ -76,8 +76,8 @@ class Directions:
         if needed <= self.damping[-1]:
             return self
         damping = np.append(self.damping[:-1], needed)
-        share = self.values**2 / (self.values**2 + damping)
-        return replace(self, damping=damping, share=share)
+        left = self.values**2 / (self.values**2 + damping)
+        return replace(self, damping=damping, speed_factors=left)
 
     @property
     def least(self) -> float:
@@ -87,7 +87,7 @@ class Directions:
     @property
     def lost(self) -> Mask:
         """Mask of the lost directions."""
-        mask: Mask = self.share < LOST_SPEED_FACTOR
+        mask: Mask = self.speed_factors < LOST_SPEED_FACTOR
         return mask
 
 

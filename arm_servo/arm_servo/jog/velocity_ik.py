@@ -221,7 +221,7 @@ def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:
     if factor > 0.99:
         return []
     parts = command @ found.tool
-    kept = float(np.sum(found.share * parts * parts) / (command @ command))
+    kept = float(np.sum(found.speed_factors * parts * parts) / (command @ command))
     if kept > 0.99:
         return []
     axis = AXES[int(np.argmax(np.abs(command)))]

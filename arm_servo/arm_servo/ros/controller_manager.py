@@ -93,7 +93,7 @@ class ControllerManager:
     ) -> SwitchController.Response:
         on, off = list(request.activate_controllers), list(request.deactivate_controllers)
         problems = [
-            f'there is no controller {name!r}; there are {", ".join(self._controllers)}'
+            f'no controller {name!r}; choose one of {", ".join(self._controllers)}'
             for name in (*on, *off)
             if name not in self._controllers
         ]

@@ -48,11 +48,11 @@ class JointSamples:
 
     def __init__(self, joints: Sequence[str], mimics: Mapping[str, Mimic]) -> None:
         self._joints, self._mimics = list(joints), mimics
-        self._heard: dict[str, JointSample] = {}
+        self._received: dict[str, JointSample] = {}
 
-    def hear(self, joint: str, sample: JointSample) -> None:
+    def receive(self, joint: str, sample: JointSample) -> None:
         """Take what the drive of another joint has measured."""
-        self._heard[joint] = sample
+        self._received[joint] = sample
 
     def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:
         """Return what was measured lately, the arm's joints first.
@@ -63,7 +63,7 @@ class JointSamples:
         """
         fresh = {
             name: sample
-            for name, sample in (self._of_the_arm(snapshot) | self._heard).items()
+            for name, sample in (self._of_the_arm(snapshot) | self._received).items()
             if now - sample.time <= MAX_AGE
         }
         for name, mimic in self._mimics.items():
@@ -139,7 +139,7 @@ class JointStateBroadcaster:
         self._dynamic = node.create_publisher(DynamicJointState, 'dynamic_joint_states', 10)
         for name in others:
             topic = f'{name}/joint_states'
-            node.create_subscription(JointState, topic, partial(self._hear, name), 10)
+            node.create_subscription(JointState, topic, partial(self._receive, name), 10)
         node.create_timer(1.0 / self.rate, self._publish)
 
     def entry(self) -> Controller:
@@ -152,7 +152,7 @@ class JointStateBroadcaster:
         """Publish, or stop publishing."""
         self.active = active
 
-    def _hear(self, name: str, message: JointState) -> None:
+    def _receive(self, name: str, message: JointState) -> None:
         if name not in message.name:
             return
         place = list(message.name).index(name)
@@ -160,7 +160,7 @@ class JointStateBroadcaster:
             has_velocity = place < len(message.velocity)
             velocity = message.velocity[place] if has_velocity else math.nan
             sample = JointSample(message.position[place], velocity, time.monotonic())
-            self._samples.hear(name, sample)
+            self._samples.receive(name, sample)
 
     def _publish(self) -> None:
         now = time.monotonic()

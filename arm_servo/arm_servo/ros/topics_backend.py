@@ -195,13 +195,13 @@ class TopicDrives:
         self.period, self.topic = loop.period, wanted.topic
         feedback = JointFeedback(model.joints, loop.joint_timeout)
 
-        def take(message: JointState) -> None:
-            feedback.take(message.name, message.position, message.velocity, time.monotonic())
+        def receive(message: JointState) -> None:
+            feedback.receive(message.name, message.position, message.velocity, time.monotonic())
 
         def begin() -> None:
             raise_thread_priority(node, loop.priority, 'the motion loop')
 
-        node.create_subscription(JointState, loop.joint_topic, take, 10)
+        node.create_subscription(JointState, loop.joint_topic, receive, 10)
         publish = TopicOutput(node, wanted, list(model.joints), loop.period)
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)

@@ -119,15 +119,15 @@ class TrajectoryController:
         except Exception:  # noqa: BLE001  # a message must not end the program
             self._node.get_logger().error(f'trajectory refused: {traceback.format_exc()}')
             return
-        command.future.add_done_callback(self._tell_refusal)
+        command.future.add_done_callback(self._log_refusal)
 
     def _scale(self, message: SpeedScalingFactor) -> None:
         self._override(message.factor)
 
     def _override(self, speed: float) -> None:
-        self._gateway.command(SpeedRequest(speed)).add_done_callback(self._tell_refusal)
+        self._gateway.command(SpeedRequest(speed)).add_done_callback(self._log_refusal)
 
-    def _tell_refusal(self, future: Future[Any]) -> None:
+    def _log_refusal(self, future: Future[Any]) -> None:
         if not future.cancelled() and (error := future.exception()) is not None:
             self._news.append(f'refused: {error}')  # the cycle must not wait for a log
 

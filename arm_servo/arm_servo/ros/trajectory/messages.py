@@ -118,7 +118,7 @@ def _overridden(
     for tolerance in asked:
         if tolerance.name not in merged:
             known = ', '.join(merged)
-            reason = f'{what}: there is no joint {tolerance.name!r}; joints: {known}'
+            reason = f'{what}: no joint {tolerance.name!r}; joints: {known}'
             raise GoalError(GoalCode.INVALID_JOINTS, reason)
         before = merged[tolerance.name]
         values = (tolerance.position, tolerance.velocity)

@@ -12,8 +12,8 @@ import numpy as np
 
 from arm_model import Array, JointLimits
 
-from .exceptions import GoalCode, GoalError
-from .goal import JointTolerance
+from ..exceptions import GoalCode, GoalError
+from ..goal import JointTolerance
 
 
 @dataclass(frozen=True, slots=True, eq=False)

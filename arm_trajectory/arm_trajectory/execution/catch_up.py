@@ -10,7 +10,7 @@ import numpy as np
 
 from arm_model import JointLimits, RobotState
 
-from .otg import OnlineTrajectoryGenerator, Plan
+from ..otg import OnlineTrajectoryGenerator, Plan
 
 INTERCEPTION_CYCLES = (4, 10, 25, 60, 150)
 """Cycles after which an interception is tried."""

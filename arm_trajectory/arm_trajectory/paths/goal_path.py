@@ -13,14 +13,14 @@ import numpy as np
 
 from arm_model import JointLimits, RobotState
 
+from ..exceptions import GoalError
+from ..goal import GoalRules, TrajectoryGoal
 from .approach import approach_path, stop_path
-from .exceptions import GoalError
-from .goal import GoalRules, TrajectoryGoal
-from .goal_points import Points, refuse, upcoming_points
+from .bounds import farthest_beyond
 from .path import cubic, linear, Path, PathPoint, quintic, Segment
-from .path_bounds import farthest_beyond
-from .path_rounding import rounded, run_out
-from .path_timing import Demand, Timing
+from .points import Points, refuse, upcoming_points
+from .rounding import rounded, run_out
+from .time_scaling import Demand, Timing
 
 MAX_SPEED_EXCESS = 1.02
 """How far the speed of a segment may exceed a limit; it is followed slower then."""
@@ -60,7 +60,7 @@ class GoalPath:
 
     Attributes:
         path: The path.
-        late: How much later than asked it ends, and why, in words; empty for in time.
+        late: How much later than requested it ends, and why, in words; empty for in time.
     """
 
     path: Path
@@ -99,7 +99,7 @@ def build_path(
     answer = _tried(points, limits, state)
     if isinstance(answer, GoalPath):
         return answer
-    if points.asked == 0.0:
+    if points.requested_duration == 0.0:
         raise refuse(f'{answer.reason}; give the trajectory a time_from_start')
     factor = _sufficient(points, limits, state, answer.factor)
     raise refuse(f'{answer.reason}; give the trajectory {factor:.2f} times the time')
@@ -118,8 +118,8 @@ def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath |
     ):
         return answer
     # only the way to the first point is longer
-    for share in APPROACH_FACTORS:
-        more = share * (approach + MIN_APPROACH_MARGIN)
+    for factor in APPROACH_FACTORS:
+        more = factor * (approach + MIN_APPROACH_MARGIN)
         later = _from_rest(points.delayed(more), limits, state)
         if isinstance(later, GoalPath):
             return later
@@ -199,22 +199,22 @@ def _time_scaled(
 ) -> tuple[Path | None, _Haste]:
     """Return a path with its corners rounded, as quick as can be, and what asks most of it."""
     demand = Timing(path, limits).fastest
-    if demand.share > MAX_SPEED_EXCESS:
-        return None, _haste(demand, limits, demand.share)
+    if demand.time_factor > MAX_SPEED_EXCESS:
+        return None, _haste(demand, limits, demand.time_factor)
     timing = Timing(rounded(path, limits, from_rest=from_rest), limits)
-    return timing.time_scaled(), _haste(timing.plainest, limits, timing.demand.share)
+    return timing.time_scaled(), _haste(timing.plainest, limits, timing.demand.time_factor)
 
 
 def _in_time(path: Path, points: Points, haste: _Haste) -> GoalPath | _Haste:
     """Return a path that does not take much longer than asked, or why it does."""
-    most = MAX_DELAY[0] * points.asked + MAX_DELAY[1]
+    most = MAX_DELAY[0] * points.requested_duration + MAX_DELAY[1]
     if path.duration > most:
         enough = (path.duration - MAX_DELAY[1]) / MAX_DELAY[0]
-        return replace(haste, factor=enough / max(points.asked, 1e-9))
-    late = path.duration - points.asked
+        return replace(haste, factor=enough / max(points.requested_duration, 1e-9))
+    late = path.duration - points.requested_duration
     if late < NEGLIGIBLE_DELAY:
         return GoalPath(path, '')
-    return GoalPath(path, f'{late:.2f} s later than asked, for the {haste.cause}')
+    return GoalPath(path, f'{late:.2f} s later than requested, for the {haste.cause}')
 
 
 def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The time of a trajectory: how fast it runs, with limited acceleration and jerk of the joints."""
+"""Speed scaling: how fast a trajectory runs now, with limited acceleration and jerk of the joints.
+
+Speed override, pause, resume and cancel are changes of the speed scaling; the path stays the same.
+What makes a path feasible before it begins is the time scaling of :mod:`..paths.time_scaling`.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import ruckig
 
 from arm_model import JointLimits
 
-from .path import Path
+from ..paths.path import Path
 
 MAX_SCALING_RATE = 10.0
 """Greatest change of the speed scaling in [1/s], for where the path asks nothing of the joints."""

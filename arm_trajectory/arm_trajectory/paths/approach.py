@@ -14,10 +14,10 @@ import numpy as np
 
 from arm_model import JointLimits, RobotState
 
-from .otg import OnlineTrajectoryGenerator, Plan
+from ..otg import OnlineTrajectoryGenerator, Plan
+from .bounds import farthest_beyond
 from .path import Path, PathPoint, quintic, Segment
-from .path_bounds import farthest_beyond
-from .path_timing import Timing
+from .time_scaling import Timing
 
 MIN_PHASE = 1e-7
 """Least length of a segment with one jerk in [s]; shorter ones are left out."""
@@ -49,7 +49,7 @@ def _candidates(
     if duration > 0.0:
         here = PathPoint(state.position, state.velocity, state.acceleration)
         smooth = Path([quintic(0.0, duration, here, begin)])
-        if Timing(smooth, limits).demand.share <= 1.0:
+        if Timing(smooth, limits).demand.time_factor <= 1.0:
             yield smooth
     generator = OnlineTrajectoryGenerator(limits)
     there = RobotState(begin.position, begin.velocity, begin.acceleration)

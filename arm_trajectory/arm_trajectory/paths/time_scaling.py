@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Paths followed slower where joints could not follow: the same places, more time.
+"""Time scaling: a path followed slower where joints could not follow, on the same places.
+
+It takes place before the path begins, once, as that of TOPP-RA does, but with limited jerk and
+never quicker than the points say. While the path runs, the speed scaling of
+:mod:`..execution.speed_scaling` takes over.
 
 Planners know speeds and accelerations, seldom jerks, and only at their points; what lies between
 may ask more. The path q(s) is followed as q(s(t)) with ds/dt = 1/r. The scaling r(s) >= 1 is a
@@ -55,14 +59,14 @@ class Demand:
     """What a path asks most.
 
     Attributes:
-        share: Factor of time that it takes to come within the limits; 1 or less is within.
+        time_factor: Factor of time that it takes to come within the limits; 1 or less is within.
         joint: Number of the joint that asks it.
         quantity: 0 velocity, 1 acceleration, 2 jerk.
         time: When in [s].
         value: How much in [rad/s], [rad/s2] or [rad/s3].
     """
 
-    share: float
+    time_factor: float
     joint: int
     quantity: int
     time: float
@@ -88,30 +92,30 @@ class Timing:
     @property
     def fastest(self) -> Demand:
         """The greatest speed that the path asks, measured by the limits."""
-        return self._most(self._shares(self._rates, 1.0)[:1])
+        return self._most(self._time_factors(self._rates, 1.0)[:1])
 
     @property
     def demand(self) -> Demand:
         """What the path asks most, measured by the limits."""
-        return self._most(self._shares(self._rates, 1.0))
+        return self._most(self._time_factors(self._rates, 1.0))
 
     @property
     def plainest(self) -> Demand:
         """What says best that the path asks too much: speed before acceleration before jerk."""
-        shares = self._shares(self._rates, 1.0)
-        beyond = [row for row in range(3) if shares[row].max() > 1.0]
-        return self._most(shares[: beyond[0] + 1]) if beyond else self._most(shares)
+        factors = self._time_factors(self._rates, 1.0)
+        beyond = [row for row in range(3) if factors[row].max() > 1.0]
+        return self._most(factors[: beyond[0] + 1]) if beyond else self._most(factors)
 
-    def _most(self, shares: Array) -> Demand:
-        quantity, place, joint = np.unravel_index(int(shares.argmax()), shares.shape)
+    def _most(self, factors: Array) -> Demand:
+        quantity, place, joint = np.unravel_index(int(factors.argmax()), factors.shape)
         value = float(abs(self._rates[quantity][place, joint]))
         return Demand(
-            float(shares.max()), int(joint), int(quantity), float(self._times[place]), value
+            float(factors.max()), int(joint), int(quantity), float(self._times[place]), value
         )
 
     def time_scaled(self) -> Path | None:
         """Return the path within the limits, as quick as a spline makes it; None for no way."""
-        if self.demand.share <= 1.0:
+        if self.demand.time_factor <= 1.0:
             return self._path
         for full in LIMIT_FACTORS:
             found = [
@@ -120,7 +124,7 @@ class Timing:
             if not found:
                 return None
             path = _scaled_path(self._path, min(found, key=lambda scaling: scaling.duration))
-            if Timing(path, self._limits).demand.share <= 1.0:
+            if Timing(path, self._limits).demand.time_factor <= 1.0:
                 return path
         return None
 
@@ -155,10 +159,10 @@ class Timing:
             + 3.0 * acceleration * (rate * change)[:, None]
             + speed * jolt[:, None],
         ]
-        needed: Array = self._shares(scaled, full).max(axis=(0, 2))
+        needed: Array = self._time_factors(scaled, full).max(axis=(0, 2))
         return needed
 
-    def _shares(self, rates: list[Array], full: float) -> Array:
+    def _time_factors(self, rates: list[Array], full: float) -> Array:
         """Return the factors of time (3, m, n) by velocity, acceleration and jerk."""
         limits = self._limits
         speed, acceleration, jerk = (

@@ -13,8 +13,8 @@ import numpy as np
 
 from arm_model import Array, JointLimits, RobotState
 
-from .exceptions import GoalCode, GoalError
-from .goal import GoalPoint, GoalRules, TrajectoryGoal
+from ..exceptions import GoalCode, GoalError
+from ..goal import GoalPoint, GoalRules, TrajectoryGoal
 from .path import PathPoint
 
 MAX_POINTS = 5000
@@ -29,14 +29,14 @@ MIN_JOIN_TIME = 0.05
 class Points:
     """A checked trajectory in the arm's order: times (k), the rest (k, n) or None.
 
-    ``asked`` is the time_from_start of its last point in [s], which delays do not change.
+    ``requested_duration`` is the time_from_start of its last point in [s]; delays keep it.
     """
 
     times: Array
     positions: Array
     velocities: Array | None
     accelerations: Array | None
-    asked: float
+    requested_duration: float
 
     def at(self, place: int) -> PathPoint:
         """Return the place that a point is; at rest where it does not say."""
@@ -58,7 +58,7 @@ class Points:
             self.positions,
             None if self.velocities is None else self.velocities / factor,
             None if self.accelerations is None else self.accelerations / factor**2,
-            self.asked * factor,
+            self.requested_duration * factor,
         )
 
     def delayed(self, by: float) -> Points:
@@ -80,7 +80,7 @@ class Points:
             self.positions[place:],
             None if self.velocities is None else self.velocities[place:],
             None if self.accelerations is None else self.accelerations[place:],
-            self.asked,
+            self.requested_duration,
         )
 
 
@@ -157,7 +157,7 @@ def _check_joints(joints: Sequence[str], limits: JointLimits, rules: GoalRules) 
     known = ', '.join(limits.names)
     for name in joints:
         if name not in limits.names:
-            raise refuse(f'there is no joint {name!r}; joints: {known}', invalid)
+            raise refuse(f'no joint {name!r}; joints: {known}', invalid)
         if list(joints).count(name) > 1:
             raise refuse(f'joint {name} is named twice', invalid)
     missing = [name for name in limits.names if name not in joints]
@@ -223,7 +223,7 @@ def _upcoming(points: Points, age: float) -> Points:
     # a point that passes in a moment cannot be met; the next one can, and the last one is the goal
     soonest = MIN_JOIN_TIME if age > 0.0 else 0.0
     left = min(int(np.searchsorted(times, soonest)), len(times) - 1)
-    return replace(points, times=times, asked=float(times[-1])).since(left)
+    return replace(points, times=times, requested_duration=float(times[-1])).since(left)
 
 
 def _by_the_short_way(points: Points, limits: JointLimits, state: RobotState) -> Points:
