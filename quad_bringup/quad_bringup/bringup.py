@@ -35,13 +35,13 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         argv: Arguments without the program's name.
 
     Returns:
-        What was asked for, and the options of all nodes.
+        What was requested, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup bringup',
         description='Bring a quadruped up: serial bridge, controller and /tf; with --simulate '
-        'also the robot itself, in physics, on a pseudo-serial port. It stays as it is until it '
-        'is told to stand up: by teleop_keyboard, or by /set_mode. Ctrl-C lets it lie down and '
+        'also the robot itself, in physics, on a pseudo-serial port. It stays as it is until a '
+        'mode is requested, by teleop_keyboard or /set_mode. Ctrl-C lets it lie down and '
         'ends everything; Ctrl-C again ends it at once, and the servos hold their last position '
         '(the bridge folds legs that were walking).',
     )

@@ -5,10 +5,10 @@
 ::
 
     BringupError
-    └── ArgumentError (ValueError)   what was asked for cannot be brought up
+    └── ArgumentError (ValueError)   what was requested cannot be brought up
 
-What cannot be started, or refuses, is told by the errors of ``process_supervisor``. Arguments of
-the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
+Errors of ``process_supervisor`` report what cannot be started, or refuses. Arguments of the wrong
+kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class BringupError(Exception):
 
 
 class ArgumentError(BringupError, ValueError):
-    """What was asked for cannot be brought up.
+    """What was requested cannot be brought up.
 
     Scenarios: a policy or calibration file that is not there, an unknown preset.
     """

@@ -14,12 +14,12 @@ from process_supervisor import CallError
 from process_supervisor.graph_client import GraphClient
 from quad_msgs.srv import SetMode
 
-REFUSED_PATIENCE = 3.0
-"""Time in [s] for which a refused mode is asked for again."""
-ASK_AGAIN = 0.2
+REFUSAL_TIMEOUT = 3.0
+"""Time in [s] for which a refused mode is requested again."""
+RETRY_PERIOD = 0.2
 """Time in [s] between that."""
 STATE_TOPIC = 'controller_node/state'
-"""Topic on which the controller says what it is doing."""
+"""Topic on which the controller publishes what it is doing."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -41,13 +41,13 @@ class ModeClient(GraphClient):
 
     @property
     def state(self) -> str:
-        """State of the controller, as it calls it; empty before it is heard."""
+        """State of the controller, as it calls it; empty before it is received."""
         return self._state
 
     def set_mode(self, mode: str, timeout: float) -> str:
         """Ask the controller for a mode; again for a while when it refuses.
 
-        A controller that has just begun may not have heard of everything that it needs.
+        A controller that has just begun may not have received everything that it needs.
 
         Args:
             mode: One that it knows.
@@ -60,16 +60,16 @@ class ModeClient(GraphClient):
             CallError: It refused, or did not answer in time.
             GivenUpError: It is no longer wanted.
         """
-        patience = time.monotonic() + REFUSED_PATIENCE
+        patience = time.monotonic() + REFUSAL_TIMEOUT
         while True:
-            answer = self._ask(mode, timeout)
+            answer = self._request(mode, timeout)
             if answer.success:
                 return str(answer.message)
             if time.monotonic() > patience:
                 raise CallError(f'the mode {mode!r} was refused: {answer.message}')
-            self.listen(ASK_AGAIN)
+            self.listen(RETRY_PERIOD)
 
-    def _ask(self, mode: str, timeout: float) -> SetMode.Response:
+    def _request(self, mode: str, timeout: float) -> SetMode.Response:
         end = time.monotonic() + timeout
         self.wait_until(self._modes.service_is_ready, timeout, 'the service /set_mode')
         future = self._modes.call_async(SetMode.Request(mode=mode))

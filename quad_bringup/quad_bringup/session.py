@@ -35,9 +35,9 @@ AUTO, VENDOR = 'auto', 'vendor'
 PROTOCOLS = (AUTO, V2.name, V1.name, VENDOR)
 """Serial protocols of quad_hardware, and ways to choose one."""
 PORT_REMEDY = 'another --port'
-"""What a second bring-up on a port is told to take."""
+"""What a second bring-up on a port has to choose."""
 NAMESPACE_REMEDY = 'another --namespace'
-"""What a second bring-up in a namespace is told to take."""
+"""What a second bring-up in a namespace has to choose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=protocol_argument,
         choices=PROTOCOLS,
         default=AUTO,
-        help='what is spoken on the serial line; auto asks a real robot, and is v2 with a '
+        help='protocol of the serial line; auto detects it on a real robot, and is v2 with a '
         "simulated one; vendor goes through the vendor's xgo_lib2, whose vendor_servo_method is "
         'given in --calibration (default: %(default)s)',
     )
@@ -179,5 +179,5 @@ def _existing(name: str, path: Path | None) -> Path | None:
         except PolicyError as error:
             raise ArgumentError(f'--policy: {error}') from error
     if not path.is_file():
-        raise ArgumentError(f'--{name}: there is no file {path}')
+        raise ArgumentError(f'--{name}: no file {path}')
     return path.resolve()

@@ -10,7 +10,7 @@ from typing import Protocol
 from process_supervisor import CallError, GivenUpError
 
 HEAR_TIMEOUT = 5.0
-"""Longest time in [s] to hear what the controller is doing."""
+"""Longest time in [s] to receive what the controller is doing."""
 LIE_TIMEOUT = 10.0
 """Longest time in [s] for it to lie, or to stand still."""
 FAULT, LYING, STANDING = 'fault', 'lie', 'stand'
@@ -30,10 +30,10 @@ class Client(Protocol):
 
     @property
     def state(self) -> str:
-        """State of the controller, empty before it is heard."""
+        """State of the controller, empty before it is received."""
 
     def set_mode(self, mode: str, timeout: float) -> str:
-        """Ask for a mode; return the answer."""
+        """Request a mode; return the answer."""
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
         """Wait for something."""
@@ -59,61 +59,61 @@ def join_ros(given_up: Callable[[], bool], namespace: str = '') -> Client:
 
 
 def lie_down(
-    say: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
+    report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
 ) -> None:
     """Let the robot lie down, if it is on its feet; a controller that does not help is left.
 
     Args:
-        say: Takes what the user is told.
+        report: Takes what the user shall read.
         given_up: True when it is no longer wanted.
         make_client: Joins the ROS graph.
     """
-    _leave(_lie_down, 'lying down', say, make_client(given_up))
+    _leave(_lie_down, 'lying down', report, make_client(given_up))
 
 
 def stand_still(
-    say: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
+    report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
 ) -> None:
     """Let the robot end its gait, if it walks, so that it is left standing on all its feet.
 
     Args:
-        say: Takes what the user is told.
+        report: Takes what the user shall read.
         given_up: True when it is no longer wanted.
         make_client: Joins the ROS graph.
     """
-    _leave(_stand_still, 'standing still', say, make_client(given_up))
+    _leave(_stand_still, 'standing still', report, make_client(given_up))
 
 
 def _leave(
     end: Callable[[Client, Callable[[str], None]], None],
     what: str,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
     client: Client,
 ) -> None:
     try:
         client.wait_until(lambda: bool(client.state), HEAR_TIMEOUT, 'the state of the controller')
-        end(client, say)
+        end(client, report)
     except GivenUpError:
-        say(f'stopping without {what}')
+        report(f'stopping without {what}')
     except CallError as error:
-        say(f'stopping without {what}: {error}')
+        report(f'stopping without {what}: {error}')
     finally:
         client.close()
 
 
-def _stand_still(client: Client, say: Callable[[str], None]) -> None:
+def _stand_still(client: Client, report: Callable[[str], None]) -> None:
     if client.state.removeprefix(ON_THE_WAY) not in STEPPING and client.state != TO_STAND:
         return
-    say('standing still first; Ctrl-C again stops at once')
+    report('standing still first; Ctrl-C again stops at once')
     client.set_mode(STANDING, LIE_TIMEOUT)
     ends = {STANDING, FAULT}
     client.wait_until(lambda: client.state in ends, LIE_TIMEOUT, 'it to stand still')
 
 
-def _lie_down(client: Client, say: Callable[[str], None]) -> None:
+def _lie_down(client: Client, report: Callable[[str], None]) -> None:
     if client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
         return
-    say('lying down first; Ctrl-C again stops at once')
+    report('lying down first; Ctrl-C again stops at once')
     # what fails on the way down stops it; asked once more, the robot lies down without it
     if _try_to_lie(client, {LYING, FAULT}) == FAULT:
         _try_to_lie(client, {LYING})

@@ -23,7 +23,7 @@ TF_RATE = 100.0
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
-"""Order of stopping: who commands before who transmits before who obeys."""
+"""Order of stopping: the controller, then the bridge, then the robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Stack:
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Say which processes make a quadruped.
+    """Return which processes make a quadruped.
 
     Args:
         stack: What is to be brought up.
@@ -139,7 +139,7 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
     executable = first_found(STATE_PUBLISHERS, find)
     if executable is None:
         raise StartError(
-            'there is no robot_state_publisher; build the workspace (make build) and source env.sh'
+            'no robot_state_publisher; build the workspace (make build) and source env.sh'
         )
     values = {'publish_frequency': f'{TF_RATE}', **stack.frames}
     return ProcessSpec(

@@ -71,7 +71,7 @@ def test_a_slow_robot_that_stands_has_not_walked() -> None:
         (Velocity(0.2, 0.06, 0.0), 'walk: .*moved'),
         (Velocity(0.2, 0.0, 0.3), 'walk: .*moved'),
         (Velocity(math.nan, 0.0, 0.0), 'walk: .*moved'),
-        (None, 'walk: nobody says how the robot moved'),
+        (None, 'walk: no motion was measured'),
     ],
     ids=['slow', 'sideways', 'turning', 'nan', 'unknown'],
 )

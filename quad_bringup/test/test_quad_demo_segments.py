@@ -13,10 +13,10 @@ import pytest
 
 from quad_bringup.demo.period_statistics import PeriodStatistics
 from quad_bringup.demo.segments import (
+    MIN_DURATION,
     one_round,
     segments,
     share_of,
-    SHORTEST,
     STANDSTILL,
     Velocity,
 )
@@ -28,7 +28,7 @@ from quad_controller.gait.velocity import Velocity as GaitVelocity
 from quad_description import quadruped, robot_urdf
 
 
-@given(st.floats(SHORTEST, 1000.0))
+@given(st.floats(MIN_DURATION, 1000.0))
 def test_a_round_takes_its_time_and_ends_at_rest(duration: float) -> None:
     """It walks forward at 0.2 m/s, turns and strafes; every segment has time to be measured."""
     found = list(segments(duration))
@@ -62,7 +62,7 @@ def test_no_gait_is_asked_for_more_than_it_can(gait: Gait) -> None:
     assert walk.forward > 0.6 * parameters.top_speed(gait)
 
 
-@pytest.mark.parametrize('duration', [0.0, -1.0, SHORTEST - 0.1, math.nan])
+@pytest.mark.parametrize('duration', [0.0, -1.0, MIN_DURATION - 0.1, math.nan])
 def test_too_short_a_round_is_refused(duration: float) -> None:
     """With what it needs."""
     with pytest.raises(ValueError, match='too short'):

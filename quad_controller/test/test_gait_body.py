@@ -221,7 +221,7 @@ def test_a_soft_servo_is_pushed_against_the_weight() -> None:
         ({'max_linear_velocity_x': math.nan}, 'max_linear_velocity_x nan'),
         ({'duty': 0.4}, 'duty 0.4 is below 0.5'),
         ({'swing_height': -0.01}, 'swing_height -0.01 is not within'),
-        ({'servo': ServoModel(kp=0.0)}, 'kp 0.0 is no stiffness'),
+        ({'servo': ServoModel(kp=0.0)}, 'kp 0.0 is not a stiffness'),
     ],
 )
 def test_odd_parameters_are_refused(values: dict[str, float], reason: str) -> None:

@@ -42,7 +42,7 @@ def test_a_policy_that_only_stands_walks_nowhere(
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['--walk', 'nan', '0', '0'], 'nan is no finite number'),
+        (['--walk', 'nan', '0', '0'], 'nan is not a finite number'),
         (['--duration', '0'], 'must be 0.5 to 600'),
         (['--duration', '-1'], 'must be 0.5 to 600'),
         (['--phase-period', '-0.1'], 'must be 0 or more'),
@@ -65,4 +65,4 @@ def test_what_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixt
     assert run([str(path)]) == 1
     assert 'not in the robot: hip' in capsys.readouterr().out
     assert run([str(tmp_path / 'none.onnx')]) == 1
-    assert 'is no file' in capsys.readouterr().out
+    assert 'is neither a file' in capsys.readouterr().out

@@ -32,7 +32,7 @@ from quad_controller.states.status import Output
 from quad_description import ImuSample, JointSample, Targets
 from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 
-PATIENCE = 10.0  # [s]
+TEST_TIMEOUT = 10.0  # [s]
 angles = st.floats(-1.2, 1.2)
 
 
@@ -219,14 +219,14 @@ def test_feedback_makes_steps_and_is_used_once() -> None:
     """An output follows the joint states, and the figures know of their latency."""
     outputs: queue.Queue[Output] = queue.Queue()
     with running(outputs.put) as loop:
-        assert outputs.get(timeout=PATIENCE).targets is None
+        assert outputs.get(timeout=TEST_TIMEOUT).targets is None
         loop.offer_joints(JointSample(FOLDED, (0.0,) * 12))
         loop.offer_imu(UPRIGHT)
-        output = outputs.get(timeout=PATIENCE)
+        output = outputs.get(timeout=TEST_TIMEOUT)
         while output.targets is None:
-            output = outputs.get(timeout=PATIENCE)
+            output = outputs.get(timeout=TEST_TIMEOUT)
         assert output.targets == FOLDED
-        outputs.get(timeout=PATIENCE)
+        outputs.get(timeout=TEST_TIMEOUT)
         figures = loop.figures()
     assert figures.latency_p50 > 0.0
     assert figures.steps >= 2
@@ -240,4 +240,4 @@ def test_a_defect_is_told_and_ends_the_loop() -> None:
         raise RuntimeError('no DDS')
 
     with running(broken, failures.put):
-        assert 'no DDS' in str(failures.get(timeout=PATIENCE))
+        assert 'no DDS' in str(failures.get(timeout=TEST_TIMEOUT))

@@ -164,7 +164,7 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     bad = Twist()
     bad.linear.x = math.nan
     robot.twist.publish(bad)
-    robot.process.wait_for('it is no number')
+    robot.process.wait_for('it is not finite')
     assert robot.mode('lie').success
     robot.until_state('lie')
     # the speed limit of the joints is 10 rad/s, and the time between two steps is not exact

@@ -55,9 +55,9 @@ def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedP
         ({'default_joint_pos': joined([3.0] * 12)}, 'default pose: fl_hip_joint 3'),
         ({'default_joint_pos': joined([0.0] * 12)}, 'rad from our stand'),
         ({'default_joint_pos': '0.0,1.0'}, 'length of default_joint_pos: 2'),
-        ({'default_joint_pos': 'a,b'}, 'no list of numbers'),
+        ({'default_joint_pos': 'a,b'}, 'not a list of numbers'),
         ({'action_scale': '0.0'}, 'action_scale: 0'),
-        ({'action_scale': 'nan'}, 'no finite number'),
+        ({'action_scale': 'nan'}, 'not finite'),
         ({'observation_names': 'gravity,ang_vel,cmd,phase,joint_pos,joint_vel,prev_action'},
          'observation_names'),
         ({'observation_terms_history_length': '[1, 3, 1]'}, 'history, scale, clip'),
@@ -261,7 +261,7 @@ def test_numbers_that_are_none_are_no_targets() -> None:
     network.action[0, 3] = np.nan
     step = runner.step(STILL, UPRIGHT, REST, PERIOD)
     assert step.targets is None
-    assert 'no number' in step.reason
+    assert 'not finite' in step.reason
 
     def broken(_observation: object) -> None:
         raise RuntimeError('out of order')
@@ -354,7 +354,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     with pytest.raises(PolicyError, match='No such file'):
         load_policy(tmp_path / 'missing.onnx', ROBOT, STAND, options, PERIOD)
     (tmp_path / 'text.onnx').write_text('not a network')
-    with pytest.raises(PolicyError, match='no ONNX model'):
+    with pytest.raises(PolicyError, match='not an ONNX model'):
         load_policy(tmp_path / 'text.onnx', ROBOT, STAND, options, PERIOD)
     narrow = write_policy(tmp_path / 'narrow.onnx', metadata(), width=45)
     with pytest.raises(PolicyError, match='input'):

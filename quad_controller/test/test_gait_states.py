@@ -181,7 +181,7 @@ def test_a_velocity_that_is_too_much_is_told_once() -> None:
     assert rig.controller.status.velocity == Velocity(0.3)
     told = [line for line in rig.log if 'is more than' in line]
     assert told == [
-        '0.80 0.00 m/s 0.00 rad/s is more than a trot can: it is 0.30 0.00 m/s 0.00 rad/s'
+        '0.80 0.00 m/s 0.00 rad/s is more than a trot can; clamped to 0.30 0.00 m/s 0.00 rad/s'
     ]
     rig.run(1.0, Velocity(0.2))
     assert len([line for line in rig.log if 'is more than' in line]) == 1
@@ -193,8 +193,8 @@ def test_velocities_and_poses_that_are_no_numbers_are_refused(value: float) -> N
     rig = standing()
     rig.ask('walk')
     rig.run(0.5, FORWARD)
-    assert 'no number' in rig.controller.set_velocity(Velocity(0.1, value)).message
-    assert 'no number' in rig.controller.set_body_pose(BodyPose(roll=value)).message
+    assert 'not finite' in rig.controller.set_velocity(Velocity(0.1, value)).message
+    assert 'not finite' in rig.controller.set_body_pose(BodyPose(roll=value)).message
     rig.run(0.5)
     assert rig.controller.status.velocity.at_rest
     assert rig.controller.status.refused == 2

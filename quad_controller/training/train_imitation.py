@@ -36,7 +36,7 @@ HIDDEN = (128, 64)
 PHASE_THRESHOLD = 0.02
 EPISODE = 6.0  # [s]
 COMMAND_TIME = 1.5  # [s] between two commands
-FASTEST = (0.35, 0.15, 1.5)  # [m/s], [m/s], [rad/s]
+MAX_VELOCITY = (0.35, 0.15, 1.5)  # [m/s], [m/s], [rad/s]
 MAX_TILT = 0.7  # [rad] an episode ends there
 # the vendor's training noise (luwu_mjlab): uniform, in [rad/s], of a unit vector, [rad], [rad/s]
 NOISE = {'rate': 0.2, 'gravity': 0.05, 'position': 0.01, 'velocity': 1.5}
@@ -153,7 +153,7 @@ class Trainer:
         kind = self._random.integers(6)
         if kind == 0:
             return Velocity()
-        parts = self._random.uniform(-1.0, 1.0, 3) * FASTEST
+        parts = self._random.uniform(-1.0, 1.0, 3) * MAX_VELOCITY
         if kind <= 2:
             parts *= np.eye(3)[self._random.integers(3)]
         x, y, yaw = parts.tolist()

@@ -129,7 +129,7 @@ def parse(urdf: str) -> Description:
             f'the robot description is not XML: {error}; give its text: "$(xacro robot.xacro)"'
         ) from error
     if robot.tag != 'robot':
-        raise DescriptionError(f'the robot description is no URDF: its root is <{robot.tag}>')
+        raise DescriptionError(f'the robot description is not a URDF: its root is <{robot.tag}>')
     links = {link.get('name', ''): link for link in robot.findall('link')}
     spheres = {name: link.find('.//sphere') for name, link in links.items()}
     return Description(
@@ -162,7 +162,9 @@ def _joint(element: ET.Element) -> Joint:
     try:
         kind = JointKind(element.get('type'))
     except ValueError:
-        raise DescriptionError(f'joint {name}: {element.get("type")!r} is no joint type') from None
+        raise DescriptionError(
+            f'joint {name}: {element.get("type")!r} is not a joint type'
+        ) from None
     origin = element.find('origin')
     mimics = element.find('mimic') is not None
     return Joint(

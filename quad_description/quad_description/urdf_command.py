@@ -13,7 +13,7 @@ from .presets import PRESETS, robot_urdf
 
 
 def run(argv: Sequence[str] | None = None) -> int:
-    """Print the URDF that the arguments ask for; return the exit code."""
+    """Print the URDF that the arguments request; return the exit code."""
     parser = argparse.ArgumentParser(description='Print the URDF of the quadruped.')
     parser.add_argument('--preset', default='lite', choices=PRESETS, help='the robot')
     parser.add_argument('--arm', action='store_true', help='with the arm on its back')

@@ -164,7 +164,7 @@ def test_a_height_out_of_reach_is_refused() -> None:
         ('parent link="base_link"', 'parent link="fl_calf"', 'no chain'),
         ('lower="-0.6"', 'lower="nan"', 'finite'),
         ('<robot', '<model', 'not XML'),
-        ('type="revolute"', 'type="turning"', 'no joint type'),
+        ('type="revolute"', 'type="turning"', 'not a joint type'),
         ('link="fl_hip"', '', 'is missing'),
     ],
 )

@@ -68,7 +68,7 @@ class SerialBackend(Backend):
         """Send targets, and wait for the next report.
 
         Raises:
-            CommandError: The targets were not sent; says why.
+            CommandError: The targets were not sent; the message has the reason.
             NoAnswerError: The robot was lost.
         """
         if targets is not None:

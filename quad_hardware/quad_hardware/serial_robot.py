@@ -203,7 +203,7 @@ class SerialRobot:
         return not self._driver.limp and self._driver.command(angles)
 
     def _obstacle(self) -> str:
-        """Say why nothing is sent to the servos."""
+        """Return why nothing is sent to the servos."""
         status = self._driver.status()
         if self._driver.limp and status.state is LinkState.RUNNING:
             return 'the servos are without torque; call ~/torque with true'

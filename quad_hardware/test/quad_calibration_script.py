@@ -17,11 +17,11 @@ class Script:
         self._answers = list(answers)
         self.said: list[str] = []
 
-    def say(self, text: str) -> None:
+    def write(self, text: str) -> None:
         """Listen."""
         self.said.append(text)
 
-    def ask(self, question: str) -> str:
+    def prompt(self, question: str) -> str:
         """Answer; leave when there is no answer left."""
         self.said.append(question)
         if not self._answers:

@@ -178,7 +178,7 @@ class PtyPeer:
             if self._pushing and time.monotonic() >= next_push:
                 next_push = time.monotonic() + PUSH_PERIOD
                 self._sequence += 1
-                self._say(self._state().frame())
+                self._send(self._state().frame())
 
     def _take(self, frame: Frame) -> None:
         (self._new if self.protocol is V2 else self._old)(frame)
@@ -193,7 +193,7 @@ class PtyPeer:
             sequence=self._sequence % 65536,
         )
 
-    def _say(self, frame: Frame) -> None:
+    def _send(self, frame: Frame) -> None:
         if self.behaviour.silent:
             return
         wire = bytearray(frame.encode(self.protocol))
@@ -219,9 +219,9 @@ class PtyPeer:
 
     def _new(self, frame: Frame) -> None:
         if frame.kind is Kind.READ and frame.address == Code.VERSION:
-            self._say(Frame(Kind.REPLY, Code.VERSION, self.firmware.encode().ljust(10, b'\0')))
+            self._send(Frame(Kind.REPLY, Code.VERSION, self.firmware.encode().ljust(10, b'\0')))
         elif frame.kind is Kind.READ and frame.address == Code.BATTERY:
-            self._say(Frame(Kind.REPLY, Code.BATTERY, bytes((80,))))
+            self._send(Frame(Kind.REPLY, Code.BATTERY, bytes((80,))))
         elif frame.address == Code.FEEDBACK:
             self._pushing = bool(frame.payload[0])
         elif frame.address == Code.TORQUE:
@@ -242,19 +242,19 @@ class PtyPeer:
                 }
             )
         elif frame.address == Register.FIRMWARE:
-            self._say(Frame(Kind.REPLY, frame.address, self.firmware.encode().ljust(10, b'\0')))
+            self._send(Frame(Kind.REPLY, frame.address, self.firmware.encode().ljust(10, b'\0')))
         elif frame.address == Register.BATTERY:
-            self._say(Frame(Kind.REPLY, frame.address, bytes((80,))))
+            self._send(Frame(Kind.REPLY, frame.address, bytes((80,))))
         elif frame.address == Register.MOTORS:
             motors = BULK_READ_ORDER[: frame.payload[0]]
             data = bytes(spans[motor].encode(self.angles[motor]) for motor in motors)
-            self._say(Frame(Kind.REPLY, frame.address, data))
+            self._send(Frame(Kind.REPLY, frame.address, data))
         elif frame.address == Register.IMU:
             attitude, rates = self._moved()
             values = V1.functions[Register.IMU].pack(
                 acceleration=self.behaviour.acceleration, rate=rates, attitude=attitude
             )
-            self._say(Frame(Kind.REPLY, frame.address, values))
+            self._send(Frame(Kind.REPLY, frame.address, values))
 
     def __enter__(self) -> Self:
         """Plug it in."""

@@ -16,9 +16,9 @@ import yaml
 
 from quad_calibration_script import Script
 from quad_hardware.calibration import robot
-from quad_hardware.calibration.console import ask_number
+from quad_hardware.calibration.console import prompt_number
 from quad_hardware.calibration.joints import (
-    LEAST_TURN,
+    MIN_TURN,
     moved_motor,
     with_direction,
     with_limits,
@@ -38,7 +38,7 @@ KNEE = JointServo('fl_calf_joint', 11, lower=-1.134, upper=0.8727)
 @given(
     st.sampled_from([1, -1]),
     st.floats(-1.0, 1.0),
-    st.floats(math.radians(LEAST_TURN) + 0.01, 1.5),
+    st.floats(math.radians(MIN_TURN) + 0.01, 1.5),
 )
 def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> None:
     """From two angles of a servo that is mounted in any way."""
@@ -180,7 +180,7 @@ def test_a_file_keeps_what_it_had(tmp_path: Path) -> None:
 def test_a_number_is_asked_for_until_there_is_one() -> None:
     """A comma is a point; words, nothing and zero are not."""
     script = Script('far', '', '-1', 'inf', '0,95')
-    assert ask_number(script, 'How far?') == 0.95
+    assert prompt_number(script, 'How far?') == 0.95
     assert len(script.said) == 9
 
 

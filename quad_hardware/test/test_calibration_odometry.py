@@ -88,7 +88,9 @@ def test_the_scale_is_what_the_tape_says(walking_robot: WalkingRobot, tmp_path: 
     command = ['odometry', '--distance', '0.3', '--speed', '0.5', '--output', str(output)]
     assert run_calibrate(command, script) == 0, script.said
     assert walking_robot.velocity.linear.x == 0.0
-    said = float(next(line for line in script.said if line.startswith('odometry says')).split()[2])
+    said = float(
+        next(line for line in script.said if line.startswith('odometry measured')).split()[2]
+    )
     assert said >= 0.3
     scale = read_parameters(output)['odometry']['scale_x']  # type: ignore[index]
     assert scale == pytest.approx(1.25 * 0.15 / said, rel=2e-3)

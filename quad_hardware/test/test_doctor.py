@@ -133,7 +133,7 @@ def test_a_port_is_judged_by_what_answers(tmp_path: Path) -> None:
     assert found(check_port(path), 'port').severity is Severity.ERROR
     plain = tmp_path / 'plain'
     plain.touch()
-    assert 'is no device' in str(found(check_port(str(plain)), 'port'))
+    assert 'is not a device' in str(found(check_port(str(plain)), 'port'))
 
 
 def test_an_adapter_that_keeps_bytes_back_is_found(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
-from quad_hardware.joints.command import LONGEST_PERIOD
+from quad_hardware.joints.command import MAX_PERIOD
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
 from quad_node_rig import NodeRig, TIMEOUT
 
@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
 
 HOME = [0.0] * 12
 POSE = [0.0, 0.6, -0.3] * 4
-LARGEST_STEP = math.degrees(LimiterSettings().speed * LONGEST_PERIOD)  # [deg]
+LARGEST_STEP = math.degrees(LimiterSettings().speed * MAX_PERIOD)  # [deg]
 LEGS_ORDER = [13, 12, 11, 23, 22, 21, 43, 42, 41, 33, 32, 31]
 
 

@@ -118,7 +118,7 @@ def test_limits_are_told() -> None:
 def test_a_leg_that_nobody_has_seen_is_not_moved() -> None:
     """Its target would jump: the command is refused by name, and the next one begins anew."""
     limiter = CommandLimiter(JOINTS)
-    with pytest.raises(CommandError, match='says where fl_thigh_joint, fl_calf_joint is'):
+    with pytest.raises(CommandError, match='no report of fl_thigh_joint, fl_calf_joint'):
         limiter.step([0.5] * 12, [0.0, None, None, *HOME[3:]], 0.0)
     with pytest.raises(CommandError, match='fl_hip_joint'):
         limiter.step([0.5] * 12, [None] * 12, 0.02)

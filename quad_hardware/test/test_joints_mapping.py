@@ -84,7 +84,7 @@ def test_the_legs_come_first() -> None:
         JointMap([servos[12], *servos[:12], *servos[13:]])
     assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
     tail = replace(LEGS[2], name='tail_joint')
-    with pytest.raises(CommandError, match='tail_joint: there is no motor 61'):
+    with pytest.raises(CommandError, match='tail_joint: unknown motor 61'):
         JointMap([*servos, servo_of(tail, 61)])
 
 

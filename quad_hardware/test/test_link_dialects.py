@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_hardware.link.dialect import Dialect
-from quad_hardware.link.unseen_servo import LOWEST_RATE, UnseenServo
+from quad_hardware.link.unseen_servo import MIN_RATE, UnseenServo
 from quad_hardware.link.v1_dialect import HOST_GAP, V1Dialect
-from quad_hardware.link.v2_dialect import ASK_AGAIN, V2Dialect
+from quad_hardware.link.v2_dialect import REQUEST_PERIOD, V2Dialect
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -56,7 +56,7 @@ class OldRig:
         self.dialect: Dialect[Frame] = V1Dialect(self.now)
         self.latency = latency
         self.lose_each = 0
-        self._asked = 0
+        self._requested = 0
         self.sent: list[tuple[float, Frame]] = []
         self.states: list[Report] = []
         self.angles_at: list[float] = []  # [s] when half an answer about the motors was there
@@ -66,8 +66,8 @@ class OldRig:
     def _answers_to(self, frame: Frame) -> bool:
         if frame.kind is not Kind.READ or self.latency == math.inf:
             return False
-        self._asked += 1
-        return not self.lose_each or self._asked % self.lose_each > 0
+        self._requested += 1
+        return not self.lose_each or self._requested % self.lose_each > 0
 
     def run(self, duration: float) -> None:
         """Let time pass."""
@@ -208,12 +208,12 @@ def test_an_unseen_servo_has_arrived_only_when_it_has(
     for target, time in orders:
         servo.send(target, now)
         now += time
-        way = LOWEST_RATE * time
+        way = MIN_RATE * time
         place = min(max(target, place - way), place + way)
         if servo.arrived(now):
             assert place == pytest.approx(target, abs=1e-6)
     servo.send(0.0, now)
-    assert servo.arrived(now + 350.0 / LOWEST_RATE)
+    assert servo.arrived(now + 350.0 / MIN_RATE)
 
 
 def test_a_silent_old_robot_is_asked_again_and_counted() -> None:
@@ -271,10 +271,10 @@ def test_the_new_protocol_asks_until_states_come() -> None:
     dialect = V2Dialect(0.0)
     asked = [f.address for f in StreamParser(V2, HOST_KINDS).feed(dialect.step(0.0).send)]
     assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
-    assert dialect.step(ASK_AGAIN / 2).send == b''
-    assert dialect.handle_frame(Feedback().frame(), ASK_AGAIN / 2) is not None
-    assert dialect.step(ASK_AGAIN).send == b''
-    assert dialect.step(ASK_AGAIN * 1.5).send != b''
+    assert dialect.step(REQUEST_PERIOD / 2).send == b''
+    assert dialect.handle_frame(Feedback().frame(), REQUEST_PERIOD / 2) is not None
+    assert dialect.step(REQUEST_PERIOD).send == b''
+    assert dialect.step(REQUEST_PERIOD * 1.5).send != b''
 
 
 @given(st.dictionaries(st.sampled_from(MOTOR_ORDER), st.floats(-180, 180), min_size=1))

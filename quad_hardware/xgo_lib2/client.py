@@ -13,7 +13,7 @@ import time
 from typing import TYPE_CHECKING
 
 from quad_hardware.exceptions import CodecError, HardwareError, NoAnswerError
-from quad_hardware.link import ask, connect
+from quad_hardware.link import connect, send_request
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     Code,
@@ -77,7 +77,7 @@ class XgoDog:
 
     @property
     def protocol(self) -> str:
-        """Name of the protocol that the robot speaks: ``new`` or ``old``."""
+        """Name of the protocol that the robot speaks: ``v2`` or ``v1``."""
         return self._connection.protocol.name
 
     def read_version(self) -> str:
@@ -87,7 +87,7 @@ class XgoDog:
             XgoError: The robot does not answer, or the port was lost.
         """
         if self._is_v2:
-            answer = self._ask(Frame(Kind.READ, Code.VERSION), 10)
+            answer = self._request(Frame(Kind.READ, Code.VERSION), 10)
         else:
             answer = self._read_register(Register.FIRMWARE, 10)
         return answer.rstrip(b'\0').decode('ascii', 'replace')
@@ -99,7 +99,7 @@ class XgoDog:
             XgoError: The robot does not answer, or the port was lost.
         """
         if self._is_v2:
-            return self._ask(Frame(Kind.READ, Code.BATTERY), 1)[0]
+            return self._request(Frame(Kind.READ, Code.BATTERY), 1)[0]
         return self._read_register(Register.BATTERY, 1)[0]
 
     def system_set_feedback(self, on: int) -> None:
@@ -110,9 +110,7 @@ class XgoDog:
             XgoError: The port was lost.
         """
         if not self._is_v2:
-            raise XgoNotSupportedError(
-                'a robot of protocol v1 pushes nothing; ask with read_imu and read_servo_angles'
-            )
+            raise XgoNotSupportedError('protocol v1 pushes nothing; poll with read_imu')
         self._send(Frame(Kind.WRITE, Code.FEEDBACK, bytes((bool(on),))))
 
     def read_state(self, timeout: float = TIMEOUT) -> DeviceState:
@@ -177,7 +175,7 @@ class XgoDog:
         for motor, angle in angles.items():
             slot_of(motor)
             if not math.isfinite(angle):
-                raise ValueError(f'motor {motor}: {angle} is no angle')
+                raise ValueError(f'motor {motor}: {angle} is not an angle')
         if self._is_v2:
             servos = V2.functions[Code.SERVOS]
             with _as_xgo_errors():
@@ -226,12 +224,12 @@ class XgoDog:
             self._connection.port.write(frame.encode(self._connection.protocol))
 
     def _read_register(self, register: Register, size: int) -> bytes:
-        return self._ask(Frame(Kind.READ, register, bytes((size,))), size)
+        return self._request(Frame(Kind.READ, register, bytes((size,))), size)
 
-    def _ask(self, request: Frame, size: int) -> bytes:
+    def _request(self, request: Frame, size: int) -> bytes:
         connection = self._connection
         with _as_xgo_errors():
-            answer = ask(connection.port, connection.protocol, request, size, TIMEOUT)
+            answer = send_request(connection.port, connection.protocol, request, size, TIMEOUT)
         if answer is None:
             raise XgoTimeoutError(f'no answer from {connection.port.path} within {TIMEOUT} s')
         return answer

@@ -78,7 +78,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
     add('--arm', action='store_true', help='with the arm on its back')
     add('--trunk-mass', type=float, metavar='KG', help="mass of the trunk, not the preset's")
-    add('--firmware', default='', help='version that the board tells, e.g. L-4.3.3')
+    add('--firmware', default='', help='version that the board reports, e.g. L-4.3.3')
     add('--physics', choices=('mujoco', 'none'), default='mujoco', help='none: in the air')
     add('--servo', default='firm', help='firm, vendor_rl, or kp=10,kv=0.25,interpolation=0.02')
     add('--slope', type=float, default=0.0, metavar='DEG', help='of the ground, uphill ahead')
@@ -150,7 +150,7 @@ def parse_servo(text: str) -> ServoModel | ServoParameters:
     """Return a servo from its name, or from ``name=value,...``.
 
     Raises:
-        SetupError: The text has no sense; the message says what has.
+        SetupError: The text has no sense; the message names what has.
     """
     names = {'kp': 'stiffness', 'kv': 'velocity_gain'} | {
         name: name for name in ('damping', 'armature', 'friction', 'interpolation')
@@ -176,7 +176,7 @@ def parse_mount(text: str) -> tuple[int, Mount]:
     """Return a motor id and how its servo sits, from ``ID=SIGN[,DEGREES]``.
 
     Raises:
-        SetupError: The text has no sense; the message says what has.
+        SetupError: The text has no sense; the message names what has.
     """
     motor, _, rest = text.partition('=')
     sign, _, offset = rest.partition(',')

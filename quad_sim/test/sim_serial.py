@@ -17,7 +17,7 @@ from quad_sim.line.pseudo_terminal import PseudoTerminal
 from quad_sim.line.server import Server
 from quad_sim.options import build, parse_arguments, Simulation
 
-PATIENCE = 10.0  # [s] until a test gives up
+TEST_TIMEOUT = 10.0  # [s] until a test gives up
 
 
 class Served:
@@ -29,7 +29,7 @@ class Served:
 
     def do(self, action: Callable[[], object]) -> object:
         """Have something done between two turns of the robot's loop."""
-        return self.server.submit(action).result(PATIENCE)
+        return self.server.submit(action).result(TEST_TIMEOUT)
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def serve(link: Path, *arguments: str) -> Iterator[Served]:
             yield Served(simulation, server, link)
         finally:
             server.stop()
-            thread.join(PATIENCE)
+            thread.join(TEST_TIMEOUT)
             server.close()
 
 
@@ -65,7 +65,7 @@ class Listener:
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
         """Listen until something holds."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TEST_TIMEOUT
         while not condition():
             assert time.monotonic() < deadline, f'no {what}'
             for frame in self.parser.feed(self.port.read(max(self.port.in_waiting, 1))):

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 import serial
-from sim_serial import Listener, PATIENCE, serve
+from sim_serial import Listener, serve, TEST_TIMEOUT
 from sim_virtual import VirtualRobot
 
 from quad_hardware.protocol import Code, decode_feedback, Fault, Frame, Kind, V2
@@ -227,13 +227,13 @@ def test_the_same_bytes_at_the_same_times_have_the_same_answer() -> None:
 @pytest.mark.parametrize(
     ('text', 'message'),
     [
-        ('fire', "no fault 'fire'; there are drop, flip, silence, deaf, slow, brown_out"),
+        ('fire', "unknown fault 'fire'; there are drop, flip, silence, deaf, slow, brown_out"),
         ('drop,rate=2', 'rate 2.0 .* is not 0 to 1'),
         ('drop,rate=nan', 'rate nan'),
         ('drop,delay=1', "drop has no 'delay'; it takes at, for, rate"),
         ('silence,at=-1', 'at -1.0'),
         ('silence,for=0', 'for 0.0'),
-        ('slow,delay', "'delay' is no name=number"),
+        ('slow,delay', "'delay' is not name=number"),
     ],
 )
 def test_a_fault_without_sense_is_refused(text: str, message: str) -> None:
@@ -261,7 +261,7 @@ def test_an_unplugged_port_goes_and_comes_back(tmp_path: Path) -> None:
             listener.until(lambda: False, 'hang-up')
         assert not served.path.exists()
         listener.close()
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TEST_TIMEOUT
         while not served.path.exists():
             assert time.monotonic() < deadline
             time.sleep(0.01)

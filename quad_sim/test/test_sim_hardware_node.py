@@ -15,7 +15,7 @@ import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
-from quad_hardware.joints.command import LONGEST_PERIOD
+from quad_hardware.joints.command import MAX_PERIOD
 from quad_msgs.srv import InjectFault
 from quad_node_rig import Rig, TIMEOUT
 
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('sim_hardware_node')
 
 NAMES = [joint.name for joint in movable_joints(robot_urdf('lite'))]
 STAND = [pose_positions(Pose.STAND)[name] for name in NAMES]
-LARGEST_STEP = LimiterSettings().speed * LONGEST_PERIOD  # [rad]
+LARGEST_STEP = LimiterSettings().speed * MAX_PERIOD  # [rad]
 
 
 class XgoRig(Rig):

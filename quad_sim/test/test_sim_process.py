@@ -21,7 +21,7 @@ from nav_msgs.msg import Odometry
 from processes import executable
 import pytest
 from ros_client import RosClient
-from sim_serial import Listener, PATIENCE
+from sim_serial import Listener, TEST_TIMEOUT
 from std_srvs.srv import Trigger
 
 from quad_hardware.protocol import Code, decode_feedback, Frame, Kind
@@ -54,7 +54,7 @@ def fake_xgo(
     finally:
         if process.poll() is None:
             process.kill()
-        process.communicate(timeout=PATIENCE)
+        process.communicate(timeout=TEST_TIMEOUT)
 
 
 def test_it_works_without_ros_and_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_it_works_without_ros_and_leaves_nothing_behind(tmp_path: Path) -> None:
         assert answer.payload.startswith(b'L-')
         listener.close()
         process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
+        assert process.wait(TEST_TIMEOUT) == 0
     assert not os.path.lexists(link)
 
 
@@ -89,11 +89,11 @@ def test_a_path_in_use_is_refused_and_a_dead_one_replaced(tmp_path: Path) -> Non
         assert second.returncode == 2
         assert 'belongs to another simulated robot' in second.stderr
         process.kill()
-        process.wait(PATIENCE)
+        process.wait(TEST_TIMEOUT)
     assert link.is_symlink()
     with fake_xgo(link, '--no-ros', '--physics', 'none') as process:
         process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE) == 0
+        assert process.wait(TEST_TIMEOUT) == 0
 
 
 @pytest.mark.parametrize('ros', [True, False], ids=['with ROS', 'without'])
@@ -102,7 +102,7 @@ def test_it_reports_that_it_is_ready(ros: bool, tmp_path: Path) -> None:
     environment = {**os.environ, 'NOTIFY_SOCKET': str(tmp_path / 'notify')}
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as supervisor:
         supervisor.bind(environment['NOTIFY_SOCKET'])
-        supervisor.settimeout(PATIENCE)
+        supervisor.settimeout(TEST_TIMEOUT)
         options = ('--physics', 'none', *(() if ros else ('--no-ros',)))
         with fake_xgo(tmp_path / 'xgo', *options, env=environment):
             assert supervisor.recv(100) == b'READY=1'
@@ -196,7 +196,7 @@ def robot(isolation: Isolation, tmp_path: Path) -> Iterator[tuple[RosClient, Pat
     ):
         yield client, link
         process.send_signal(signal.SIGTERM)
-        assert process.wait(PATIENCE) == 0
+        assert process.wait(TEST_TIMEOUT) == 0
 
 
 def push(client: RosClient, **parts: float) -> Any:
@@ -212,7 +212,7 @@ def test_services_push_the_robot_and_break_its_line(robot: tuple[RosClient, Path
     """A push moves it, a fault silences it for its time, and nonsense is answered with words."""
     client, link = robot
     truth = client.listen(Odometry, '/fake_xgo/ground_truth')
-    client.spin_until(lambda: bool(truth), PATIENCE, 'ground truth')
+    client.spin_until(lambda: bool(truth), TEST_TIMEOUT, 'ground truth')
     assert 0.12 < truth[-1].pose.pose.position.z < 0.14
 
     def moves() -> bool:
@@ -221,7 +221,7 @@ def test_services_push_the_robot_and_break_its_line(robot: tuple[RosClient, Path
         client.spin_for(0.5)
         return any(abs(t.twist.twist.linear.y) > 0.1 for t in truth)
 
-    client.spin_until(moves, PATIENCE, 'motion')
+    client.spin_until(moves, TEST_TIMEOUT, 'motion')
     assert push(client, force=1.0, duration=0.1).success
     refused = push(client)
     assert (refused.success, 'neither force' in refused.message) == (False, True)
@@ -255,5 +255,5 @@ def test_services_push_the_robot_and_break_its_line(robot: tuple[RosClient, Path
 
     assert client.call(Trigger, '/fake_xgo/stand', Trigger.Request()).success
     begin = time.monotonic()
-    client.spin_until(lambda: time.monotonic() - begin > 0.2, PATIENCE, 'time')
+    client.spin_until(lambda: time.monotonic() - begin > 0.2, TEST_TIMEOUT, 'time')
     assert truth[-1].pose.pose.position.z > 0.1

@@ -11,7 +11,7 @@ from pathlib import Path
 import time
 
 import pytest
-from sim_serial import PATIENCE, serve, Served
+from sim_serial import serve, Served, TEST_TIMEOUT
 from sim_v1_client import V1Client
 
 pytestmark = pytest.mark.slow
@@ -38,7 +38,7 @@ def encoded(angles: list[float]) -> bytes:
 
 def wait(condition: Callable[[], bool], what: str) -> None:
     """Wait until something holds."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TEST_TIMEOUT
     while not condition():
         assert time.monotonic() < deadline, f'not: {what}'
         time.sleep(0.01)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How the body stands on its feet, as a person asks for it."""
+"""How the body stands on its feet, as a person requests it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the controller says of itself on /diagnostics (REP 107), for a person at a keyboard."""
+"""What the controller reports of itself on /diagnostics (REP 107), for a person at a keyboard."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ControllerReport:
     time: float
 
     def is_fresh(self, now: float) -> bool:
-        """Say whether it still counts.
+        """Return whether it still counts.
 
         Args:
             now: Time [s].

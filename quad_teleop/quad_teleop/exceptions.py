@@ -6,7 +6,7 @@
 
     TeleopError
     ├── SettingError (ValueError)   a parameter is misspelt, or its value makes no sense
-    └── CommandError (ValueError)   a velocity is no number
+    └── CommandError (ValueError)   a velocity is not finite
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -26,7 +26,7 @@ class SettingError(TeleopError, ValueError):
 
 
 class CommandError(TeleopError, ValueError):
-    """A velocity is no number.
+    """A velocity is not finite.
 
     Scenarios: a planner divided by zero and sends NaN.
     """

@@ -28,7 +28,7 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
     """Moves while the deadman is held.
 
     Attributes:
-        pose: The pose of the body that was asked for last.
+        pose: The pose of the body that was requested last.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
     def wanted(self) -> Velocity | None:
         """Return the velocity that is wanted; None without the deadman.
 
-        Without a deadman button, a gamepad at rest asks for nothing.
+        Without a deadman button, a gamepad at rest requests nothing.
         """
         speeds = self._speeds.get(self.grip)
         if speeds is None:
@@ -71,7 +71,7 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
             state: At rest when there is none.
 
         Returns:
-            What the person asks for besides a velocity. Whatever makes the robot move needs the
+            What the person requests besides a velocity. Whatever makes the robot move needs the
             deadman, as walking does; lying down and clearing a fault, which moves nothing, need
             none.
         """

@@ -30,7 +30,7 @@ class KeyboardTeleop:
 
     Attributes:
         speeds: The speeds that are set.
-        pose: The pose of the body that was asked for last.
+        pose: The pose of the body that was requested last.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class KeyboardTeleop:
         self._stream = stream
 
     def wanted(self, now: float) -> Velocity | None:
-        """Return the velocity that is wanted; None when no key asks for one.
+        """Return the velocity that is wanted; None when no key requests one.
 
         Args:
             now: Time [s].
@@ -62,7 +62,7 @@ class KeyboardTeleop:
         return MOVES[key].at(self.speeds.linear, self.speeds.angular)
 
     def step(self, now: float) -> Velocity | None:
-        """Say what to publish now; call it after every event and when it is due.
+        """Return what to publish now; call it after every event and when it is due.
 
         Args:
             now: Time [s].
@@ -89,7 +89,7 @@ class KeyboardTeleop:
             event: What happened to a key.
 
         Returns:
-            What the person asks for besides a velocity.
+            What the person requests besides a velocity.
         """
         if event.key in MOVES or not event.is_stroke:
             self._held.feed(event)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Modes of the controller that a person can ask for with one key or button."""
+"""Modes of the controller that a person can request with one key or button."""
 
 from __future__ import annotations
 

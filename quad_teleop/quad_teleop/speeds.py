@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from .exceptions import SettingError
 
 STEP = 0.1  # share by which a key makes faster or slower
-SLOWEST = 0.01  # [m/s] and [rad/s]: slower is standing, and could not be made faster again
+MIN_SPEED = 0.01  # [m/s] and [rad/s]: slower is standing, and could not be made faster again
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class Speeds:
             ('speed', self.linear, self.linear_limit),
             ('turn', self.angular, self.angular_limit),
         ):
-            if not SLOWEST <= speed <= limit:
+            if not MIN_SPEED <= speed <= limit:
                 raise SettingError(
-                    f'{name} is {speed}: it must be between {SLOWEST} and its limit {limit}; '
+                    f'{name} is {speed}: it must be between {MIN_SPEED} and its limit {limit}; '
                     f'change {name} or {name}_limit'
                 )
 
@@ -58,4 +58,4 @@ class Speeds:
 
 
 def _scaled(speed: float, steps: int, limit: float) -> float:
-    return min(max(speed * (1.0 + STEP * steps), SLOWEST), limit)
+    return min(max(speed * (1.0 + STEP * steps), MIN_SPEED), limit)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot is asked to do at one moment."""
+"""What the robot has to do at one moment."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 from quad_msgs.srv import SetMode
 
 STILL = (0.0, 0.0, 0.0)
-PATIENCE = 30.0  # [s] of a test on a busy machine
+TEST_TIMEOUT = 30.0  # [s] of a test on a busy machine
 
 
 class Robot:
@@ -52,13 +52,13 @@ class Robot:
             found = self.velocities[after:]
             return any(tuple(round(part, 6) for part in each) == wanted for each in found)
 
-        self.client.spin_until(heard, PATIENCE, f'velocity {velocity} on /cmd_vel')
+        self.client.spin_until(heard, TEST_TIMEOUT, f'velocity {velocity} on /cmd_vel')
         return len(self.twists)
 
     def wait_until_stopped(self) -> None:
         """Wait for a zero."""
         self.client.spin_until(
-            lambda: bool(self.twists) and self.velocities[-1] == STILL, PATIENCE, 'zero'
+            lambda: bool(self.twists) and self.velocities[-1] == STILL, TEST_TIMEOUT, 'zero'
         )
 
     def wait_until_silent(self) -> int:
@@ -67,7 +67,7 @@ class Robot:
         Returns:
             How many messages there are then.
         """
-        self.client.spin_until(lambda: self.velocities[-3:] == [STILL] * 3, PATIENCE, 'zeros')
+        self.client.spin_until(lambda: self.velocities[-3:] == [STILL] * 3, TEST_TIMEOUT, 'zeros')
         count = len(self.twists)
         self.listen_for(0.5)
         assert len(self.twists) == count, 'an idle teleop is silent'
@@ -76,13 +76,13 @@ class Robot:
     def wait_until_linked(self) -> None:
         """Wait until a teleop publishes here."""
         count = self.client.node.count_publishers
-        self.client.spin_until(lambda: count('cmd_vel') > 0, PATIENCE, 'publisher of /cmd_vel')
+        self.client.spin_until(lambda: count('cmd_vel') > 0, TEST_TIMEOUT, 'publisher of /cmd_vel')
 
     def listen_for(self, duration: float) -> None:
         """Listen for a time, for what must not come."""
         clock = self.client.node.get_clock()
         end = clock.now().nanoseconds + int(duration * 1e9)
-        self.client.spin_until(lambda: clock.now().nanoseconds > end, PATIENCE, 'end')
+        self.client.spin_until(lambda: clock.now().nanoseconds > end, TEST_TIMEOUT, 'end')
 
     def fall_over(self) -> None:
         """Report a fault, as the controller does."""

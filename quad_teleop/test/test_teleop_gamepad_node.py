@@ -13,7 +13,7 @@ import pytest
 import rclpy
 from ros_client import RosClient
 from std_srvs.srv import Trigger
-from teleop_robot import PATIENCE, Robot
+from teleop_robot import Robot, TEST_TIMEOUT
 
 from operator_input.ros import run_session
 from quad_teleop.nodes.teleop_gamepad import Session, TeleopGamepad
@@ -52,7 +52,7 @@ def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[
         with RosClient(isolation.domain_id) as client:
             robot = Robot(client)
             robot.wait_until_linked()
-            client.spin_until(lambda: node.outputs.is_heard, PATIENCE, 'link')
+            client.spin_until(lambda: node.outputs.has_subscriber, TEST_TIMEOUT, 'link')
             yield robot
     finally:
         stop.set()
@@ -86,9 +86,9 @@ def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
     """With the deadman, A asks to stand and the d-pad lifts the body."""
     pad.press(LEFT_SHOULDER)
     pad.press(SOUTH)
-    robot.client.spin_until(lambda: robot.modes == ['stand'], PATIENCE, 'set_mode')
+    robot.client.spin_until(lambda: robot.modes == ['stand'], TEST_TIMEOUT, 'set_mode')
     pad.move(ABS_HAT0Y, -1)
-    robot.client.spin_until(lambda: bool(robot.poses), PATIENCE, 'body pose')
+    robot.client.spin_until(lambda: bool(robot.poses), TEST_TIMEOUT, 'body pose')
     assert robot.poses[0].position.z == pytest.approx(0.005)
 
 
@@ -109,7 +109,7 @@ def test_select_clears_a_fault(pad: InjectedDevice, robot: Robot) -> None:
 
     timer = robot.client.node.create_timer(0.2, press)
     try:
-        robot.client.spin_until(lambda: bool(cleared), PATIENCE, 'clear_fault')
+        robot.client.spin_until(lambda: bool(cleared), TEST_TIMEOUT, 'clear_fault')
     finally:
         robot.client.node.destroy_timer(timer)
         robot.client.node.destroy_service(service)
@@ -127,7 +127,7 @@ def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:
         assert process.stderr is not None
         assert 'no gamepad yet: ' in process.stderr.readline()
         process.send_signal(2)
-        assert process.wait(PATIENCE) == 0
+        assert process.wait(TEST_TIMEOUT) == 0
     finally:
         process.kill()
         process.communicate()

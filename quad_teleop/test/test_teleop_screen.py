@@ -13,7 +13,7 @@ from quad_teleop.body_pose import NEUTRAL
 from quad_teleop.controller_report import ControllerReport, Level, read_report
 from quad_teleop.nodes.screen import hint, status, View
 
-VIEW = View(None, None, Speeds(), None, NEUTRAL, ReleaseSource.TIME_OUT, is_heard=True)
+VIEW = View(None, None, Speeds(), None, NEUTRAL, ReleaseSource.TIME_OUT, has_subscriber=True)
 MOVING = replace(VIEW, velocity=Velocity(0.15, 0.0, 0.0))
 
 
@@ -55,7 +55,7 @@ def test_state_of_the_controller_is_shown() -> None:
         (replace(MOVING, report=report('relax', 'relax')), r'\(relax\): press 2'),
         (replace(MOVING, report=report('to stand', 'walk')), ''),
         (replace(MOVING, report=report('walk', 'walk'), mode=Mode.LIE), ''),
-        (replace(MOVING, mode=Mode.STAND, is_heard=False), ''),
+        (replace(MOVING, mode=Mode.STAND, has_subscriber=False), ''),
         (
             replace(VIEW, report=report('fault', 'fault', Level.ERROR, 'it fell over')),
             'fault: it fell over; Backspace clears it, 0 lies down',

@@ -14,7 +14,7 @@ from isolation import Isolation
 from processes import executable
 import pytest
 from ros_client import RosClient
-from teleop_robot import PATIENCE, Robot, STILL
+from teleop_robot import Robot, STILL, TEST_TIMEOUT
 
 pytestmark = [
     pytest.mark.scenario,
@@ -41,7 +41,7 @@ def teleop(
     )
     os.close(descriptor)
     try:
-        terminal.wait_written(rb'idle', PATIENCE)
+        terminal.wait_written(rb'idle', TEST_TIMEOUT)
         yield process
     finally:
         process.kill()
@@ -58,7 +58,7 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
 def settle(robot: Robot, terminal: ScriptedTerminal) -> None:
     """Wait until the robot hears, and the terminal has promised true releases."""
     robot.wait_until_linked()
-    terminal.wait_written(rb'idle +\| true releases', PATIENCE)
+    terminal.wait_written(rb'idle +\| true releases', TEST_TIMEOUT)
 
 
 def test_true_release(isolation: Isolation, robot: Robot) -> None:
@@ -100,7 +100,7 @@ def test_killed_while_moving(isolation: Isolation, robot: Robot, number: signal.
             robot.wait_for(FORWARD)
             process.send_signal(number)
             robot.wait_until_stopped()
-            assert process.wait(PATIENCE) == 0
+            assert process.wait(TEST_TIMEOUT) == 0
         assert terminal.settings() == before
         assert (terminal.flags, terminal.modes) == ([], set())
 
@@ -113,7 +113,7 @@ def test_window_closed_while_moving(isolation: Isolation, robot: Robot) -> None:
         robot.wait_for(FORWARD)
         terminal.hang_up()
         robot.wait_until_stopped()
-        assert process.wait(PATIENCE) in {0, 1}
+        assert process.wait(TEST_TIMEOUT) in {0, 1}
 
 
 def test_line_cut_while_moving(isolation: Isolation, robot: Robot) -> None:
@@ -134,10 +134,10 @@ def test_stamped_messages(isolation: Isolation, robot: Robot) -> None:
     ):
         client = robot.client
         count = client.node.count_publishers
-        client.spin_until(lambda: count('cmd_vel_stamped') > 0, PATIENCE, 'publisher')
-        terminal.wait_written(rb'idle +\| timed releases', PATIENCE)
+        client.spin_until(lambda: count('cmd_vel_stamped') > 0, TEST_TIMEOUT, 'publisher')
+        terminal.wait_written(rb'idle +\| timed releases', TEST_TIMEOUT)
         terminal.send('i')
-        client.spin_until(lambda: bool(robot.stamped), PATIENCE, 'TwistStamped')
+        client.spin_until(lambda: bool(robot.stamped), TEST_TIMEOUT, 'TwistStamped')
     message = robot.stamped[0]
     assert message.twist.linear.x == pytest.approx(0.15)
     assert message.header.frame_id == 'body'
@@ -149,7 +149,7 @@ def test_paste_moves_nothing(isolation: Isolation, robot: Robot) -> None:
     """A text that is pasted by mistake is no command."""
     with ScriptedTerminal(kitty=False) as terminal, teleop(terminal, isolation):
         robot.wait_until_linked()
-        terminal.wait_written(rb'idle +\| timed releases', PATIENCE)
+        terminal.wait_written(rb'idle +\| timed releases', TEST_TIMEOUT)
         terminal.send('\x1b[200~ivory\n\x1b[201~')
         robot.listen_for(0.7)
         assert robot.twists == []

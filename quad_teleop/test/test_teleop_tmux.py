@@ -9,19 +9,19 @@ import shutil
 from isolation import Isolation
 import pytest
 from ros_client import RosClient
-from teleop_robot import PATIENCE, Robot, STILL
+from teleop_robot import Robot, STILL, TEST_TIMEOUT
 from tmux_pane import Pane
 
 pytestmark = [
     pytest.mark.scenario,
     pytest.mark.skipif(shutil.which('tmux') is None, reason='needs tmux, for real key presses'),
 ]
-LINKED = r'idle +\| timed releases'  # without "nobody listens" between
+LINKED = r'idle +\| timed releases'  # without "no subscriber" between
 
 
 def wait_on_screen(client: RosClient, pane: Pane, text: str) -> None:
     """Wait until something is on the screen, and serve the robot meanwhile."""
-    client.spin_until(lambda: text in pane.screen(), PATIENCE, text)
+    client.spin_until(lambda: text in pane.screen(), TEST_TIMEOUT, text)
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
         pane.press('BSpace')
         wait_on_screen(client, pane, 'clear fault: all is well')
         pane.press('t', 'Down')
-        client.spin_until(lambda: len(robot.poses) == 2, PATIENCE, 'two body poses')
+        client.spin_until(lambda: len(robot.poses) == 2, TEST_TIMEOUT, 'two body poses')
         assert robot.poses[-1].position.z == pytest.approx(0.005)
         assert robot.poses[-1].orientation.y > 0.0, 'nose down'
 
@@ -98,9 +98,9 @@ def test_held_key_over_a_terminal_without_releases(pane: Pane, isolation: Isolat
 def test_nobody_there(pane: Pane) -> None:
     """Without a controller the screen says so, for the velocities and for the modes."""
     pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
-    pane.wait_for('nobody listens')
+    pane.wait_for('no subscriber')
     pane.press('1')
-    pane.wait_for(r'stand: there is no service /set_mode; is controller_node running')
+    pane.wait_for(r'stand: no service /set_mode; is controller_node running')
 
 
 def test_suspended_like_any_program(pane: Pane, isolation: Isolation) -> None:

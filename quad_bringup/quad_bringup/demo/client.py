@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo's ROS client: commands velocities, asks for modes, and hears what comes of it."""
+"""The demo's ROS client: commands velocities, requests modes, and observes what comes of it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ COMMAND_PERIOD = 0.1
 LOOP_PERIOD = 0.02
 """Period of the controller in [s]."""
 CONTROLLER = 'controller_node'
-"""Node whose errors in /diagnostics say why it is in a fault."""
+"""Node whose errors in /diagnostics have the reason it is in a fault."""
 FAULT = 'fault'
 """State of the controller after an error."""
 COMMAND_QOS = QoSProfile(depth=1)
@@ -38,7 +38,7 @@ COMMAND_QOS = QoSProfile(depth=1)
 
 
 class QuadClient(ModeClient):
-    """Commands, and hears everything; use it in one thread."""
+    """Commands, and receives everything; use it in one thread."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class QuadClient(ModeClient):
 
         Args:
             joints: Names of the joints, in the order of /joint_command.
-            ground_truth: Topic on which the simulator says where the body is.
+            ground_truth: Topic on which the simulator publishes where the body is.
             given_up: True when nothing shall be waited for any more.
             namespace: That of the robot.
         """
@@ -84,7 +84,7 @@ class QuadClient(ModeClient):
 
     @property
     def figures(self) -> Figures:
-        """What was heard last."""
+        """What was received last."""
         return Figures(
             state=self.state or UNKNOWN,
             fault=self._reason if self.state.endswith(FAULT) else '',
@@ -107,14 +107,14 @@ class QuadClient(ModeClient):
 
     @property
     def missing(self) -> list[str]:
-        """What is needed and not there yet: topics that nobody was heard on, or listens to."""
+        """What is needed and not there yet: topics without publisher or subscriber."""
         there = {
             'ground truth of the simulator': self._truth.milestone is not None,
             '/odom': self._odometry.milestone is not None,
             '/imu': math.isfinite(self._tilt),
             '/joint_states': bool(self._positions),
             '/joint_command': bool(self._targets),
-            'somebody who listens to /cmd_vel': self._twist.get_subscription_count() > 0,
+            'a subscriber of /cmd_vel': self._twist.get_subscription_count() > 0,
         }
         return [name for name, is_there in there.items() if not is_there]
 

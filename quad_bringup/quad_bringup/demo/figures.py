@@ -16,7 +16,7 @@ UNKNOWN = 'unknown'
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What was heard last.
+    """What was received last.
 
     Attributes:
         state: State of the controller, as it calls it.

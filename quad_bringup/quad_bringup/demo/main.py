@@ -18,11 +18,11 @@ from ..exceptions import BringupError
 from ..session import add_arguments, Session, session
 from .figures import Figures
 from .scenario import Client, WalkScenario
-from .segments import share_of, SHORTEST
+from .segments import MIN_DURATION, share_of
 from .view import QuadView
 
 GROUND_TRUTH = 'fake_xgo/ground_truth'
-"""Topic on which the simulated robot says where its body is."""
+"""Topic on which the simulated robot publishes where its body is."""
 
 
 def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
@@ -32,7 +32,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         argv: Arguments without the program's name.
 
     Returns:
-        What was asked for, and the options of all nodes.
+        What was requested, and the options of all nodes.
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run quad_bringup demo',
@@ -44,9 +44,9 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     parser.add_argument(
         '--duration',
         metavar='S',
-        type=seconds_from(SHORTEST),
-        help=f'walk for so many seconds, at least {SHORTEST:g}, and end with a summary; the exit '
-        'code says whether it moved as it was told (default: until Ctrl-C)',
+        type=seconds_from(MIN_DURATION),
+        help=f'walk for so many seconds, at least {MIN_DURATION:g}, and end with a summary; the '
+        'exit code is 0 when it moved as commanded (default: until Ctrl-C)',
     )
     return parse_with_ros(parser, argv)
 

@@ -51,7 +51,7 @@ class PeriodStatistics:
         self._last = stamp
 
     def figures(self) -> PeriodFigures:
-        """Say how regular it was."""
+        """Return how regular it was."""
         if not self._intervals:
             return PeriodFigures()
         total = sum(self._intervals)

@@ -15,11 +15,11 @@ LINEAR_TOLERANCE = 0.04
 """Greatest difference of commanded and measured speed in [m/s]."""
 TURN_TOLERANCE = 0.2
 """Greatest difference of commanded and measured rate in [rad/s]."""
-TOLERANCE_SHARE = 0.5
+RELATIVE_TOLERANCE = 0.5
 """The same as a share of what was commanded: a slow robot that stands has not walked."""
 TILT_LIMIT = math.radians(15.0)
 """A body that leaned more than this in [rad] did not walk, it stumbled."""
-LOWEST_RATE = 45.0
+MIN_RATE = 45.0
 """Joint commands per second below which the loop did not hold its 50 Hz."""
 
 
@@ -44,7 +44,7 @@ class Measured:
 
 
 def progress_line(figures: Figures) -> str:
-    """Say how it goes.
+    """Return how it goes.
 
     Args:
         figures: The latest.
@@ -116,7 +116,7 @@ def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
 
 
 def problems(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
-    """Say what went wrong.
+    """Return what went wrong.
 
     Args:
         figures: The last ones before it lay down.
@@ -135,7 +135,7 @@ def _wrong_speed(each: Measured) -> Iterator[str]:
     name = each.segment.name
     speed, wanted = each.best, each.segment.velocity
     if speed is None:
-        yield f'{name}: nobody says how the robot moved, neither ground truth nor /odom'
+        yield f'{name}: no motion was measured, neither by ground truth nor by /odom'
         return
     linear = math.hypot(speed.forward - wanted.forward, speed.left - wanted.left)
     linear_tolerance = _tolerance(LINEAR_TOLERANCE, math.hypot(wanted.forward, wanted.left))
@@ -145,7 +145,7 @@ def _wrong_speed(each: Measured) -> Iterator[str]:
 
 
 def _tolerance(most: float, wanted: float) -> float:
-    return min(most, TOLERANCE_SHARE * wanted) if wanted else most
+    return min(most, RELATIVE_TOLERANCE * wanted) if wanted else most
 
 
 def _wrong_body(figures: Figures) -> Iterator[str]:
@@ -156,8 +156,8 @@ def _wrong_body(figures: Figures) -> Iterator[str]:
             f'the body leaned by {math.degrees(figures.tilt_max):.1f}°, more than '
             f'{math.degrees(TILT_LIMIT):.0f}°'
         )
-    if not figures.periods.rate >= LOWEST_RATE:
+    if not figures.periods.rate >= MIN_RATE:
         yield (
-            f'{figures.periods.rate:.1f} joint commands a second, less than {LOWEST_RATE:g}: '
+            f'{figures.periods.rate:.1f} joint commands a second, less than {MIN_RATE:g}: '
             'is this machine too busy?'
         )

@@ -44,7 +44,7 @@ class Client(DemoClient, Protocol):
 
     @property
     def figures(self) -> Figures:
-        """What was heard last."""
+        """What was received last."""
 
     @property
     def milestones(self) -> Milestones:
@@ -61,7 +61,7 @@ class Client(DemoClient, Protocol):
         """Measure the greatest tilt from now on."""
 
     def set_mode(self, mode: str, timeout: float) -> str:
-        """Ask for a mode; return the answer."""
+        """Request a mode; return the answer."""
 
 
 class WalkScenario(DemoScenario[Client]):
@@ -111,7 +111,7 @@ class WalkScenario(DemoScenario[Client]):
             ) from error
 
     def _reach(self, client: Client, mode: str, phase: str) -> None:
-        """Ask for a mode and wait until it is there."""
+        """Request a mode and wait until it is there."""
         self._enter(phase)
         client.set_mode(mode, MODE_TIMEOUT)
         self._wait(client, lambda: client.figures.state == mode, MODE_TIMEOUT, f'mode {mode}')

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo's robot is told to do, segment by segment."""
+"""What the demo's robot has to do, segment by segment."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import itertools
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
 
-SHORTEST = 6.0
+MIN_DURATION = 6.0
 """Least duration in [s] in which every segment can show something."""
 SETTLING = 1.0
 """Time in [s] of a segment that is not measured: the robot takes up speed."""
-SETTLING_SHARE = 0.4
+SETTLING_RATIO = 0.4
 """Largest part of a segment that is settling."""
 USUAL = 20.0
 """Duration in [s] of a round when the demo has no end."""
@@ -60,10 +60,10 @@ class Segment:
     @property
     def settling(self) -> float:
         """Time in [s] from its beginning that is not measured."""
-        return min(SETTLING, SETTLING_SHARE * self.duration)
+        return min(SETTLING, SETTLING_RATIO * self.duration)
 
 
-SHARES = (
+SEGMENT_RATIOS = (
     ('walk', Velocity(forward=0.2), 0.4),
     ('turn', Velocity(turn=0.8), 0.25),
     ('strafe', Velocity(left=0.1), 0.25),
@@ -92,15 +92,16 @@ def one_round(duration: float, share: float = 1.0) -> list[Segment]:
     Raises:
         ValueError: That is too short to show anything.
     """
-    if not duration >= SHORTEST:
-        raise ValueError(f'{duration:g} s is too short; the demo needs {SHORTEST:g} s')
+    if not duration >= MIN_DURATION:
+        raise ValueError(f'{duration:g} s is too short; the demo needs {MIN_DURATION:g} s')
     return [
-        Segment(name, velocity.scaled(share), part * duration) for name, velocity, part in SHARES
+        Segment(name, velocity.scaled(share), part * duration)
+        for name, velocity, part in SEGMENT_RATIOS
     ]
 
 
 def segments(duration: float | None, share: float = 1.0) -> Iterator[Segment]:
-    """Say what comes after what.
+    """Return what comes after what.
 
     Args:
         duration: Time in [s] for one round; None for rounds without end.

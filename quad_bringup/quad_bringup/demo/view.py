@@ -42,7 +42,7 @@ class QuadView:
     legs: Sequence[str]
 
     def fits(self, width: int, height: int) -> bool:
-        """Say whether a terminal has room for the table.
+        """Return whether a terminal has room for the table.
 
         Args:
             width: Its columns.

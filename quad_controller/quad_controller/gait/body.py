@@ -136,11 +136,11 @@ class Leveller:
     def step(
         self, attitude: tuple[float, float, float] | None, pose: BodyPose, dt: float
     ) -> BodyPose:
-        """Return the pose that is asked for, with the correction added.
+        """Return the pose that is requested, with the correction added.
 
         Args:
             attitude: Measured roll, pitch and yaw in [rad]; None lets the correction fade.
-            pose: Pose that is asked for; its own roll and pitch are no error.
+            pose: Pose that is requested; its own roll and pitch are no error.
             dt: Duration of the step in [s].
         """
         roll = pitch = 0.0

@@ -20,7 +20,7 @@ from .servo_compensation import ServoCompensation
 from .stepping import Stepper
 from .velocity import REST, Velocity
 
-CLAMP_LINEAR = 0.005  # [m/s] that may be lacking before it is told; rounding is no clamp
+CLAMP_LINEAR = 0.005  # [m/s] that may be lacking before it is reported; rounding is no clamp
 CLAMP_YAW = 0.02  # [rad/s]
 
 
@@ -45,7 +45,7 @@ class GaitGenerator:
     Attributes:
         velocity: Velocity that is walked at the moment.
         goal: Velocity that is approached.
-        clamped: Whether that is less than was asked for.
+        clamped: Whether that is less than was requested.
         pose: Pose of the body over its feet at the moment.
         gait: The gait at the moment.
         wanted_gait: The gait that was chosen, which begins at rest.
@@ -130,8 +130,8 @@ class GaitGenerator:
         """Advance.
 
         Args:
-            velocity: Velocity that is asked for; clamped and approached.
-            pose: Pose of the body that is asked for; clamped and approached.
+            velocity: Velocity that is requested; clamped and approached.
+            pose: Pose of the body that is requested; clamped and approached.
             attitude: Measured roll, pitch and yaw in [rad], None when they are not known.
             dt: Duration of the step in [s].
         """

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the course: the robot turns as far as it was told to, and no further.
+"""Keeps the course: the robot turns as far as it was commanded to, and no further.
 
 A gait drifts to a side and turns a few per cent too fast. The heading that the commands add up to
 is compared with the measured one, and the turning is corrected in proportion.
@@ -12,8 +12,8 @@ import math
 
 from .velocity import Velocity
 
-MOST_ERROR = 0.3  # [rad] a robot that was turned by hand does not turn back further
-MOST_CORRECTION = 0.4  # [rad/s]
+MAX_ERROR = 0.3  # [rad] a robot that was turned by hand does not turn back further
+MAX_CORRECTION = 0.4  # [rad/s]
 
 
 class HeadingHold:
@@ -41,7 +41,7 @@ class HeadingHold:
             return velocity
         course = heading if self._course is None else self._course + velocity.yaw * dt
         error = math.remainder(course - heading, math.tau)
-        error = min(max(error, -MOST_ERROR), MOST_ERROR)
+        error = min(max(error, -MAX_ERROR), MAX_ERROR)
         self._course = heading + error
-        correction = min(max(self._gain * error, -MOST_CORRECTION), MOST_CORRECTION)
+        correction = min(max(self._gain * error, -MAX_CORRECTION), MAX_CORRECTION)
         return Velocity(velocity.x, velocity.y, velocity.yaw + correction)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How high a swinging foot is lifted, so that no joint is asked for more than its speed.
+"""How high a swinging foot is lifted, so that no joint needs more than its speed.
 
 A swing carries a foot a whole stroke ahead in less time than the stroke took, and lifts it on the
 way. Where both together are too much for the servos, as in a fast trot or the short swing of a
@@ -19,11 +19,11 @@ from quad_description import Feet, Quadruped
 
 from .schedule import Schedule
 
-SPEED_SHARE = 0.97  # of the joints' speed; levelling and turning take their part, too
+SPEED_RATIO = 0.97  # of the joints' speed; levelling and turning take their part, too
 SPEEDS = 5  # how many speeds of a foot are looked at, up to that of the gait
 SAMPLES = 8  # of a swing
 HALVINGS = 5  # of the height
-LEAST_SHARE = 0.7  # of the height on the spot: a foot that scuffs is worse than a slow joint
+MIN_RATIO = 0.7  # of the height on the spot: a foot that scuffs is worse than a slow joint
 
 
 class SwingLift:
@@ -44,7 +44,7 @@ class SwingLift:
         step = schedule.speed / (SPEEDS - 1)
         self._speeds = [step * index for index in range(SPEEDS)]
         most = self._highest(0.0, 0.0, 0.0, swing_height)
-        least = LEAST_SHARE * most
+        least = MIN_RATIO * most
         self._ahead, self._aside = (
             [self._highest(speed * x, speed * y, least, most) for speed in self._speeds]
             for x, y in ((1.0, 0.0), (0.0, 1.0))
@@ -79,7 +79,7 @@ class SwingLift:
             for feet in self._swing(x, y, height)
         )
         return all(
-            abs(now - last) <= SPEED_SHARE * self._robot.limits[index].velocity * step
+            abs(now - last) <= SPEED_RATIO * self._robot.limits[index].velocity * step
             for before, after in itertools.pairwise(places)
             for indices, one, other in zip(self._robot.leg_indices, before, after, strict=True)
             for index, last, now in zip(indices, one, other, strict=True)

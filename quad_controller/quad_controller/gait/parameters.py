@@ -67,7 +67,9 @@ class GaitParameters:
         if self.duty and not self.duty >= MIN_DUTY:
             raise ParameterError(f'duty {self.duty} is below {MIN_DUTY}; 0 takes that of the gait')
         if self.servo is not None and not (0.0 < self.servo.kp < math.inf):
-            raise ParameterError(f'servo_compensation.kp {self.servo.kp} is no stiffness above 0')
+            raise ParameterError(
+                f'servo_compensation.kp {self.servo.kp} is not a stiffness above 0'
+            )
 
     @property
     def velocity_limits(self) -> VelocityLimits:

@@ -101,7 +101,7 @@ class ControlLoop:
         try:
             self._begin()
             self._run()
-        except Exception as error:  # noqa: BLE001  # whatever it is, the node must hear of it
+        except Exception as error:  # noqa: BLE001  # whatever it is, the node must learn of it
             self._fail(error)
 
     def _run(self) -> None:

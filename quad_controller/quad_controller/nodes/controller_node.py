@@ -180,7 +180,9 @@ class ControllerNode(Node):
         if self._joints.unreported != self._unreported:
             self._unreported = self._joints.unreported
             names = ', '.join(self._unreported) or 'none'
-            self.get_logger().info(f'joints that nobody measures, which are left alone: {names}')
+            self.get_logger().info(
+                f'joints that are not measured, which are left where they are: {names}'
+            )
 
     def _take_imu(self, data: bytes) -> None:
         try:
@@ -231,7 +233,7 @@ class ControllerNode(Node):
         return response
 
     def _tune(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Take another tuning of the gait, or say why not."""
+        """Take another tuning of the gait, or return why not."""
         values = {parameter.name: parameter.value for parameter in parameters}
         try:
             gait = changed_gait(self._gait, values)
@@ -292,7 +294,7 @@ class ControllerNode(Node):
         self._diagnostics.publish(array)
 
     def _give_up(self, error: Exception) -> None:
-        """Say why the loop ended; the servos hold, and the process ends."""
+        """Log why the loop ended; the servos hold, and the process ends."""
         self.failure = f'{type(error).__name__}: {error}'
         self.get_logger().fatal(f'the control loop ended by a defect: {self.failure}')
         self._stop.set()

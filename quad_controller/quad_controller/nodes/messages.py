@@ -56,7 +56,7 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
     for index in _VARIANCES:
         if not covariance[index] >= 0.0:  # neither is NaN
             raise ValueError(
-                f'imu: orientation_covariance[{index}] is no variance: {covariance[index]:g}; '
+                f'imu: orientation_covariance[{index}] is not a variance: {covariance[index]:g}; '
                 'publish 0 or more, all zeros where it is unknown (REP 145)'
             )
     x, y, z, w, *rest = numbers

@@ -59,7 +59,7 @@ SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
     'mass': ((0.0, 100.0), 'what the legs carry [kg]; 0: as in the URDF'),
 }
 POLICY_MEANINGS: Mapping[str, str] = {
-    'phase_period': "[s]; 0: what the file says, or else the vendor's 0.4",
+    'phase_period': "[s]; 0: that of the file, else the vendor's 0.4",
     'soft_limits': "share of a joint's range that its targets may use",
     'low_pass': 'cut-off of a filter of its targets [Hz]; 0: none',
 }
@@ -69,7 +69,7 @@ THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
 
 @dataclass(frozen=True, slots=True)
 class NodeSettings:
-    """Everything that the parameters say.
+    """All parameters.
 
     Attributes:
         robot: The robot.
@@ -81,7 +81,7 @@ class NodeSettings:
         policy_options: How it is run.
         policy_dry_run: Whether the policy is only watched.
         diagnostics_period: In [s].
-        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 asks for none.
+        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
     """
 
     robot: Quadruped
@@ -113,7 +113,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         ),
         states=_states(read),
         arm_pose=read.numbers(
-            'arm_pose', "positions of the joints that are no legs' when it stands [rad]"
+            'arm_pose', 'positions of the joints of the arm when it stands [rad]'
         ),
         policy=read.text(
             'policy', '', 'ONNX file that the mode policy follows, or name of one that is shipped'
@@ -122,7 +122,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         policy_dry_run=read.flag(
             'policy_dry_run',
             default=False,
-            meaning='the policy is asked, but only joint_command_shadow tells its answers',
+            meaning='the policy runs, but its targets go to joint_command_shadow only',
         ),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
@@ -132,7 +132,7 @@ def declare_parameters(node: Node) -> NodeSettings:
 
 
 def changed_gait(gait: GaitParameters, values: Mapping[str, object]) -> GaitParameters | None:
-    """Return a tuning with what parameters say of it; None when they say nothing.
+    """Return a tuning with the parameters that concern it; None when there are none.
 
     Args:
         gait: The tuning of now.
@@ -186,7 +186,7 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
             'policy_imu_frame',
             default.imu_frame.value,
             {frame.value: frame for frame in ImuFrame},
-            'frame of the angular velocity; yawed: turned by 180 degrees; auto: as the file says',
+            'frame of the angular velocity; yawed: turned by 180 degrees; auto: that of the file',
         ),
         gravity_source=read.choice(
             'policy_gravity_source',

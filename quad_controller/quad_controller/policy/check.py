@@ -25,7 +25,7 @@ PHASE_PERIODS = (0.1, 5.0)  # [s] of a gait of legs of this size
 MAX_THRESHOLD = 1.0  # a gait that has no phase at faster commands is none
 WARM_UP = 20
 TIMED_RUNS = 100
-MAX_LATENCY_SHARE = 0.25  # of the period
+MAX_LATENCY_RATIO = 0.25  # of the period
 
 
 class Verdict(Enum):
@@ -95,11 +95,11 @@ def check_contract(
     options: PolicyOptions,
     period: float,
 ) -> Iterator[Row]:
-    """Compare what a policy says of itself with the robot; yields a row for each.
+    """Compare what a policy declares with the robot; yields a row for each.
 
     Args:
         network: The network.
-        metadata: What its file says.
+        metadata: What its file has.
         robot: The robot.
         stand: Where the gait stands [rad].
         options: How it shall be run.
@@ -142,7 +142,7 @@ def check_answers(
         period: Time between two steps in [s].
         clock: A monotonic clock in [s].
     """
-    # all zero is no state of a robot (gravity has a direction), so only numbers are asked for
+    # all zero is no state of a robot (gravity has a direction): finite numbers will do
     finite = bool(np.isfinite(run(np.zeros_like(standing))).all())
     yield _row('answer to all zero', 'numbers', 'numbers' if finite else 'NaN', finite)
     action = run(standing)
@@ -161,7 +161,7 @@ def check_answers(
         run(standing)
         times.append(clock() - start)
     late = sorted(times)[int(0.99 * (TIMED_RUNS - 1))]
-    most = MAX_LATENCY_SHARE * period
+    most = MAX_LATENCY_RATIO * period
     verdict = Verdict.OK if late < most else Verdict.WARN
     yield Row('time, p99', f'below {most * 1e3:.1f} ms', f'{late * 1e3:.3f} ms', verdict)
 

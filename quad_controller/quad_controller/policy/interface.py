@@ -26,7 +26,7 @@ class PolicyStep:
 
 
 def missing_inputs(joints: JointSample, imu: ImuSample) -> str:
-    """Say what is not measured that a policy has to be told; nothing when all is there.
+    """Return what is not measured that a policy needs; nothing when all is there.
 
     Args:
         joints: The joints.
@@ -63,7 +63,7 @@ class Policy(Protocol):
         Args:
             joints: Measured joints.
             imu: Measured attitude and turning.
-            velocity: Velocity that is asked for.
+            velocity: Velocity that is requested.
             dt: Duration of the step in [s].
         """
         ...

@@ -32,7 +32,7 @@ class LoadedPolicy:
         runner: What runs it.
         report: The table of the check.
         digest: SHA-256 of its file.
-        metadata: What its file says, as it stands there.
+        metadata: What its file has, as it stands there.
     """
 
     runner: PolicyRunner

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What an ONNX file says about its policy: the keys of mjlab's exporter, read leniently.
+"""What an ONNX file has about its policy: the keys of mjlab's exporter, read leniently.
 
 All values are texts; lists are joined by commas, numbers have three decimals (mjlab,
 rl/exporter_utils.py). Newer exporters print nested lists as Python does. A joint may have a prefix
@@ -35,13 +35,13 @@ class PolicyMetadata:
         default_joint_pos: Positions that its actions are added to in [rad], in that order.
         action_scale: Positions in [rad] for an action of one, in that order.
         observation_names: Terms of its observation, in their order.
-        phase_period: Period of the phase in [s], None when the file does not say.
-        phase_threshold: A command whose norm is smaller has no phase; None when not said.
-        imu_frame: Frame of the angular velocity, None when not said.
-        kind: How it was made; empty when not said.
-        step_periods: Time between two steps in [s], by the keys that say it.
-        observation_sizes: Width of the observation, by the keys that say it.
-        action_sizes: Number of actions, by the keys that say it.
+        phase_period: Period of the phase in [s], None where the file has none.
+        phase_threshold: A command whose norm is smaller has no phase; None where there is none.
+        imu_frame: Frame of the angular velocity, None where there is none.
+        kind: How it was made; empty where there is none.
+        step_periods: Time between two steps in [s], by key.
+        observation_sizes: Width of the observation, by key.
+        action_sizes: Number of actions, by key.
         unusual: Keys that would change observations or actions, with their values.
         unknown: Keys that look as if they mattered, with their values.
     """
@@ -68,7 +68,7 @@ def read_metadata(values: Mapping[str, str]) -> PolicyMetadata:
         values: Keys and texts.
 
     Raises:
-        PolicyError: A key is missing, or a text is no number or list.
+        PolicyError: A key is missing, or a text is not a number or a list.
     """
     names = tuple(_base_name(name) for name in _words(values, 'joint_names'))
     defaults = _numbers(values, 'default_joint_pos')
@@ -120,9 +120,9 @@ def _numbers(values: Mapping[str, str], key: str) -> tuple[float, ...]:
     try:
         numbers = tuple(float(word) for word in _words(values, key))
     except ValueError:
-        raise PolicyError(f'metadata {key} {values[key]!r} is no list of numbers') from None
+        raise PolicyError(f'metadata {key} {values[key]!r} is not a list of numbers') from None
     if not all(map(math.isfinite, numbers)):
-        raise PolicyError(f'metadata {key} {values[key]!r} holds what is no finite number')
+        raise PolicyError(f'metadata {key} {values[key]!r} has a number that is not finite')
     return numbers
 
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a file says beside the keys of mjlab's exporter: its rate, its sizes, scales and clips.
+"""What a file has beside the keys of mjlab's exporter: its rate, its sizes, scales and clips.
 
 Nobody has agreed on these keys; those below are in use (unitree_rl_lab's deploy.yaml, rl_sar,
-IsaacLab). What looks like one of them and is not understood is told, and what would change
+IsaacLab). What looks like one of them and is not understood is reported, and what would change
 observations or actions is refused.
 """
 
@@ -31,17 +31,17 @@ NO_CLIP = 100.0  # where observations are clipped anyway, and no action is ever
 
 
 def step_periods(values: Mapping[str, str]) -> dict[str, float]:
-    """Return what is said of the time between two steps in [s], by key; NaN for no number."""
+    """Return the time between two steps in [s], by key; NaN for no number."""
     return {key: (_numbers(values[key]) or [math.nan])[0] for key in STEP_KEYS if key in values}
 
 
 def observation_sizes(values: Mapping[str, str]) -> dict[str, float]:
-    """Return what is said of the width of the observation, by key; NaN for no number."""
+    """Return the width of the observation, by key; NaN for no number."""
     return _ends(values, (*OBSERVATION_SIZE_KEYS, SIZES_KEY), 0)
 
 
 def action_sizes(values: Mapping[str, str]) -> dict[str, float]:
-    """Return what is said of the number of actions, by key; NaN for no number."""
+    """Return the number of actions, by key; NaN for no number."""
     return _ends(values, (*ACTION_SIZE_KEYS, SIZES_KEY), -1)
 
 

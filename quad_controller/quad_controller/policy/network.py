@@ -23,7 +23,7 @@ class Network(Protocol):
     """A network with one input and one output.
 
     Attributes:
-        metadata: What the file says of it.
+        metadata: What the file has of it.
         inputs: Name, type and shape of each input.
         outputs: The same of each output.
         digest: SHA-256 of the file.
@@ -80,7 +80,7 @@ def _session(data: bytes, path: Path) -> Any:  # noqa: ANN401  # ONNX Runtime ha
         import onnxruntime
     except ImportError as error:
         raise PolicyError(
-            f'policy {path}: there is no onnxruntime; install it (pip install onnxruntime)'
+            f'policy {path}: no onnxruntime; install it (pip install onnxruntime)'
         ) from error
     options = onnxruntime.SessionOptions()
     # more threads cost more than they give for networks of this size
@@ -91,4 +91,4 @@ def _session(data: bytes, path: Path) -> Any:  # noqa: ANN401  # ONNX Runtime ha
             data, sess_options=options, providers=['CPUExecutionProvider']
         )
     except Exception as error:
-        raise PolicyError(f'policy {path} is no ONNX model that can be run: {error}') from error
+        raise PolicyError(f'policy {path} is not an ONNX model that runs: {error}') from error

@@ -44,7 +44,7 @@ CLIP = 100.0  # beyond it an observation is no observation
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 TRUSTED = 0.5  # [m/s^2] off 1 g up to which the accelerometer is blended in
 PLAUSIBLE = 2.0  # [m/s^2] off 1 g up to which it is believed at all
-BLEND_SHARE = 0.1
+BLEND_WEIGHT = 0.1
 
 
 def width(joints: int) -> int:
@@ -67,7 +67,7 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
     off = abs(size - STANDARD_GRAVITY)
     if off > (TRUSTED if source is GravitySource.BLEND else PLAUSIBLE):
         return down
-    share = BLEND_SHARE if source is GravitySource.BLEND else 1.0
+    share = BLEND_WEIGHT if source is GravitySource.BLEND else 1.0
     mixed = tuple(
         (1.0 - share) * a - share * b / size for a, b in zip(down, (x, y, z), strict=True)
     )
@@ -125,7 +125,7 @@ class ObservationBuilder:
             positions: Joints in the policy's order in [rad].
             velocities: The same in [rad/s].
             imu: Attitude and turning.
-            velocity: Velocity that is asked for.
+            velocity: Velocity that is requested.
             previous: The raw action of the step before.
         """
         row, count = self._row[0], self._count

@@ -26,7 +26,7 @@ class ImuFrame(Enum):
     """Frame in which the policy expects the angular velocity.
 
     ``YAWED`` is turned by 180 degrees about z: in the vendor's training environment (luwu_mjlab)
-    the IMU sits so on the body. ``AUTO`` is what the file says; one that does not is refused.
+    the IMU sits so on the body. ``AUTO`` is that of the file; one without it is refused.
     """
 
     AUTO = 'auto'
@@ -44,7 +44,7 @@ class PolicyOptions:
     """Options of the runner.
 
     Attributes:
-        phase_period: In [s]; 0 takes what the file says, and the vendor's when it does not.
+        phase_period: In [s]; 0 takes that of the file, and the vendor's where it has none.
         imu_frame: Of the angular velocity.
         gravity_source: Of the direction of gravity.
         hold_missing: Joints of the policy that the robot lacks count as being at their default.

@@ -60,7 +60,7 @@ class PolicyRunner:
         Args:
             name: How it is called in messages.
             network: What answers.
-            metadata: What its file says; checked before. It has the frame of the IMU where the
+            metadata: What its file has; checked before. It has the frame of the IMU where the
                 options leave it open.
             robot: The robot.
             options: How to run it.
@@ -111,7 +111,7 @@ class PolicyRunner:
         Args:
             joints: Measured joints.
             imu: Measured attitude and turning.
-            velocity: Velocity that is asked for.
+            velocity: Velocity that is requested.
         """
         self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
         if joints.velocities is not None:
@@ -128,7 +128,7 @@ class PolicyRunner:
         Args:
             joints: Measured joints.
             imu: Measured attitude and turning.
-            velocity: Velocity that is asked for.
+            velocity: Velocity that is requested.
             dt: Duration of the step in [s].
         """
         self._builder.advance(dt)
@@ -136,13 +136,13 @@ class PolicyRunner:
             return PolicyStep(None, missing)
         observation = self.observe(joints, imu, velocity)
         if not np.isfinite(observation).all():
-            return PolicyStep(None, 'the observation holds what is no number')
+            return PolicyStep(None, 'the observation is not finite')
         try:
             action = self._network.run(observation)[0]
         except Exception as error:  # noqa: BLE001  # whatever a network fails with, the robot stands
             return PolicyStep(None, f'the network failed: {error}')
         if not np.isfinite(action).all():
-            return PolicyStep(None, 'the action holds what is no number')
+            return PolicyStep(None, 'the action is not finite')
         self._previous[:] = action
         return PolicyStep(self._targets(action, dt))
 

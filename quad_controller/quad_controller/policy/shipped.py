@@ -29,5 +29,5 @@ def find_policy(text: str) -> Path:
     if text in shipped:
         return shipped[text]
     raise PolicyError(
-        f'policy {text!r} is no file and none that is shipped ({", ".join(shipped) or "none"})'
+        f'policy {text!r} is neither a file nor shipped ({", ".join(shipped) or "none"})'
     )

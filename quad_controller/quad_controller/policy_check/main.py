@@ -25,9 +25,9 @@ from .walk import walk
 SERVOS = ('firm', 'vendor_rl')
 """Servo models of the simulation; policies of the vendor's training expect ``vendor_rl``."""
 
-SHORTEST, LONGEST = 0.5, 600.0
+MIN_DURATION, MAX_DURATION = 0.5, 600.0
 """Times of a walk in [s]."""
-LEAST_SHARE = 0.5
+MIN_RATIO = 0.5
 """Share of the commanded way below which a policy does not walk."""
 REACH = 0.1
 """Distance of a foot from the middle in [m], which weighs turning beside walking."""
@@ -66,7 +66,7 @@ def run(arguments: Sequence[str]) -> int:
         f'tilt at most {math.degrees(walked.tilt):.1f} deg'
     )
     trouble = walked.trouble
-    if not trouble and (share := _share(walked.velocity, velocity)) < LEAST_SHARE:
+    if not trouble and (share := _share(walked.velocity, velocity)) < MIN_RATIO:
         trouble = f'it went {100 * share:.0f} % of its way; is it made for other servos (--servo)?'
     if trouble:
         _print(f'it did not go well: {trouble}')
@@ -96,19 +96,21 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
     parser.add_argument('--arm', action='store_true', help='the robot has its arm')
-    parser.add_argument(
-        '--phase-period', type=_time, default=0.0, help='[s]; 0: what the file says'
-    )
+    parser.add_argument('--phase-period', type=_time, default=0.0, help='[s]; 0: that of the file')
     parser.add_argument(
         '--imu-frame',
         choices=[each.value for each in ImuFrame],
         default='auto',
-        help='of the angular velocity (policy_imu_frame); needed where the file does not say',
+        help='of the angular velocity (policy_imu_frame); needed where the file does not have it',
     )
     parser.add_argument(
         '--gravity-source', choices=[each.value for each in GravitySource], default='blend'
     )
-    parser.add_argument('--hold-missing', action='store_true', help='joints that are lacking')
+    parser.add_argument(
+        '--hold-missing',
+        action='store_true',
+        help='accept a robot without some joints of the policy',
+    )
     parser.add_argument(
         '--walk', nargs=3, type=_finite, metavar=('X', 'Y', 'YAW'), help='[m/s], [m/s], [rad/s]'
     )
@@ -120,22 +122,22 @@ def _parser() -> argparse.ArgumentParser:
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text} is no finite number')
+        raise argparse.ArgumentTypeError(f'{text} is not a finite number')
     return value
 
 
 def _time(text: str) -> float:
     value = _finite(text)
     if value < 0.0:
-        raise argparse.ArgumentTypeError(f'{text} is no time in [s]: it must be 0 or more')
+        raise argparse.ArgumentTypeError(f'{text} is not a time in [s]: it must be 0 or more')
     return value
 
 
 def _duration(text: str) -> float:
     value = _finite(text)
-    if not SHORTEST <= value <= LONGEST:
+    if not MIN_DURATION <= value <= MAX_DURATION:
         raise argparse.ArgumentTypeError(
-            f'{text} is no time of a walk in [s]: it must be {SHORTEST:g} to {LONGEST:g}'
+            f'{text} is not a duration [s]: it must be {MIN_DURATION:g} to {MAX_DURATION:g}'
         )
     return value
 

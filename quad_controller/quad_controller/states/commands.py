@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked for while the robot moves: a velocity, which goes stale, and a body pose."""
+"""What is requested while the robot moves: a velocity, which goes stale, and a body pose."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Commands:
 
     Attributes:
         pose: Pose of the body over its feet.
-        refused: How many commands were no numbers.
+        refused: How many commands were not finite.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -32,11 +32,11 @@ class Commands:
         self.refused = 0
 
     def set_velocity(self, velocity: Velocity) -> Answer:
-        """Take a velocity; one that is no number stops the robot."""
+        """Take a velocity; one that is not finite stops the robot."""
         if not velocity.finite:
             self.refused += 1
             self._velocity = REST
-            return Answer(False, f'refused {velocity}: it is no number; stopping')
+            return Answer(False, f'rejected {velocity}: it is not finite; stopping')
         self._velocity, self._age = velocity, 0.0
         return Answer(True, '')
 
@@ -44,7 +44,7 @@ class Commands:
         """Take a pose of the body; it stays until the next one."""
         if not pose.finite:
             self.refused += 1
-            return Answer(False, f'refused {pose}: it is no number; the pose stays')
+            return Answer(False, f'rejected {pose}: it is not finite; the pose stays')
         self.pose = pose
         return Answer(True, '')
 

@@ -51,7 +51,7 @@ class Controller:
     """Brings a quadruped from lying to walking and back, whatever happens on the way.
 
     Give it what arrived and how much time has passed with :meth:`step`; everything else can be
-    called between two steps. Nothing moves before it was asked to, the step between two
+    called between two steps. Nothing moves before it was commanded to, the step between two
     consecutive targets is bounded by the joints' speed, and faults stay until they are cleared.
     """
 
@@ -109,14 +109,14 @@ class Controller:
         self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
     def set_mode(self, text: str) -> Answer:
-        """Ask for a mode.
+        """Request a mode.
 
         Args:
             text: One of :data:`.modes.MODES` or an alias.
         """
         request = parse_mode(text)
         if request is None:
-            return Answer(False, f'{text!r} is no mode; there are {", ".join(MODES)}')
+            return Answer(False, f'unknown mode {text!r}; choose one of {", ".join(MODES)}')
         state = self._machine.state
         if reason := self._refusal(request):
             return Answer(False, f'stays in {state.value}: {reason}')
@@ -131,18 +131,18 @@ class Controller:
         return Answer(True, f'{request.state.value}{gait}{way}{without}')
 
     def set_velocity(self, velocity: Velocity) -> Answer:
-        """Ask for a velocity; it counts until the next one or the time-out."""
+        """Request a velocity; it counts until the next one or the time-out."""
         return self._commands.set_velocity(velocity)
 
     def set_body_pose(self, pose: BodyPose) -> Answer:
-        """Ask for a pose of the body over its feet; it stays until the next one."""
+        """Request a pose of the body over its feet; it stays until the next one."""
         return self._commands.set_pose(pose)
 
     def clear_fault(self) -> Answer:
         """Forget the latched faults if their reasons are gone; nothing moves by this."""
         machine = self._machine
         if not self._latch.texts:
-            return Answer(True, f'there is no fault; the mode is {machine.state.value}')
+            return Answer(True, f'no fault; the mode is {machine.state.value}')
         if still := [f'{fault.value}: {reason}' for fault, reason in self._health.faults()]:
             return Answer(False, f'still {"; ".join(still)}')
         self._latch.clear()
@@ -174,7 +174,7 @@ class Controller:
 
     @property
     def status(self) -> Status:
-        """What can be told of it."""
+        """What can be reported of it."""
         health, machine = self._health, self._machine
         more = (self._commands.warning(machine.state), self._tracking.text)
         return Status(
@@ -314,7 +314,9 @@ class Controller:
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal
-            conditions['clamped'] = f'{asked} is more than a {gait.gait.value} can: it is {walked}'
+            conditions['clamped'] = (
+                f'{asked} is more than a {gait.gait.value} can; clamped to {walked}'
+            )
         return conditions
 
     def _ended_conditions(self, state: State) -> dict[str, str]:
@@ -345,7 +347,7 @@ class Controller:
         self._unreachable += not self._machine.reachable
         if all(map(math.isfinite, wanted)):
             return wanted
-        reason = f'{type(self._machine.motion).__name__} gave a target that is no number'
+        reason = f'{type(self._machine.motion).__name__} returned a target that is not finite'
         events += self._latch_fault(Fault.TARGET, reason, last)
         return last
 
@@ -361,13 +363,13 @@ class Controller:
         )
 
     def _refusal(self, request: ModeRequest) -> str:
-        """Say why a mode cannot be entered, nothing when it can."""
+        """Return why a mode cannot be entered, nothing when it can."""
         if request.state in WAYS_DOWN and self._limiter.last is not None:
             return ''
         if self._latch.texts:
             return (
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended. '
-                'The modes lie and relax are possible all the same'
+                'The modes lie and relax are possible in spite of it'
             )
         if request.state is State.POLICY and self._policy is None:
             return self._policy_refusal
@@ -379,7 +381,7 @@ class Controller:
         return self._unmeasured() if request.state is State.POLICY else ''
 
     def _unmeasured(self) -> str:
-        """Say what a policy would have to be told and nobody measures."""
+        """Return what a policy would need and nobody measures."""
         joints, imu = self._health.joints, self._health.imu
         if joints is None or imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'

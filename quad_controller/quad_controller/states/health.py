@@ -14,7 +14,7 @@ from .parameters import StateParameters
 
 REFUSAL_LIFE = 0.2
 """How long a message of no use is a reason for silence in [s]; then nothing comes at all."""
-LONGEST_PAUSE = 0.1  # [s] that counts of a single step that came late
+MAX_PAUSE = 0.1  # [s] that counts of a single step that came late
 
 
 class Health:
@@ -58,7 +58,7 @@ class Health:
         Returns:
             What was refused and why.
         """
-        waited = self._waited(dt, heard=measurement.joints is not None)
+        waited = self._waited(dt, received=measurement.joints is not None)
         self.joints_age += waited
         self.imu_age += waited
         self._refusals = {
@@ -99,7 +99,7 @@ class Health:
 
     @property
     def complete(self) -> bool:
-        """Whether everything has been heard that a robot on its legs needs."""
+        """Whether everything has been received that a robot on its legs needs."""
         return self.joints is not None and (
             self.imu is not None or not self._parameters.require_imu
         )
@@ -148,23 +148,23 @@ class Health:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
 
     def _silence(self, what: Fault, age: float, topic: str) -> str:
-        """Say why nothing was heard for a time [s]."""
+        """Return why nothing was received for a time [s]."""
         if what in self._refusals:
             return self._refusals[what][0]
         if math.isinf(age):
             return f'none yet; is the hardware node running, and does it publish {topic}?'
         return f'none for {age:.1f} s; look at the hardware node and its cable'
 
-    def _waited(self, dt: float, *, heard: bool) -> float:
+    def _waited(self, dt: float, *, received: bool) -> float:
         """Return how much of a step counts [s].
 
         After one pause of this process itself, what was sent meanwhile is yet to be read; the
         next one has no such excuse, unless joint states came on time in between.
         """
-        waited = dt if self._late else min(dt, LONGEST_PAUSE)
-        if dt > LONGEST_PAUSE:
+        waited = dt if self._late else min(dt, MAX_PAUSE)
+        if dt > MAX_PAUSE:
             self._late = True
-        elif heard:
+        elif received:
             self._late = False
         return waited
 

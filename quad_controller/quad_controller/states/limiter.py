@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The last thing that a target passes: limits, and a bound of the step from the one before.
 
-A joint that is found outside of its limits is not pulled into them before something is asked for:
+A joint that is found outside of its limits is not pulled into them before something is requested:
 its range reaches to where it is, and shrinks with it.
 """
 
@@ -13,7 +13,7 @@ import math
 
 from quad_description import JointLimits, Targets
 
-LONGEST_STEP = 1.5  # periods; a step that comes late may not be a leap
+MAX_PERIODS = 1.5  # periods; a step that comes late may not be a leap
 
 
 class StepLimiter:
@@ -32,7 +32,7 @@ class StepLimiter:
             speed: Speed of a target per speed of its joint.
         """
         self._limits = tuple(limits)
-        self._longest = LONGEST_STEP * period
+        self._longest = MAX_PERIODS * period
         self._speed = speed
         self._last: Targets | None = None
         self.limited = 0

@@ -48,7 +48,7 @@ class Poses:
         if arm_pose and len(arm_pose) != len(robot.others):
             names = ', '.join(robot.names[index] for index in robot.others) or 'none'
             raise ParameterError(
-                f"arm_pose has {len(arm_pose)} positions; the joints that are no legs' are {names}"
+                f'arm_pose has {len(arm_pose)} positions; the joints of the arm are {names}'
             )
         self._robot = robot
         self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
@@ -70,7 +70,7 @@ class StateMachine:
 
     Attributes:
         state: The state of now.
-        goal: The state that was asked for.
+        goal: The state that was requested.
         motion: What moves the joints now.
     """
 
@@ -133,7 +133,7 @@ class StateMachine:
         """Go into FAULT, or to a stronger reaction there.
 
         Args:
-            reaction: What the faults ask for.
+            reaction: What the faults require.
             last: The last targets of all joints in [rad].
         """
         self.state = self.goal = State.FAULT

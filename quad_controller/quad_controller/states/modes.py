@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The states of the controller and the words with which they are asked for."""
+"""The states of the controller and the words with which they are requested."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ MODES = (
     *(state.value for state in State if state is not State.FAULT),
     *(GAIT_PREFIX + gait.value for gait in Gait),
 )
-"""The words that can be asked for."""
+"""The words that can be requested."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModeRequest:
-    """What a word asks for.
+    """What a word requests.
 
     Attributes:
         state: State to go to.
@@ -54,7 +54,7 @@ class ModeRequest:
 
 
 def parse_mode(text: str) -> ModeRequest | None:
-    """Return what a word asks for, None when it is no mode."""
+    """Return what a word requests, None when it is not a mode."""
     word = text.strip().lower()
     word = ALIASES.get(word, word)
     if word not in MODES:

@@ -22,8 +22,8 @@ class Situation:
     Attributes:
         joints: The joints, None when they are not known any more.
         imu: Attitude and turning, None when they are not known any more.
-        velocity: Velocity that is asked for.
-        pose: Pose of the body that is asked for.
+        velocity: Velocity that is requested.
+        pose: Pose of the body that is requested.
     """
 
     joints: JointSample | None

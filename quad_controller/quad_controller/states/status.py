@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be told of the controller."""
+"""What can be reported of the controller."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Status:
 
 
 class EventKind(Enum):
-    """How an event is to be told."""
+    """How an event is to be reported."""
 
     NEWS = 'news'
     WARNING = 'warning'
@@ -60,10 +60,10 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that people should hear of.
+    """Something that people should know.
 
     Attributes:
-        kind: How it is to be told.
+        kind: How it is to be reported.
         text: What happened, and the remedy if there is one.
     """
 
@@ -79,7 +79,7 @@ class Output:
         targets: Positions of all joints in [rad]; None as long as no joint state was received.
         shadow: What the policy would do, in a dry run; None otherwise.
         title: Name of the state, with the way to it.
-        ready: Whether all measurements were heard once that walking needs.
+        ready: Whether all measurements were received once that walking needs.
         events: News.
     """
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 WINDOW = 1.0  # [s] longer than a period of every gait
-LEAST_TRAVEL = 0.15  # [rad] that a target must have gone to be of interest
-LEAST_SHARE = 0.1  # of that way, that its joint must have gone; soft servos go a third
+MIN_TRAVEL = 0.15  # [rad] that a target must have gone to be of interest
+MIN_RATIO = 0.1  # of that way, that its joint must have gone; soft servos go a third
 
 
 class TrackingMonitor:
@@ -50,9 +50,9 @@ class TrackingMonitor:
         stuck = [
             name
             for name, way, went in zip(self._names, wanted, gone, strict=True)
-            if way > LEAST_TRAVEL and went < LEAST_SHARE * way
+            if way > MIN_TRAVEL and went < MIN_RATIO * way
         ]
-        moving = sum(way > LEAST_TRAVEL for way in wanted)
+        moving = sum(way > MIN_TRAVEL for way in wanted)
         which = 'all that move' if len(stuck) == moving > 1 else ', '.join(stuck)
         self.text = (
             f'do not follow their targets: {which}; are the servos on, and their angles alive?'

@@ -118,7 +118,9 @@ def _chain(description: Description, foot: str) -> list[Joint]:
         link = joint.parent
     for joint in chain:
         if joint.kind not in _TURNING or joint.mimics:
-            raise DescriptionError(f'{joint.name} is in a leg and is no turning joint of its own')
+            raise DescriptionError(
+                f'{joint.name} is in a leg and is not a turning joint of its own'
+            )
     if len(chain) != len(_EXPECTED):
         raise DescriptionError(
             f'{len(chain)} joints move {foot} ({", ".join(joint.name for joint in chain)}); a leg '

@@ -23,7 +23,7 @@ class LegSolution:
 
     Attributes:
         angles: Hip, thigh, calf in [rad], always within the limits.
-        reachable: Whether they bring the foot to where it was asked for.
+        reachable: Whether they bring the foot to where it was requested.
         margin: Distance of the foot from the edge of the reach in [m], negative outside;
             joint limits are not counted.
     """

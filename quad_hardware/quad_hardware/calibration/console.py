@@ -8,32 +8,32 @@ from typing import Protocol
 
 
 class CancelledError(Exception):
-    """The person does not want to go on; nothing is written."""
+    """The person has cancelled; nothing is written."""
 
 
 class Console(Protocol):
-    """Someone to ask."""
+    """A person who answers."""
 
-    def say(self, text: str) -> None:
-        """Tell something."""
+    def write(self, text: str) -> None:
+        """Show a text."""
 
-    def ask(self, question: str) -> str:
-        """Ask something and return the answer, without blanks around it.
+    def prompt(self, question: str) -> str:
+        """Return the answer to a question, without blanks around it.
 
         Raises:
-            CancelledError: There is nobody any more.
+            CancelledError: Nobody answers any more.
         """
 
 
 class TerminalConsole:
     """A person at a terminal."""
 
-    def say(self, text: str) -> None:
-        """Print something."""
+    def write(self, text: str) -> None:
+        """Print a text."""
         print(text, flush=True)  # noqa: T201  # what the program is for
 
-    def ask(self, question: str) -> str:
-        """Ask something and return the answer.
+    def prompt(self, question: str) -> str:
+        """Return the answer to a question.
 
         Raises:
             CancelledError: Ctrl-C or Ctrl-D was pressed.
@@ -44,21 +44,21 @@ class TerminalConsole:
             raise CancelledError('cancelled; nothing was written') from None
 
 
-def ask_yes(console: Console, question: str, *, default: bool = False) -> bool:
-    """Ask a question of yes or no."""
+def confirm(console: Console, question: str, *, default: bool = False) -> bool:
+    """Return the answer to a question of yes or no."""
     choices = '[Y/n]' if default else '[y/N]'
-    answer = console.ask(f'{question} {choices}').lower()
+    answer = console.prompt(f'{question} {choices}').lower()
     return answer.startswith('y') if answer else default
 
 
-def ask_number(console: Console, question: str) -> float:
-    """Ask for a positive number, until there is one."""
+def prompt_number(console: Console, question: str) -> float:
+    """Prompt for a positive number, until there is one."""
     while True:
-        answer = console.ask(question)
+        answer = console.prompt(question)
         try:
             number = float(answer.replace(',', '.'))
         except ValueError:
             number = 0.0
         if 0.0 < number < float('inf'):
             return number
-        console.say(f'{answer!r} is no positive number; for example 0.95')
+        console.write(f'{answer!r} is not a positive number; for example 0.95')

@@ -38,12 +38,12 @@ MAX_DISAGREEMENT = math.radians(15.0)  # [rad] between attitude and acceleromete
 TURN_WINDOW = 10  # reports over which turns are compared; their noise would count otherwise
 MAX_GAP = 0.2  # [s] between two reports; over more nobody knows how the gyro turned
 MIN_TURNED = math.radians(3.0)  # [rad] root of the squares of the turns about an axis
-GYRO_SHARES = (0.4, 2.5)  # of the turn of the attitude, that the gyro has to report
+GYRO_RATIOS = (0.4, 2.5)  # of the turn of the attitude, that the gyro has to report
 GRAVITY_TOLERANCE = 2.0  # [m/s²] of an accelerometer at rest
 
 
 class Stance(Enum):
-    """How the robot is held; the value is what the person is asked to do."""
+    """How the robot is held; the value is what the person has to do."""
 
     LEVEL = 'put the robot level, on its feet or its belly'
     NOSE_DOWN = 'lift its tail, so that the nose points down by about 20 degrees, and hold it'
@@ -75,11 +75,11 @@ def calibrate_imu(console: Console, robot: LimpRobot) -> ImuMounting:
     """Have a person tilt the robot, and return how the IMU is mounted.
 
     Raises:
-        CommandError: What was reported fits no mounting; says in which stance.
+        CommandError: What was reported fits no mounting; the message names the stance.
     """
     readings = {}
     for stance in Stance:
-        console.ask(f'{stance.value}. Enter')
+        console.prompt(f'{stance.value}. Enter')
         readings[stance] = robot.imu()
     return find_mounting(readings)
 
@@ -88,14 +88,14 @@ def find_mounting(readings: Readings) -> ImuMounting:
     """Return the mounting that fits how the robot was held, with as few signs as can be.
 
     Raises:
-        CommandError: None fits; the message says what does not.
+        CommandError: None fits; the message names what does not.
     """
     _check_gravity(readings)
     fitting = [mounting for mounting in _candidates() if not _misfit(mounting, readings)]
     if not fitting:
         raise CommandError(
             'no mounting of the IMU fits what it reported: '
-            f'{_misfit(ImuMounting(), readings)}; hold the robot as it is asked, and try again'
+            f'{_misfit(ImuMounting(), readings)}; hold the robot as described, and try again'
         )
     return with_gyro(min(fitting, key=_flips), readings)
 
@@ -106,7 +106,7 @@ def with_gyro(mounting: ImuMounting, readings: Readings) -> ImuMounting:
     Where no gyro is reported, it stays as it is.
 
     Raises:
-        CommandError: The gyro does not turn with the attitude; says about which axis.
+        CommandError: The gyro does not turn with the attitude; the message names the axis.
     """
     reports = [[s for s in reading.on_the_way if s.rates] for reading in readings.values()]
     if not any(reports):
@@ -142,7 +142,7 @@ def _gyro_sign(axis: str, turns: Iterable[tuple[float, float]]) -> float:
             'turn it quicker from one stance to the next'
         )
     share = sum(gyro * attitude for gyro, attitude in pairs) / turned
-    if not GYRO_SHARES[0] <= abs(share) <= GYRO_SHARES[1]:
+    if not GYRO_RATIOS[0] <= abs(share) <= GYRO_RATIOS[1]:
         raise CommandError(
             f'gyro: turned about {axis} of the IMU, it reports {share:.2f} times the turn of the '
             'attitude; hold the robot by its body, and try again'
@@ -175,7 +175,7 @@ def _check_gravity(readings: Readings) -> None:
 
 
 def _misfit(mounting: ImuMounting, readings: Readings) -> str:
-    """Say what of the readings does not fit a mounting; nothing when all do."""
+    """Return what of the readings does not fit a mounting; nothing when all do."""
     by_attitude = {
         stance: rotate(conjugate(mounting.attitude(reading.attitude)), (0.0, 0.0, 1.0))
         for stance, reading in readings.items()
@@ -204,7 +204,7 @@ def _misfit(mounting: ImuMounting, readings: Readings) -> str:
 
 
 def _wrong_tilt(up: Mapping[Stance, Vector]) -> str:
-    """Say which stance is not as it was asked for, by the direction of up in the body."""
+    """Return which stance is not as it was requested, by the direction of up in the body."""
     level = up[Stance.LEVEL]
     if (tilt := _angle(level, (0.0, 0.0, 1.0))) > MAX_LEVEL_TILT:
         return f'level: tilted by {math.degrees(tilt):.0f} degrees'

@@ -10,7 +10,7 @@ import math
 from ..exceptions import CommandError
 from ..joints import JointServo
 
-LEAST_TURN = 8.0  # [deg] that tells a direction from a hand that shakes
+MIN_TURN = 8.0  # [deg] that tells a direction from a hand that shakes
 LIMIT_MARGIN = math.radians(2.0)  # [rad] that targets stay away from a stop
 
 
@@ -25,10 +25,10 @@ def with_direction(servo: JointServo, zero: float, turned: float) -> JointServo:
     Raises:
         CommandError: It was turned too little to tell.
     """
-    if abs(turned - zero) < LEAST_TURN:
+    if abs(turned - zero) < MIN_TURN:
         raise CommandError(
             f'{servo.joint}: motor {servo.motor} turned by {turned - zero:.1f} degrees; at least '
-            f'{LEAST_TURN:.0f} are needed. Is this the right joint?'
+            f'{MIN_TURN:.0f} are needed. Is this the right joint?'
         )
     sign = 1 if turned > zero else -1
     return with_zero(replace(servo, sign=sign), zero)
@@ -55,4 +55,4 @@ def moved_motor(before: dict[int, float], after: dict[int, float]) -> int | None
     """Return the motor that turned the farthest, None when none turned enough."""
     turns = {motor: abs(after[motor] - before[motor]) for motor in after if motor in before}
     motor = max(turns, key=turns.__getitem__, default=None)
-    return motor if motor is not None and turns[motor] >= LEAST_TURN else None
+    return motor if motor is not None and turns[motor] >= MIN_TURN else None

@@ -38,13 +38,13 @@ def run_calibrate(argv: Sequence[str], console: Console) -> int:
     try:
         _PARTS[options.what](options, console)
     except KeyboardInterrupt:
-        console.say('cancelled; nothing was written')
+        console.write('cancelled; nothing was written')
         return 1
     except (HardwareError, CancelledError) as error:
-        console.say(str(error))
+        console.write(str(error))
         return 1
-    console.say(f'written to {options.output}; use it with:')
-    console.say(
+    console.write(f'written to {options.output}; use it with:')
+    console.write(
         f'  ros2 run quad_hardware hardware_node --ros-args --params-file {options.output}'
     )
     return 0
@@ -63,27 +63,27 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     if unknown := [name for name in options.joint if name not in names]:
         raise CommandError(f'no joint is called {unknown[0]!r}; there are {", ".join(names)}')
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
-    console.say(f'{len(chosen)} joints. The servos will let go: support the robot.')
+    console.write(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
     with LimpRobot(_link(options), motors) as robot:
-        console.ask('Enter takes their torque away; Ctrl-C leaves')
+        console.prompt('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:
-                console.ask('Put all joints to zero, and hold them there. Enter')
+                console.prompt('Put all joints to zero, and hold them there. Enter')
                 found = zero_all(chosen, robot.angles())
             else:
                 found = calibrate_joints(console, robot, chosen, limits=options.limits)
-        console.say('the servos hold again, where they are')
+        console.write('the servos hold again, where they are')
     if found == chosen and not options.zero_only:
         raise CancelledError('every joint was skipped; nothing was written')
     write_parameters(options.output, servo_parameters(found))
 
 
 def _imu(options: argparse.Namespace, console: Console) -> None:
-    console.say('The servos stay as they are. Hold the robot by its body, not by its legs.')
+    console.write('The servos stay as they are. Hold the robot by its body, not by its legs.')
     with LimpRobot(_link(options), ()) as robot:
         found = imu_parameters(calibrate_imu(console, robot))
-    console.say(f'found: {found["imu"]}')
+    console.write(f'found: {found["imu"]}')
     write_parameters(options.output, found)
 
 
@@ -101,7 +101,7 @@ def _odometry(options: argparse.Namespace, console: Console) -> None:
         before = walker.scale(axis)
         found = calibrate_odometry(console, walker, axis, options.distance, options.speed)
     scale = round(found, 4)
-    console.say(f'odometry.{key}: {before:.4f} -> {scale:.4f}')
+    console.write(f'odometry.{key}: {before:.4f} -> {scale:.4f}')
     write_parameters(options.output, {'odometry': {key: scale}})
 
 
@@ -131,7 +131,7 @@ def _parser() -> argparse.ArgumentParser:
     joints.add_argument('--preset', choices=PRESETS, default='lite', help='(%(default)s)')
     joints.add_argument('--arm', action='store_true', help='with the arm on its back')
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
-    joints.add_argument('--limits', action='store_true', help='ask for the ends of the travel')
+    joints.add_argument('--limits', action='store_true', help='record the ends of the travel, too')
     joints.add_argument('--zero-only', action='store_true', help='all offsets at once, in a jig')
     odometry = kinds.add_parser('odometry', help='scale; walks while bringup runs')
     odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
@@ -147,7 +147,7 @@ def _parser() -> argparse.ArgumentParser:
 def _positive(text: str) -> float:
     number = float(text)
     if not 0.0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f'{text} is no positive number')
+        raise argparse.ArgumentTypeError(f'{text} is not a positive number')
     return number
 
 

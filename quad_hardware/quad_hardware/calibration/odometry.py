@@ -24,7 +24,7 @@ from quad_description.rotations import yaw_of
 from ..estimation import SCALES
 from ..exceptions import NoAnswerError
 from ..link import DEFAULT_PORT
-from .console import ask_number, Console
+from .console import Console, prompt_number
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 BRING_UP = f'start it first: ros2 run quad_bringup bringup --port {DEFAULT_PORT}'
 PERIOD = 0.05  # [s] between velocities
 ODOMETRY_TIMEOUT = 10.0  # [s] for odometry to come
-SLOWEST_SHARE = 0.3  # of the speed asked for, below which the robot does not walk
+MIN_SPEED_RATIO = 0.3  # of the speed requested, below which the robot does not walk
 SETTLING = 1.5  # [s] to stop
 
 
@@ -84,7 +84,7 @@ class Walker:
         deadline = time.monotonic() + ODOMETRY_TIMEOUT
         while self._place is None:
             if time.monotonic() > deadline:
-                raise NoAnswerError(f'nobody publishes /odom; {BRING_UP}')
+                raise NoAnswerError(f'no publisher of /odom; {BRING_UP}')
             self._executor.spin_once(PERIOD)
         return self._place
 
@@ -113,7 +113,7 @@ class Walker:
             NoAnswerError: The robot does not walk, or /odom fell silent.
         """
         start = self.place()
-        deadline = time.monotonic() + distance / (speed * SLOWEST_SHARE) + ODOMETRY_TIMEOUT / 2
+        deadline = time.monotonic() + distance / (speed * MIN_SPEED_RATIO) + ODOMETRY_TIMEOUT / 2
         try:
             while start.way(self.place(), axis) < distance:
                 if time.monotonic() > deadline:
@@ -163,12 +163,12 @@ def calibrate_odometry(
     Raises:
         NoAnswerError: The robot does not walk.
     """
-    console.ask('Mark where the robot stands, and stand clear. Enter')
+    console.prompt('Mark where the robot stands, and stand clear. Enter')
     said = walker.walk(distance, speed, axis)
-    console.say(f'odometry says {said:.3f} m')
+    console.write(f'odometry measured {said:.3f} m')
     before = walker.scale(axis)
     while True:
-        scale = before * ask_number(console, 'How far did it really come [m]?') / said
+        scale = before * prompt_number(console, 'How far did it really come [m]?') / said
         if SCALES[0] <= scale <= SCALES[1]:
             return scale
-        console.say(f'that makes a scale of {scale:.3g}, which is none; was it in metres?')
+        console.write(f'that makes a scale of {scale:.3g}, which is none; was it in metres?')

@@ -33,7 +33,7 @@ def read_parameters(path: Path) -> Tree:
     try:
         content = yaml.safe_load(path.read_text(encoding='utf-8')) or {}
     except yaml.YAMLError as error:
-        raise CommandError(f'{path} is no YAML: {error}') from error
+        raise CommandError(f'{path} is not YAML: {error}') from error
     node = content.get(NODE, {}) if isinstance(content, dict) else None
     parameters = node.get(PARAMETERS, {}) if isinstance(node, dict) else None
     if not isinstance(parameters, dict):

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 SAMPLES = 15  # reports that one reading is the median of
-LONGEST_WAY = 6000  # reports between two readings, the newest; two minutes
+MAX_REPORTS = 6000  # reports between two readings, the newest; two minutes
 REPORT_TIMEOUT = 4.0  # [s] for a robot to report
 
 
@@ -56,7 +56,7 @@ class LimpRobot:
         """
         self._motors = frozenset(motors)
         self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
-        self._imu: deque[Report] = deque(maxlen=LONGEST_WAY)
+        self._imu: deque[Report] = deque(maxlen=MAX_REPORTS)
         self._changed = threading.Condition()
         self._driver = Driver(options, self._take, self._forget)
 
@@ -64,7 +64,7 @@ class LimpRobot:
         """Return the servo angles [deg] by motor, as they are from now on.
 
         Raises:
-            NoAnswerError: The robot does not report; says why.
+            NoAnswerError: The robot does not report; the message has the reason.
         """
         with self._changed:
             self._recent.clear()
@@ -77,7 +77,7 @@ class LimpRobot:
         """Return what the IMU reports from now on, as a mean.
 
         Raises:
-            NoAnswerError: The robot does not report, or no number; says why.
+            NoAnswerError: The robot does not report, or no number; the message has the reason.
         """
         with self._changed:
             way = tuple(self._imu)
@@ -99,7 +99,7 @@ class LimpRobot:
         """Take torque away, and give it back at the end, where the servos are then.
 
         Raises:
-            NoAnswerError: The robot does not report; says why.
+            NoAnswerError: The robot does not report; the message has the reason.
         """
         if not self._driver.torque(on=False):
             raise NoAnswerError(self._driver.status().detail)

@@ -10,7 +10,7 @@ import math
 
 from ..exceptions import CommandError
 from ..joints import JointServo
-from .console import ask_yes, Console
+from .console import confirm, Console
 from .joints import moved_motor, with_direction, with_limits, with_zero
 from .robot import LimpRobot
 
@@ -30,13 +30,13 @@ _ARM_PLACE = ('the joint is where the URDF draws it at zero', 'turn it the way o
 def calibrate_joints(
     console: Console, robot: LimpRobot, servos: Iterable[JointServo], *, limits: bool
 ) -> list[JointServo]:
-    """Ask for zero, direction and, if wanted, both ends of each joint.
+    """Record zero, direction and, if wanted, both ends of each joint.
 
     Args:
         console: The person.
         robot: The robot, limp.
         servos: What is known so far.
-        limits: Ask for the ends of the travel as well.
+        limits: Record the ends of the travel as well.
 
     Returns:
         The servos with what was found.
@@ -49,22 +49,22 @@ def _calibrate(
 ) -> JointServo:
     zero_place, direction = _place_of(servo.joint)
     while True:
-        console.say(f'\n{servo.joint} (motor {servo.motor})')
-        answer = console.ask(f'  hold it at zero: {zero_place}. Enter; s skips it')
+        console.write(f'\n{servo.joint} (motor {servo.motor})')
+        answer = console.prompt(f'  hold it at zero: {zero_place}. Enter; s skips it')
         if answer.lower() == 's':
             return servo
         try:
             before = robot.angles()
-            console.ask(f'  now {direction}, and hold it there. Enter')
+            console.prompt(f'  now {direction}, and hold it there. Enter')
             after = robot.angles()
             found = _found(console, servo, before, after)
             if limits:
                 found = _ends(console, robot, found)
         except CommandError as error:
-            console.say(f'  {error}')
+            console.write(f'  {error}')
             continue
-        console.say(f'  {describe(found)}')
-        if ask_yes(console, '  keep it?', default=True):
+        console.write(f'  {describe(found)}')
+        if confirm(console, '  keep it?', default=True):
             return found
 
 
@@ -83,7 +83,7 @@ def _found(
     if moved is not None and moved != servo.motor:
         turned = math.fabs(after[moved] - before[moved])
         question = f'  motor {moved} turned by {turned:.0f} degrees, not {servo.motor}; take it?'
-        if ask_yes(console, question):
+        if confirm(console, question):
             servo = replace(servo, motor=moved)
     if servo.motor not in before or servo.motor not in after:
         raise CommandError(f'motor {servo.motor} does not report its angle; skip this joint')
@@ -91,9 +91,9 @@ def _found(
 
 
 def _ends(console: Console, robot: LimpRobot, servo: JointServo) -> JointServo:
-    console.ask('  move it to one end of its travel. Enter')
+    console.prompt('  move it to one end of its travel. Enter')
     one = robot.angles()[servo.motor]
-    console.ask('  move it to the other end. Enter')
+    console.prompt('  move it to the other end. Enter')
     return with_limits(servo, one, robot.angles()[servo.motor])
 
 

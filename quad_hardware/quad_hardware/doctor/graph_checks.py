@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is heard on ROS topics, judged: nodes, rates, joint names, transforms."""
+"""What is received on ROS topics, judged: nodes, rates, joint names, transforms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .finding import error, Finding, good, note, warning
 from .tree import links_without_place
 
 NODES = ('hardware_node', 'controller_node', 'robot_state_publisher')
-RATE, RATE_SHARE = 50.0, 0.9  # [Hz], and the share of it that is still well
+RATE, MIN_RATE_RATIO = 50.0, 0.9  # [Hz], and the share of it that is still well
 _SOURCES = {
     'joint_states': 'hardware_node',
     'imu': 'hardware_node',
@@ -90,7 +90,7 @@ def _check_nodes(seen: Observation, bringup: str) -> Iterator[Finding]:
 def _check_rate(seen: Observation, topic: str) -> Iterator[Finding]:
     source = _SOURCES[topic]
     rate = seen.counts.get(topic, 0) / seen.duration
-    if rate >= RATE * RATE_SHARE:
+    if rate >= RATE * MIN_RATE_RATIO:
         yield good(topic, f'{rate:.1f} Hz')
     elif rate > 0:
         remedy = 'free -h; no parallel build while it walks; see the counters in /diagnostics'
@@ -102,13 +102,13 @@ def _check_rate(seen: Observation, topic: str) -> Iterator[Finding]:
             topic, 'silent', "ros2 service call /set_mode quad_msgs/srv/SetMode '{mode: stand}'"
         )
     else:
-        yield error(topic, 'silent', f'see what {source} says; is the robot connected?')
+        yield error(topic, 'silent', f'see the log of {source}; is the robot connected?')
 
 
 def _check_joints(seen: Observation) -> Iterator[Finding]:
     if not seen.urdf:
         remedy = 'run robot_state_publisher, which publishes it'
-        yield warning('robot_description', 'nobody publishes it', remedy)
+        yield warning('robot_description', 'no publisher', remedy)
         return
     try:
         wanted = [joint.name for joint in parse(seen.urdf).commanded]

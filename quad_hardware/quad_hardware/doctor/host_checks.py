@@ -12,7 +12,7 @@ from dds_network import describe_dds, is_this_host, NETWORK_VARIABLE, NetworkCho
 from ..link.vendor_library import is_installed
 from .finding import error, Finding, good, note, warning
 
-LEAST_MEMORY = 300e6  # [B] below that, processes are soon ended
+MIN_MEMORY = 300e6  # [B] below that, processes are soon ended
 
 
 def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
@@ -54,7 +54,7 @@ def check_memory(meminfo: str) -> Iterator[Finding]:
     """Look at the text of /proc/meminfo."""
     rows = dict(line.split(':', 1) for line in meminfo.splitlines() if ':' in line)
     available = float(rows.get('MemAvailable', '0 kB').split()[0]) * 1024
-    if available < LEAST_MEMORY:
+    if available < MIN_MEMORY:
         remedy = 'end other programs (free -h), build with --parallel-workers 1'
         yield warning('memory', f'{available / 1e6:.0f} MB available', remedy)
     else:

@@ -14,7 +14,7 @@ from serial.tools import list_ports
 
 from ..estimation.battery import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
-from ..link import ask_battery, connect, latency_problem, latency_timer
+from ..link import connect, latency_problem, latency_timer, read_battery
 from ..protocol import model_of_firmware, V1
 from .finding import error, Finding, good, note, warning
 
@@ -27,12 +27,12 @@ def check_port(path: str) -> Iterator[Finding]:
     """Look at a port, and talk to the robot when nobody else does."""
     if not Path(path).exists():
         ports = [port.device for port in list_ports.comports()]
-        there = f'there are {", ".join(ports)}; ' if ports else 'there is no serial port at all; '
+        there = f'there are {", ".join(ports)}; ' if ports else 'no serial port was found; '
         remedy = f'{there}choose with --port, or see that the robot is plugged in and switched on'
         yield error('port', f'{path} does not exist', remedy)
         return
     if not stat.S_ISCHR(Path(path).stat().st_mode):
-        yield error('port', f'{path} is no device', 'choose the serial port with --port')
+        yield error('port', f'{path} is not a device', 'choose the serial port with --port')
         return
     real = os.path.realpath(path)
     yield good('port', path if real == path else f'{path} -> {real}')
@@ -43,9 +43,9 @@ def check_port(path: str) -> Iterator[Finding]:
     yield good('permission', 'may be read and written')
     users = list(port_users(real))
     if users:
-        yield note('port user', f'in use by {", ".join(users)}; the robot was not asked')
+        yield note('port user', f'in use by {", ".join(users)}; the robot was not contacted')
         return
-    yield from _ask(path)
+    yield from _contact(path)
     yield from check_latency(path, latency_timer(path))  # opening the port may have mended it
 
 
@@ -78,7 +78,7 @@ def port_users(device: str) -> Iterator[str]:
 
 
 def _makes(process: Path, device: str) -> bool:
-    """Tell whether a process has the other end of a pseudo-terminal: the robot's."""
+    """Return whether a process has the other end of a pseudo-terminal: the robot's."""
     number = Path(device).name
     for entry in (process / 'fdinfo').iterdir():
         try:
@@ -98,11 +98,11 @@ def _program(words: list[bytes]) -> str:
     return (scripts or names or ['?'])[0]
 
 
-def _ask(path: str) -> Iterator[Finding]:
+def _contact(path: str) -> Iterator[Finding]:
     try:
         connection = connect(path)
         with connection.port as port:
-            charge = ask_battery(port, connection.protocol)
+            charge = read_battery(port, connection.protocol)
     except NoAnswerError as problem:
         yield error(
             'robot',
@@ -125,7 +125,7 @@ def _ask(path: str) -> Iterator[Finding]:
 
 def _judge_battery(charge: int | None) -> Finding:
     if charge is None:
-        return warning('battery', 'the robot does not tell its charge', 'try once more')
+        return warning('battery', 'the robot does not report its charge', 'try once more')
     if charge < LOW_BATTERY:
         return warning('battery', f'at {charge} %', 'charge it: a weak robot falls')
     return good('battery', f'at {charge} %')

@@ -12,7 +12,7 @@ DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
 LATE = 0.1  # [s] a report that is later than others by that may be right, and they wrong
 LATE_TIMEOUT = 0.5  # [s] for which all reports are late, until they are believed
-LARGEST_LAG = 1.0  # [s] by which reports of one life of the board come late, or after each other
+MAX_LAG = 1.0  # [s] by which reports of one life of the board come late, or after each other
 BOOT_TIME = 0.5  # [s] without a report is no shorter while the board boots
 
 
@@ -76,4 +76,4 @@ class BoardWatch:
         if last.device_time is None or state.device_time is None:
             return gap > BOOT_TIME
         passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
-        return abs(passed - gap) > LARGEST_LAG or passed < 0.0 < gap - BOOT_TIME
+        return abs(passed - gap) > MAX_LAG or passed < 0.0 < gap - BOOT_TIME

@@ -9,7 +9,7 @@ import math
 
 from quad_description.rotations import conjugate, multiply, Quaternion, rotation_vector, Vector
 
-LONGEST_GAP = 0.2  # [s] a difference over more says nothing about now
+MAX_GAP = 0.2  # [s] a difference over more says nothing about now
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
@@ -42,7 +42,7 @@ class AttitudeRate:
     def update(self, time: float, attitude: Quaternion) -> Vector:
         """Take an attitude; return the rate [rad/s]. After a gap it begins at zero again."""
         last, self._last = self._last, (time, attitude)
-        if last is None or not 0.0 < time - last[0] <= LONGEST_GAP:
+        if last is None or not 0.0 < time - last[0] <= MAX_GAP:
             self._rate = ZERO
             return ZERO
         elapsed = time - last[0]
@@ -74,7 +74,7 @@ class JointRate:
         """Take positions [rad]; return velocities [rad/s] of the same joints."""
         elapsed, last = time - self._time, self._last
         self._time, self._last = time, dict(positions)
-        if last.keys() != positions.keys() or not 0.0 < elapsed <= LONGEST_GAP:
+        if last.keys() != positions.keys() or not 0.0 < elapsed <= MAX_GAP:
             self._rates = dict.fromkeys(positions, 0.0)
         else:
             share = low_pass_share(self._cutoff, elapsed)

@@ -32,9 +32,9 @@ from .filters import low_pass_share
 
 Flags = tuple[bool, ...]
 
-LONGEST_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
+MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
 DRIFT = 0.07  # share of the way that is the standard deviation of the position
-LEAST_VARIANCE = 1e-4  # [m²]
+MIN_VARIANCE = 1e-4  # [m²]
 KEPT_COMMANDS = 32
 GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
 REST = (0.0, 0.0)
@@ -95,7 +95,7 @@ class OdometryState:
     @property
     def position_variance(self) -> float:
         """Variance of x and y [m²], which grows with the way."""
-        return LEAST_VARIANCE + (DRIFT * self.distance) ** 2
+        return MIN_VARIANCE + (DRIFT * self.distance) ** 2
 
 
 class LegOdometry:
@@ -186,7 +186,7 @@ class LegOdometry:
             return
         last_time, last_feet, stood = self._last
         elapsed = time - last_time
-        if not 0.0 < elapsed <= LONGEST_GAP:
+        if not 0.0 < elapsed <= MAX_GAP:
             self._held = self._smooth = REST
             return
         cosine, sine = math.cos(heading), math.sin(heading)

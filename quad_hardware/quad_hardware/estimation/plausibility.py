@@ -10,10 +10,10 @@ import math
 from ..joints.mapping import SERVO_REACH
 from ..report import DEVICE_TIME_WRAP, Report
 
-LARGEST_SPEED = 3000.0  # [deg/s] of a servo
-LARGEST_ACCELERATION = 200.0  # [m/s²]
-LARGEST_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
-LARGEST_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
+MAX_SPEED = 3000.0  # [deg/s] of a servo
+MAX_ACCELERATION = 200.0  # [m/s²]
+MAX_JUMP = 60.0  # [deg] between reports; a servo does 12 degrees in 20 ms
+MAX_LAG = 0.1  # [s] between the robot's clock and ours from one report to the next
 JUMP_TIME = 0.1  # [s] after which anything may have happened
 NOT_FINITE = 'a number is not finite'
 MAX_REFUSALS = 2  # doubtful reports in a row that are refused, before they are believed
@@ -59,7 +59,7 @@ class Plausibility:
     def _joint_problem(self, state: Report) -> str:
         for name, values, most in (
             ('deg', state.positions, SERVO_REACH),
-            ('deg/s', state.velocities, LARGEST_SPEED),
+            ('deg/s', state.velocities, MAX_SPEED),
         ):
             for motor in self._motors:
                 value = values.get(motor, 0.0)
@@ -73,14 +73,14 @@ class Plausibility:
             angle = state.positions.get(motor)
             if angle is None:
                 continue
-            if abs(angle - last.positions.get(motor, angle)) > LARGEST_JUMP:
+            if abs(angle - last.positions.get(motor, angle)) > MAX_JUMP:
                 return f'motor {motor} jumped to {angle:.4g} deg'
         for name, before, now in zip('rpy', last.attitude, state.attitude, strict=True):
-            if attitude and abs(math.remainder(now - before, 360.0)) > LARGEST_JUMP:
+            if attitude and abs(math.remainder(now - before, 360.0)) > MAX_JUMP:
                 return f'attitude {name} jumped to {now:.4g} deg'
         if last.device_time is not None and state.device_time is not None:
             passed = math.remainder(state.device_time - last.device_time, DEVICE_TIME_WRAP)
-            if abs(passed - (state.arrival - last.arrival)) > LARGEST_LAG:
+            if abs(passed - (state.arrival - last.arrival)) > MAX_LAG:
                 return f'the clock of the robot went on by {passed:.3f} s'
         return ''
 
@@ -89,7 +89,7 @@ def _imu_problem(state: Report) -> str:
     felt = state.acceleration or (0.0, 0.0, 0.0)
     if not all(map(math.isfinite, (*state.attitude, *felt, *(state.rates or ())))):
         return f'imu: {NOT_FINITE}'
-    if math.hypot(*felt) > LARGEST_ACCELERATION:
+    if math.hypot(*felt) > MAX_ACCELERATION:
         return f'imu: acceleration {felt} m/s²'
     if max(map(abs, state.attitude)) > 360.0:
         return f'imu: attitude {state.attitude} deg'

@@ -14,7 +14,7 @@ from ..exceptions import CommandError
 from .mapping import JointMap
 
 NOMINAL_PERIOD = 0.02  # [s]
-LONGEST_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
+MAX_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class CommandLimiter:
     @property
     def largest_step(self) -> float:
         """Farthest that a target of a leg joint moves with one command [rad]."""
-        return self._settings.speed * LONGEST_PERIOD
+        return self._settings.speed * MAX_PERIOD
 
     def reset(self) -> None:
         """End the stream: the next command begins anew, and joints may have been moved.
@@ -107,7 +107,7 @@ class CommandLimiter:
             self._seen_end, self._last_at, self._targets = end, -math.inf, []
         if now - self._last_at > self._settings.stream_timeout:
             self._begin(measured, now)
-        elapsed = min(max(now - self._last_at, 0.0), LONGEST_PERIOD)
+        elapsed = min(max(now - self._last_at, 0.0), MAX_PERIOD)
         self._last_at = now
         return self._approach(positions, self._speed(now) * elapsed)
 
@@ -138,7 +138,7 @@ class CommandLimiter:
         lost = [name for name, place in legs if place is None]
         if lost:
             raise CommandError(
-                f'no report says where {", ".join(lost)} is, so the target could jump; '
+                f'no report of {", ".join(lost)}, so the target could jump; '
                 'wait for reports of the robot'
             )
         sent = self._targets or [math.nan] * len(measured)

@@ -106,7 +106,7 @@ class CommandLoss:
         return f'with {" or ".join(raised)} in the air' if raised else ''
 
     def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
-        """Go down from now on, or say why not. The stream is forgotten.
+        """Go down from now on, or return why not. The stream is forgotten.
 
         Args:
             place: Where the joints are [rad]; empty when nobody knows.
@@ -140,7 +140,7 @@ class CommandLoss:
         if unknown := [name for name in self._legs if name not in self._lying]:
             return f'no lying pose is known of {", ".join(unknown)}'
         if missing := [name for name in self._legs if name not in place]:
-            return f'no report says where {", ".join(missing)} is'
+            return f'no report of {", ".join(missing)}'
         if tilt is not None and tilt > MAX_TILT:
             return f'the body is tilted by {math.degrees(tilt):.0f} degrees'
         return ''

@@ -184,7 +184,7 @@ class JointCommander:
         counters.slowed += bool(command.slowed)
         if command.unseen:
             self._trouble(
-                f'nobody measures where {", ".join(command.unseen)} is: it goes to its first '
+                f'{", ".join(command.unseen)} is not measured: it goes to its first '
                 'target at the lowest speed'
             )
         if command.clamped:

@@ -49,7 +49,7 @@ class JointServo:
         if self.sign not in {1, -1}:
             raise CommandError(f'{self.joint}: sign {self.sign} is neither 1 nor -1')
         if not math.isfinite(self.offset):
-            raise CommandError(f'{self.joint}: offset {self.offset} is no position')
+            raise CommandError(f'{self.joint}: offset {self.offset} is not a position')
         if not self.lower <= self.upper:
             raise CommandError(f'{self.joint}: lower {self.lower} is above upper {self.upper}')
 
@@ -129,8 +129,8 @@ class JointMap:
         unknown = [s for s in self.servos if s.motor not in MOTOR_ORDER]
         if unknown:
             raise CommandError(
-                f'{unknown[0].joint}: there is no motor {unknown[0].motor}; '
-                f'there are {", ".join(map(str, MOTOR_ORDER))}'
+                f'{unknown[0].joint}: unknown motor {unknown[0].motor}; '
+                f'choose one of {", ".join(map(str, MOTOR_ORDER))}'
             )
         early = [s.joint for s in self.servos[: self.leg_count] if s.motor not in LEG_MOTORS]
         if early:  # twelve positions are those of the legs

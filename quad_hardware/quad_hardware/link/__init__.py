@@ -6,7 +6,7 @@ from .dialect import DialectCounters
 from .driver import Driver, STALE_TIME
 from .latency import latency_problem, latency_timer
 from .port import DEFAULT_PORT, SerialPort
-from .probe import ask, ask_battery, ask_firmware, connect, Connection
+from .probe import connect, Connection, read_battery, read_firmware, send_request
 from .session import LinkOptions
 from .status import LinkState, LinkStatus
 
@@ -20,10 +20,10 @@ __all__ = [
     'LinkState',
     'LinkStatus',
     'SerialPort',
-    'ask',
-    'ask_battery',
-    'ask_firmware',
     'connect',
     'latency_problem',
     'latency_timer',
+    'read_battery',
+    'read_firmware',
+    'send_request',
 ]

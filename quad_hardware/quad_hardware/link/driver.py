@@ -23,7 +23,7 @@ from .session import LinkOptions, open_session, Session
 from .status import LinkState, LinkStatus
 
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
-PROBE_AGAIN = 3.0  # [s] without a report, after which the robot is looked for anew
+RECONNECT_TIMEOUT = 3.0  # [s] without a report, after which the robot is looked for anew
 RETRY_PERIOD = 0.5  # [s] between attempts to open a port
 QUIET_TIME = 0.03  # [s] longer than a pause inside a frame: the timer of an FTDI adapter is 16 ms
 
@@ -68,7 +68,7 @@ class Driver:
         self._dropped = 0
         self._refused = 0
         self._refusal = ''
-        self._heard_at = self._reported_at = -float('inf')
+        self._received_at = self._reported_at = -float('inf')
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Start the thread, which looks for the robot until it finds it.
@@ -171,8 +171,8 @@ class Driver:
             self._enter(
                 LinkState.FAILED, f'internal error: {error!r}; looking for the robot again'
             )
-        except Exception:  # noqa: BLE001  the state is set; who hears of it cannot be helped
-            _log.exception('the failure could not be told')
+        except Exception:  # noqa: BLE001  the state is set, whatever its observer does
+            _log.exception('the failure could not be reported')
 
     def _converse(self) -> None:
         """Look for the robot once, and talk with it until it is lost."""
@@ -190,7 +190,7 @@ class Driver:
             session.port.close()
 
     def _serve(self, session: Session) -> None:
-        now = bytes_at = self._heard_at = self._reported_at = time.monotonic()
+        now = bytes_at = self._received_at = self._reported_at = time.monotonic()
         dialect = session.dialect
         self._session = session
         self._connections += 1
@@ -203,8 +203,8 @@ class Driver:
         self._enter(LinkState.WAITING, '; '.join(filter(None, (found, problem))))
         while not self._stopping.is_set():
             now = time.monotonic()
-            if now - self._heard_at > PROBE_AGAIN:
-                raise LinkError(f'no report for {PROBE_AGAIN} s; looking for the robot again')
+            if now - self._received_at > RECONNECT_TIMEOUT:
+                raise LinkError(f'no report for {RECONNECT_TIMEOUT} s; connecting again')
             if now - self._reported_at > STALE_TIME:
                 self._fall_silent(dialect, now)
             self._post(dialect)
@@ -220,11 +220,13 @@ class Driver:
 
     def _deadline(self, now: float) -> float:
         """Return when silence has lasted long enough to do something about it [s]."""
-        ends = (self._reported_at + STALE_TIME, self._heard_at + STALE_TIME)
-        return min((end for end in ends if end >= now), default=self._heard_at + PROBE_AGAIN)
+        ends = (self._reported_at + STALE_TIME, self._received_at + STALE_TIME)
+        return min(
+            (end for end in ends if end >= now), default=self._received_at + RECONNECT_TIMEOUT
+        )
 
     def _fall_silent(self, dialect: Dialect[Any], now: float) -> None:
-        refused = now - self._heard_at <= STALE_TIME
+        refused = now - self._received_at <= STALE_TIME
         state = LinkState.REFUSED if refused else LinkState.STALE
         if state is not self._state:
             self._enter(state, self._silence(refused=refused))
@@ -262,7 +264,7 @@ class Driver:
         return now if data else bytes_at
 
     def _take(self, report: Report, now: float) -> None:
-        self._heard_at = now
+        self._received_at = now
         reason = self._on_state(report)
         if reason:
             self._refused += 1

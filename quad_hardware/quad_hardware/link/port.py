@@ -27,7 +27,7 @@ DEFAULT_PORT = '/dev/ttyAMA0'
 """Serial port of the computer on the robot."""
 
 CHUNK = 4096  # [B] more than two frames
-WRITE_PATIENCE = 0.1  # [s] how long a port may take no bytes before it counts as lost
+WRITE_TIMEOUT = 0.1  # [s] how long a port may take no bytes before it counts as lost
 
 
 class Port(Interface):
@@ -102,14 +102,14 @@ class SerialPort:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send bytes; waits for :data:`WRITE_PATIENCE` at most.
+        """Send bytes; waits for :data:`WRITE_TIMEOUT` at most.
 
         Raises:
             LinkError: The port is gone, or takes no more bytes.
         """
-        deadline = time.monotonic() + WRITE_PATIENCE
+        deadline = time.monotonic() + WRITE_TIMEOUT
         while data := data[self._write_some(data) :]:
-            _, ready, _ = select.select([], [self], [], WRITE_PATIENCE)
+            _, ready, _ = select.select([], [self], [], WRITE_TIMEOUT)
             if not ready or time.monotonic() > deadline:
                 raise LinkError(f'{self.path} takes no more bytes; is the robot on?')
 
@@ -142,7 +142,7 @@ class SerialPort:
 def _explain(path: str, baud: int, error: Exception) -> str:
     number = getattr(error, 'errno', None)
     if number == errno.ENOENT or not Path(path).exists():
-        remedy = 'there is no such device; is the robot plugged in, and is this its port?'
+        remedy = 'no such device; is the robot plugged in, and is this its port?'
     elif number == errno.EACCES:
         remedy = 'no permission; run: sudo usermod -aG dialout $USER, then log in again'
     elif number in {errno.EBUSY, errno.EAGAIN}:

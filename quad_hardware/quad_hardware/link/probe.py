@@ -44,7 +44,7 @@ class Connection:
 
 
 def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0) -> Connection:
-    """Open a port and ask for the firmware version, in one protocol after the other.
+    """Open a port and request the firmware version, in one protocol after the other.
 
     Args:
         path: Device file.
@@ -64,7 +64,7 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
         tried.append(f'protocol {protocol.name} at {speed} baud')
         port = SerialPort(path, speed)
         try:
-            firmware = ask_firmware(port, protocol)
+            firmware = read_firmware(port, protocol)
         except LinkError:
             port.close()
             raise
@@ -77,7 +77,7 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
     )
 
 
-def ask_firmware(port: SerialPort, protocol: Protocol) -> str | None:
+def read_firmware(port: SerialPort, protocol: Protocol) -> str | None:
     """Return the firmware version of a robot, None when it does not answer.
 
     Raises:
@@ -88,13 +88,13 @@ def ask_firmware(port: SerialPort, protocol: Protocol) -> str | None:
     else:
         request = Frame(Kind.READ, Register.FIRMWARE, bytes((FIRMWARE_SIZE,)))
     for _ in range(ATTEMPTS):
-        answer = ask(port, protocol, request, FIRMWARE_SIZE, ANSWER_TIME)
+        answer = send_request(port, protocol, request, FIRMWARE_SIZE, ANSWER_TIME)
         if answer is not None:
             return answer.rstrip(b'\0').decode('ascii', 'replace')
     return None
 
 
-def ask_battery(port: SerialPort, protocol: Protocol) -> int | None:
+def read_battery(port: SerialPort, protocol: Protocol) -> int | None:
     """Return the charge of a robot [%], None when it does not answer.
 
     Raises:
@@ -104,13 +104,13 @@ def ask_battery(port: SerialPort, protocol: Protocol) -> int | None:
     if protocol is V2:
         request = Frame(Kind.READ, Code.BATTERY)
     for _ in range(ATTEMPTS):
-        answer = ask(port, protocol, request, BATTERY_SIZE, ANSWER_TIME)
+        answer = send_request(port, protocol, request, BATTERY_SIZE, ANSWER_TIME)
         if answer is not None:
             return answer[0]
     return None
 
 
-def ask(
+def send_request(
     port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
 ) -> bytes | None:
     """Send a request and wait for its answer.

@@ -13,10 +13,10 @@ import math
 
 from ..protocol import Span
 
-FULL_SPEED, LOWEST_SPEED = 255, 1
+FULL_SPEED, MIN_SPEED = 255, 1
 """Ends of the register that says how fast a single servo turns (quad.md 1.2)."""
 
-LOWEST_RATE = 527.0 / FULL_SPEED
+MIN_RATE = 527.0 / FULL_SPEED
 """What the lowest speed is worth [deg/s] where the highest is that of a servo without load.
 
 No page of the vendor says the unit; 9.2 rad/s is what the servo's data sheet allows.
@@ -48,7 +48,7 @@ class UnseenServo:
         return self._low == self._target == self._high
 
     def _advance(self, now: float) -> None:
-        way, self._at = LOWEST_RATE * (now - self._at), now
+        way, self._at = MIN_RATE * (now - self._at), now
         if not math.isnan(self._target):
             self._low = _toward(self._target, self._low, way)
             self._high = _toward(self._target, self._high, way)

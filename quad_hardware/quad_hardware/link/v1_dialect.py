@@ -30,14 +30,14 @@ from ..protocol import (
 )
 from ..report import Report
 from .dialect import Dialect, Step
-from .unseen_servo import FULL_SPEED, LOWEST_SPEED, UnseenServo
+from .unseen_servo import FULL_SPEED, MIN_SPEED, UnseenServo
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
-LONGEST_LATENCY = 0.050  # [s] what an answer may take beyond its time on the line
-SHORTEST_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
+MAX_LATENCY = 0.050  # [s] what an answer may take beyond its time on the line
+MIN_LATENCY = 0.006  # [s] what is waited for the answer of a quick board
 LATENCY_DECAY = 0.98  # by which a slow answer is forgotten with each quick one
 BATTERY_PERIOD = 2.0  # [s]
-ARM_AGAIN = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
+ARM_REPEAT_PERIOD = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
 _BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that nobody set, or that a restart may have undone
 _IMU = V1.functions[Register.IMU]
 
@@ -84,8 +84,8 @@ class V1Dialect(Dialect[Frame]):
         self._battery_at = now
         self._queue: deque[_Request] = deque()
         self._waiting: _Request | None = None
-        self._asked_at = now
-        self._latency_limit = LONGEST_LATENCY
+        self._requested_at = now
+        self._latency_limit = MAX_LATENCY
         self._free_at = now
         self._legs = self._torque = b''
         self._arm: dict[int, bytes] = {}
@@ -149,9 +149,9 @@ class V1Dialect(Dialect[Frame]):
             self._counters.unusable += 1
             return None
         self._waiting = None
-        took = now - self._asked_at - waiting.wire_time
-        wanted = max(2 * took, LATENCY_DECAY * self._latency_limit, SHORTEST_LATENCY)
-        self._latency_limit = min(wanted, LONGEST_LATENCY)
+        took = now - self._requested_at - waiting.wire_time
+        wanted = max(2 * took, LATENCY_DECAY * self._latency_limit, MIN_LATENCY)
+        self._latency_limit = min(wanted, MAX_LATENCY)
         if waiting is _READ_BATTERY:
             self._charges.append(frame.payload[0])
         elif waiting is _READ_MOTORS:
@@ -168,12 +168,12 @@ class V1Dialect(Dialect[Frame]):
         return min(commands, self._free_at if self._queue else self._cycle_at)
 
     def _deadline(self, request: _Request) -> float:
-        return self._asked_at + request.wire_time + self._latency_limit
+        return self._requested_at + request.wire_time + self._latency_limit
 
     def _give_up(self) -> None:
         """Go on without an answer: the rest of this period is of no use."""
         self._counters.unanswered += 1
-        self._latency_limit = min(1.5 * self._latency_limit, LONGEST_LATENCY)
+        self._latency_limit = min(1.5 * self._latency_limit, MAX_LATENCY)
         self._waiting = None
         self._queue.clear()
 
@@ -198,7 +198,7 @@ class V1Dialect(Dialect[Frame]):
             return Frame(Kind.WRITE, Register.TORQUE, payload).encode(V1)
         if self._waiting is None and self._queue:
             self._waiting = self._queue.popleft()
-            self._asked_at = now
+            self._requested_at = now
             return self._waiting.encode()
         return b''
 
@@ -212,7 +212,7 @@ class V1Dialect(Dialect[Frame]):
             if speed != self._speed:  # it counts for every single servo that follows
                 self._speed, self._arm[motor] = speed, payload
                 return Frame(Kind.WRITE, Register.MOTOR_SPEED, bytes((speed,))).encode(V1)
-            self._arm_sent[motor] = payload, now + ARM_AGAIN
+            self._arm_sent[motor] = payload, now + ARM_REPEAT_PERIOD
             if motor in self._unseen:
                 self._unseen[motor].send(self._spans[motor].decode(payload[0]), now)
             return Frame(Kind.WRITE, REGISTER_OF_MOTOR[motor], payload).encode(V1)
@@ -223,7 +223,7 @@ class V1Dialect(Dialect[Frame]):
             if motor not in self._unseen:
                 self._unseen[motor] = UnseenServo(self._spans[motor], now)
             if not self._unseen[motor].arrived(now):
-                return LOWEST_SPEED
+                return MIN_SPEED
         return _BOARDS_OWN if self._speed == _BOARDS_OWN else FULL_SPEED
 
     def _forget_arm(self) -> None:

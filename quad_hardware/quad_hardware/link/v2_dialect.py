@@ -21,14 +21,14 @@ from ..protocol import (
 from ..report import Report
 from .dialect import Dialect, Step
 
-ASK_AGAIN = 0.3  # [s] of silence after which the robot is asked to push its state
+REQUEST_PERIOD = 0.3  # [s] of silence after which the robot is asked to push its state
 _SERVOS = V2.functions[Code.SERVOS]
 STATE_WIRE_TIME = V2.wire_time(V2.overhead + STATE.length)  # [s]
 _SEQUENCE = 1 << 16
 
 
 class V2Dialect(Dialect[Frame]):
-    """Asks for 50 states a second, and again whenever they stop coming."""
+    """Requests 50 states a second, and again whenever they stop coming."""
 
     def __init__(self, now: float, rate: int = 50) -> None:
         """Begin a conversation.
@@ -38,12 +38,12 @@ class V2Dialect(Dialect[Frame]):
             rate: Reports a second [Hz].
         """
         super().__init__(V2, now)
-        asking = (
+        requests = (
             Frame(Kind.WRITE, Code.FEEDBACK_RATE, bytes((rate,))),
             Frame(Kind.WRITE, Code.FEEDBACK, b'\x01'),
         )
-        self._ask = b''.join(frame.encode(V2) for frame in asking)
-        self._ask_at = now
+        self._requests = b''.join(frame.encode(V2) for frame in requests)
+        self._request_at = now
         self._pending = self._torque = b''
         self._sequence: int | None = None
 
@@ -74,10 +74,10 @@ class V2Dialect(Dialect[Frame]):
     def step(self, now: float) -> Step:
         """Return a pending command, and the request for states where they are missing."""
         send, self._pending, self._torque = self._pending + self._torque, b'', b''
-        if now >= self._ask_at:
-            self._ask_at = now + ASK_AGAIN
-            send = self._ask + send
-        return Step(send, self._ask_at)
+        if now >= self._request_at:
+            self._request_at = now + REQUEST_PERIOD
+            send = self._requests + send
+        return Step(send, self._request_at)
 
     def handle_frame(self, frame: Frame, now: float) -> Report | None:
         """Take a frame of the robot; every state frame is a report."""
@@ -91,7 +91,7 @@ class V2Dialect(Dialect[Frame]):
             self._counters.unusable += 1
             return None
         self._count(feedback.sequence)
-        self._ask_at = now + ASK_AGAIN
+        self._request_at = now + REQUEST_PERIOD
         return _report(feedback, now)
 
     def _count(self, sequence: int) -> None:

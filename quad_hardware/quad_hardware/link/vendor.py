@@ -23,7 +23,7 @@ from ..protocol import MOTOR_ORDER, ParserCounters, Protocol, V2
 from ..report import Report
 from .dialect import Dialect, Step
 from .port import CHUNK
-from .v2_dialect import ASK_AGAIN, STATE_WIRE_TIME
+from .v2_dialect import REQUEST_PERIOD, STATE_WIRE_TIME
 from .vendor_library import Dog, find_serial, find_write_method, StateParser
 
 VENDOR = Protocol(
@@ -159,7 +159,7 @@ class VendorDialect(Dialect[object]):
         """
         super().__init__(VENDOR, now)
         self.can_release = False
-        self._ask_at = now
+        self._request_at = now
         self._dog = dog
         self._write = find_write_method(dog, method)
         registry = importlib.import_module('xgo_lib2.registry')
@@ -183,21 +183,21 @@ class VendorDialect(Dialect[object]):
         self._angles = {}
 
     def step(self, now: float) -> Step:
-        """Write angles, and ask for states where they are missing.
+        """Write angles, and request states where they are missing.
 
         Raises:
             LinkError: The vendor's library failed.
         """
         angles, self._angles = self._angles, {}
         try:
-            if now >= self._ask_at:
-                self._ask_at = now + ASK_AGAIN
+            if now >= self._request_at:
+                self._request_at = now + REQUEST_PERIOD
                 self._dog.system_set_feedback(1)
             for motor, angle in angles.items():
                 self._write(motor, angle)
         except Exception as error:  # whatever the vendor's library raises
             raise LinkError(f'xgo_lib2 failed: {error}') from error
-        return Step(b'', self._ask_at)
+        return Step(b'', self._request_at)
 
     def handle_frame(self, frame: object, now: float) -> Report | None:
         """Take a state of the vendor's parser; what it does not tell is not made up.
@@ -205,7 +205,7 @@ class VendorDialect(Dialect[object]):
         Raises:
             LinkError: The state has not what is public of it.
         """
-        self._ask_at = now + ASK_AGAIN
+        self._request_at = now + REQUEST_PERIOD
         self._counters.states += 1
         try:
             return Report(

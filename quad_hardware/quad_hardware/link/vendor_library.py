@@ -33,7 +33,7 @@ class StateParser(Interface):
 
 
 def is_installed() -> bool:
-    """Tell whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
+    """Return whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
     try:
         library = importlib.import_module('xgo_lib2')
     except ImportError:

@@ -18,7 +18,7 @@ from ..report import Report
 
 HOT_SERVO = 65.0  # [°C]
 GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
-DAMAGE_SHARE = 0.01  # of the frames, above which a cable is bad
+MAX_DAMAGE_RATIO = 0.01  # of the frames, above which a cable is bad
 
 FAULTS = {
     Fault.LOW_BATTERY: 'low battery: charge it',
@@ -30,7 +30,7 @@ FAULTS = {
 """What a fault is called, and what to do."""
 
 UNCHECKED = (
-    'nobody has compared the IMU with gravity, and its gyro with turning it by hand, so the '
+    'the IMU was not compared with gravity, nor its gyro with turning by hand, so the '
     'controller does not level: ros2 run quad_hardware calibrate imu'
 )
 """What is said of an attitude whose signs may be wrong."""
@@ -64,7 +64,7 @@ class LinkDiagnostic:
         level, message = _LINK_LEVELS[status.state], status.detail
         parser = status.parser
         frames, damaged = self._since(parser)
-        if level == DiagnosticStatus.OK and damaged > DAMAGE_SHARE * max(frames, 100):
+        if level == DiagnosticStatus.OK and damaged > MAX_DAMAGE_RATIO * max(frames, 100):
             level = DiagnosticStatus.WARN
             message = f'{damaged} damaged and {frames} good frames lately; is the cable loose?'
         if level == DiagnosticStatus.OK and (slow := latency_problem(port, status.latency)):

@@ -49,7 +49,7 @@ WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
 class HardwareNode(Node):
-    """Publishes what the robot reports, and sends it what ``/joint_command`` asks for.
+    """Publishes what the robot reports, and sends it what ``/joint_command`` requests.
 
     Reports are published in the driver's thread, so that nothing delays them; commands are
     checked in a callback and handed to that thread.
@@ -148,7 +148,7 @@ class HardwareNode(Node):
         return max(self.get_clock().now().nanoseconds - age, 0)
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
-        """Say how the link is; runs in the thread of the driver."""
+        """Log how the link is; runs in the thread of the driver."""
         if state is LinkState.RUNNING:
             notify_ready()
         if state in {LinkState.REFUSED, LinkState.FAILED}:
@@ -173,7 +173,7 @@ class HardwareNode(Node):
             self._silence.reset()
 
     def _miss_commands(self) -> None:
-        """Bring the robot down when the end of its commands is a hazard, or say why not."""
+        """Bring the robot down when the end of its commands is a hazard, or log why not."""
         self._silence.cancel()
         if loss := self._robot.miss_commands():
             self.get_logger().error(loss)
@@ -229,7 +229,7 @@ def _check_rest(message: JointCommand, rest: Sequence[float]) -> None:
                 'leave them out or give one for each'
             )
     if not all(map(math.isfinite, rest)):
-        raise CommandError('velocity or effort holds what is no finite number')
+        raise CommandError('velocity or effort has a number that is not finite')
 
 
 def main() -> int:

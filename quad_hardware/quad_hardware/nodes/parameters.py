@@ -72,14 +72,14 @@ class Deviations:
 
 @dataclass(frozen=True, slots=True)
 class NodeSettings:
-    """Everything that the parameters say.
+    """All parameters.
 
     Attributes:
         robot: Which robot it is, and how it is read and commanded.
         frames: Names of the frames.
         deviations: Published with the IMU.
         diagnostics_period: [s]
-        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 asks for none.
+        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
     """
 
     robot: RobotSettings
@@ -101,7 +101,7 @@ def declare_parameters(node: Node) -> NodeSettings:
         'protocol',
         AUTO,
         _PROTOCOLS,
-        'auto: asks the robot; vendor: by the vendor’s xgo_lib2',
+        'auto: detected; vendor: through the vendor’s xgo_lib2',
         former=FORMER_NAMES,
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
@@ -145,7 +145,7 @@ def declare_parameters(node: Node) -> NodeSettings:
 
 
 def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:
-    """Tell whether to go through the vendor's library; nothing is guessed where it is there."""
+    """Return whether to go through the vendor's library; nothing is guessed where it is there."""
     installed, wanted = is_installed(), not protocols
     if wanted and not installed:
         raise CommandError(

@@ -4,7 +4,7 @@ r"""Both serial protocols of the XGO: one table each, codecs and a stream parser
 
 The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read these tables::
 
-    robot = StreamParser(V1, HOST_KINDS)  # what a robot hears
+    robot = StreamParser(V1, HOST_KINDS)  # what a robot receives
     for frame in robot.feed(port.read(4096)):
         if frame.kind is Kind.READ and frame.address == Register.BATTERY:
             port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(V1))

@@ -80,7 +80,7 @@ class Span:
         """Return the nearest byte; values outside are taken to the nearer end.
 
         Raises:
-            CodecError: The value is no number.
+            CodecError: The value is not finite.
         """
         if math.isnan(value):
             raise CodecError('NaN has no byte; send a number')
@@ -203,7 +203,7 @@ class Function:
         object.__setattr__(self, 'layout', f'{layout}{length - end}x')
 
     def accepts(self, length: int) -> bool:
-        """Tell whether a payload may have a length [B]."""
+        """Return whether a payload may have a length [B]."""
         if self.repeated:
             return length > 0 and length % self.length == 0
         return 0 < length <= self.length if self.variable else length == self.length

@@ -23,7 +23,7 @@ GAIT_PERIOD = 0.02  # [s] between two sets of targets of the board's own gait
 POSE_TIME = 1.0  # [s] into a pose of the board's own
 POWER_PERIOD = 0.1  # [s] between two looks at battery and temperatures
 BOOT_TIME = 0.5  # [s] after power comes back
-LONGEST_LAG = 0.5  # [s] of time that the simulation catches up after it was held up
+MAX_LAG = 0.5  # [s] of time that the simulation catches up after it was held up
 
 FIRMWARE: Mapping[Model, str] = {
     Model.MINI: 'M-4.3.3',
@@ -47,9 +47,9 @@ class Board:
         battery: The battery.
         walker: The board's own gait.
         model: Whose ranges scale bytes.
-        firmware: Version as the board tells it.
+        firmware: Version as the board reports it.
         lost_time: Time that was skipped because the process was held up [s].
-        imu_failed: Whether the attitude is no number.
+        imu_failed: Whether the attitude is not finite.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Board:
             plant: The robot.
             urdf: What it is made of.
             model: Which one it is.
-            firmware: Version to tell; empty for one of the model.
+            firmware: Version to report; empty for one of the model.
             charge: Of the battery [%].
             mounts: How servos are mounted that are not as the driver expects, by motor id.
             now: Time [s].
@@ -108,9 +108,9 @@ class Board:
 
     def advance(self, now: float) -> None:
         """Let the robot live until a time [s]."""
-        if now - self._now > LONGEST_LAG:
-            self.lost_time += now - self._now - LONGEST_LAG
-            self._now = now - LONGEST_LAG
+        if now - self._now > MAX_LAG:
+            self.lost_time += now - self._now - MAX_LAG
+            self._now = now - MAX_LAG
         while self._now < now:
             until = min(now, max(self._gait_at, self._now), max(self._power_at, self._now))
             self._plant.step(until - self._now)
@@ -146,7 +146,7 @@ class Board:
     # -- sensors
 
     def measure(self) -> Measurement:
-        """Return what the sensors say now."""
+        """Return what the sensors measure now."""
         self._measured = self._plant.measure()
         return self._measured
 
@@ -211,7 +211,7 @@ class Board:
         self._gait_at = self._now + POSE_TIME
 
     def walk(self, command: Vector) -> None:
-        """Walk ahead [m/s], to the left [m/s] and turn [rad/s] until something else is told."""
+        """Walk ahead [m/s], to the left [m/s] and turn [rad/s] until the next command."""
         self._turn = None
         self.walker.command = command
         self.start_gait()

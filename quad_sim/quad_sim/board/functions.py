@@ -15,17 +15,17 @@ from ..plant.state import Measurement
 from .board import Board
 
 ALL_MOTORS = 0xFF
-DEFAULT_RATE, HIGHEST_RATE = 50.0, 100.0  # [Hz]
+DEFAULT_RATE, MAX_RATE = 50.0, 100.0  # [Hz]
 _CLOCK, _COUNT = 1 << 32, 1 << 16  # where device time and sequence begin anew
 
 Values = dict[str, tuple[float, ...]]
 
 
 class RefusedError(Exception):
-    """A frame asks for what the board does not do; it becomes a NACK."""
+    """A frame requests what the board does not do; it becomes a NACK."""
 
     def __init__(self, reason: Refusal) -> None:
-        """Say why."""
+        """Keep the reason."""
         super().__init__(reason.name)
         self.reason = reason
 
@@ -122,7 +122,7 @@ class Functions:
 
     def _set_rate(self, values: Values) -> None:
         rate = values['rate'][0]
-        if not 1.0 <= rate <= HIGHEST_RATE:
+        if not 1.0 <= rate <= MAX_RATE:
             raise RefusedError(Refusal.WRONG_VALUE)
         self._period = 1.0 / rate
 

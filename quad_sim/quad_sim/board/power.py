@@ -44,7 +44,7 @@ class Battery:
 
     @property
     def percent(self) -> int:
-        """Charge as the board tells it."""
+        """Charge as the board reports it."""
         return round(self.charge)
 
     @property

@@ -34,7 +34,7 @@ NEUTRAL = (127, 128)  # the vendor's library encodes zero as 127, its documents 
 LIE_DOWN, STAND_UP = 1, 2  # actions, of register 0x3E
 LEG_NAMES = {1: 'fl', 2: 'fr', 3: 'br', 4: 'bl'}
 INT16 = 32767
-LONGEST_ANSWER = V1.max_length - V1.overhead  # [B]
+MAX_ANSWER = V1.max_length - V1.overhead  # [B]
 
 _BODY = {0x33: 'x', 0x34: 'y', 0x35: 'z', 0x36: 'roll', 0x37: 'pitch', 0x38: 'yaw'}
 _FEET = range(0x40, 0x4C)
@@ -84,7 +84,7 @@ class Registers:
         if frame.kind is Kind.WRITE:
             self._write(frame)
             return []
-        if len(frame.payload) != 1 or not 0 < frame.payload[0] <= LONGEST_ANSWER:
+        if len(frame.payload) != 1 or not 0 < frame.payload[0] <= MAX_ANSWER:
             return []
         payload = self._read(frame.address, frame.payload[0])
         return [] if payload is None else [Frame(Kind.REPLY, frame.address, payload)]

@@ -54,7 +54,7 @@ class Mount:
         """Refuse what is no mounting.
 
         Raises:
-            SetupError: The message says what is.
+            SetupError: The message has the reason.
         """
         if self.sign not in {1, -1} or not abs(self.offset) <= 180.0:
             raise SetupError(
@@ -179,7 +179,7 @@ class Servos:
             self.set_torque([motor], False)
 
     def torque_on(self, motor: int) -> bool:
-        """Tell whether a servo holds."""
+        """Return whether a servo holds."""
         return self._plant.torque_on(self._joint[motor])
 
     def angles(self, measured: Measurement) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Turning on the spot by an angle, as register 0x3F asks for."""
+"""Turning on the spot by an angle, as register 0x3F requests."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The board's own trot, which the registers VX, VY and VYAW ask for.
+"""The board's own trot, which the registers VX, VY and VYAW request.
 
 The vendor's firmware has one; this is a plain trot of ours with the legs of the URDF, so
 that clients of the register protocol see the robot walk. It is not that of quad_controller.

@@ -21,13 +21,13 @@ class FaultKind(Enum):
 
     DROP = 'drop'  # bytes are lost, both ways
     FLIP = 'flip'  # a bit of a byte is inverted, both ways
-    SILENCE = 'silence'  # the robot hears, and says nothing
-    DEAF = 'deaf'  # the robot hears nothing
-    SLOW = 'slow'  # everything the robot says comes late
+    SILENCE = 'silence'  # the robot receives, and sends nothing
+    DEAF = 'deaf'  # the robot receives nothing
+    SLOW = 'slow'  # everything that the robot sends is late
     BROWN_OUT = 'brown_out'  # the supply fails: the board starts anew, its servos without torque
     UNPLUG = 'unplug'  # the serial port is gone
-    LIMP = 'limp'  # a servo lets go, and the board says that one is silent
-    IMU = 'imu'  # the IMU is dead: the board reports an attitude that is no number
+    LIMP = 'limp'  # a servo loses its torque, and the board reports a silent one
+    IMU = 'imu'  # the IMU is dead: the board reports an attitude of NaN
     BATTERY = 'battery'  # the charge is another one from now on
 
 
@@ -77,7 +77,7 @@ class Fault:
         """Refuse times and details without sense.
 
         Raises:
-            SetupError: The message says what the fault takes.
+            SetupError: The message names what the fault takes.
         """
         known = SETTINGS[self.kind]
         for name, value in self.values.items():
@@ -124,7 +124,7 @@ def make_fault(
         kind = FaultKind(name)
     except ValueError:
         known = ', '.join(kind.value for kind in FaultKind)
-        raise SetupError(f'there is no fault {name!r}; there are {known}') from None
+        raise SetupError(f'unknown fault {name!r}; there are {known}') from None
     values = dict(_assignment(name, word) for word in settings)
     start, duration = values.pop('at', start), values.pop('for', duration)
     return Fault(kind, start, duration, values)
@@ -145,7 +145,7 @@ def _assignment(fault: str, word: str) -> tuple[str, float]:
     try:
         return name.strip(), float(value)
     except ValueError:
-        raise SetupError(f'fault {fault}: {word!r} is no name=number') from None
+        raise SetupError(f'fault {fault}: {word!r} is not name=number') from None
 
 
 class FaultPlan:

@@ -154,5 +154,5 @@ def _claim(link: Path) -> socket.socket:
 
 
 def _is_left_over(link: Path) -> bool:
-    """Tell whether a link is what a simulated robot that was killed has left behind."""
+    """Return whether a link is what a simulated robot that was killed has left behind."""
     return link.is_symlink() and link.readlink().parent == DEVICES

@@ -22,7 +22,7 @@ QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
 
 @dataclass(slots=True)
 class LineStatistics:
-    """What the robot has heard.
+    """What the robot has received.
 
     Attributes:
         frames: Valid frames.
@@ -40,7 +40,7 @@ class RobotLine:
 
     Attributes:
         faults: What goes wrong; may be added to.
-        statistics: What the robot has heard.
+        statistics: What the robot has received.
         to_robot: The wire from the host.
         to_host: The wire to the host.
     """
@@ -77,7 +77,7 @@ class RobotLine:
         self._fixed_baud = fixed_baud
         self._command_gap = command_gap
         self._baud = fixed_baud or next(iter(self._by_baud))
-        self._heard_at = self._frame_end = -math.inf
+        self._received_at = self._frame_end = -math.inf
         self._battery_fault: Fault | None = None
         self._powered = self._plugged = True
         self._now = 0.0
@@ -116,7 +116,7 @@ class RobotLine:
                 for arrived in self.to_robot.take(arrival):
                     self._hear(arrived)
         self._board.advance(now)
-        if now - self._heard_at > QUIET:
+        if now - self._received_at > QUIET:
             self._give_up_waiting(now)
         return b''.join(arrived.data for arrived in self.to_host.take(now))
 
@@ -138,7 +138,7 @@ class RobotLine:
         self._board.advance(now)
         frame = self._functions.push(now)
         if self._board.awake:
-            self._say(frame, V2, now)
+            self._send(frame, V2, now)
 
     def _hear(self, arrived: Arrival) -> None:
         baud = self._baud
@@ -146,7 +146,7 @@ class RobotLine:
         if protocol is None or parser is None:
             return
         self._board.advance(arrived.end)
-        self._heard_at = arrived.end
+        self._received_at = arrived.end
         length = len(arrived.data)
         begin = arrived.end - length * arrived.seconds_per_byte
         for frame in parser.feed(arrived.data):
@@ -169,7 +169,7 @@ class RobotLine:
         self.statistics.frames += 1
         handler = self._functions if protocol is V2 else self._registers
         for answer in handler.handle(frame, now):
-            self._say(answer, protocol, now)
+            self._send(answer, protocol, now)
 
     def _forget_partial_frames(self) -> None:
         self._parsers = {
@@ -183,7 +183,7 @@ class RobotLine:
             for frame in parser.expire():
                 self._handle(frame, protocol, now, now, now)
 
-    def _say(self, frame: Frame, protocol: Protocol, now: float) -> None:
+    def _send(self, frame: Frame, protocol: Protocol, now: float) -> None:
         if self._by_baud.get(self._baud) is protocol:  # the host may have gone on to another speed
             self.to_host.put(frame.encode(protocol), now, self._baud)
 

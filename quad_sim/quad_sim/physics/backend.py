@@ -39,7 +39,7 @@ class PhysicsBackend(Backend):
         """Send targets, and let a period pass.
 
         Raises:
-            SimulationError: A target is no number, or the physics blew up.
+            SimulationError: A target is not finite, or the physics blew up.
         """
         if targets is not None:
             self.robot.set_targets(targets)

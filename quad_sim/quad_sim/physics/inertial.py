@@ -53,11 +53,11 @@ class InertialUnit:
         self._force = self._rotation().T @ self._gravity
 
     def sample(self) -> None:
-        """Take what the accelerometer says now into the low-pass."""
+        """Take what the accelerometer measures now into the low-pass."""
         self._force += self._share * (self._accelerometer - self._force)
 
     def read(self) -> Imu:
-        """Return what the unit says; its attitude is that of imu_link in the world."""
+        """Return what the unit measures; its attitude is that of imu_link in the world."""
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, self._rotation().ravel())
         w, x, y, z = quaternion.tolist()
@@ -69,7 +69,7 @@ class InertialUnit:
 
 
 def _readings(model: mujoco.MjModel, data: mujoco.MjData, name: str) -> Array:
-    """Return a view of what a sensor says."""
+    """Return a view of what a sensor measures."""
     sensor = model.sensor(name)
     start = int(sensor.adr[0])
     view: Array = data.sensordata[start : start + int(sensor.dim[0])]

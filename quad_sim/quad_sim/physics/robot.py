@@ -26,7 +26,7 @@ from .placing import place, start_positions
 
 TIMESTEP: Final = 0.002  # [s]
 STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
-FASTEST: Final = 10.0  # [m/s] of a kick
+MAX_KICK: Final = 10.0  # [m/s] of a kick
 UNSTABLE: Final = (
     mujoco.mjtWarning.mjWARN_BADQPOS,
     mujoco.mjtWarning.mjWARN_BADQVEL,
@@ -121,7 +121,7 @@ class Robot:
             duration: Time in which the set-point goes there [s]; None for the servo's own.
 
         Raises:
-            TargetError: A name is unknown, a value is no number, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
         self._ramp.approach(targets, self._servo.interpolation if duration is None else duration)
 
@@ -157,7 +157,7 @@ class Robot:
                 self._ramp.approach({name: float(place)}, 0.0)
 
     def torque_on(self, joint: str) -> bool:
-        """Tell whether a servo holds."""
+        """Return whether a servo holds."""
         return bool(self._model.actuator_gainprm[self.joint_names.index(joint), 0] > 0.0)
 
     def push(self, force: Vector, duration: float = 0.1) -> None:
@@ -186,8 +186,8 @@ class Robot:
         Raises:
             SetupError: A number is not finite, or far too large.
         """
-        if not math.hypot(*velocity) <= FASTEST:
-            raise SetupError(f'kick of {velocity} m/s: give up to {FASTEST:g} m/s')
+        if not math.hypot(*velocity) <= MAX_KICK:
+            raise SetupError(f'kick of {velocity} m/s: give up to {MAX_KICK:g} m/s')
         self._data.qvel[:3] += self._heading_to_world(velocity)
 
     def step(self, duration: float) -> None:
@@ -280,7 +280,7 @@ class Robot:
         return vector(self._data.body(link).xpos)
 
     def measure(self) -> Measurement:
-        """Return what the sensors say, with the noise that the robot was made with."""
+        """Return what the sensors measure, with the noise that the robot was made with."""
         truth = Measurement(
             time=self.time,
             imu=self.imu,

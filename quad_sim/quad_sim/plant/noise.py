@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From the true state of a robot to what its sensors say of it."""
+"""From the true state of a robot to what its sensors measure."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Noise:
 
 
 NONE = Noise()
-"""Sensors that say the truth."""
+"""Sensors without noise."""
 
 BOARD = Noise(
     attitude=math.radians(0.1),
@@ -57,7 +57,7 @@ BOARD = Noise(
 
 
 def disturb(truth: Measurement, noise: Noise, random: np.random.Generator) -> Measurement:
-    """Return what noisy sensors say of a true state."""
+    """Return what noisy sensors measure of a true state."""
     if noise.silent:
         return truth
     count = len(truth.positions)

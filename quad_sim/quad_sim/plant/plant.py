@@ -55,7 +55,7 @@ class Plant(Protocol):
         """Switch servos on or off."""
 
     def torque_on(self, joint: str) -> bool:
-        """Tell whether a servo holds."""
+        """Return whether a servo holds."""
 
     def push(self, force: Vector, duration: float = 0.1) -> None:
         """Push the trunk [N]."""
@@ -70,7 +70,7 @@ class Plant(Protocol):
         """Let time pass [s]."""
 
     def measure(self) -> Measurement:
-        """Return what the sensors say."""
+        """Return what the sensors measure."""
 
 
 class KinematicRobot:
@@ -166,7 +166,7 @@ class KinematicRobot:
             self._ramp.approach(missed, 0.0)
 
     def torque_on(self, joint: str) -> bool:
-        """Tell whether a servo holds."""
+        """Return whether a servo holds."""
         return self._on[joint]
 
     def push(self, force: Vector, duration: float = 0.1) -> None:
@@ -196,7 +196,7 @@ class KinematicRobot:
             self._ramp.advance()
 
     def measure(self) -> Measurement:
-        """Return what the sensors say."""
+        """Return what the sensors measure."""
         values = self.joint_targets
         level = (0.0, 0.0, 0.0)
         truth = Measurement(

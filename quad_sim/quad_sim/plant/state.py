@@ -71,7 +71,7 @@ class Measurement:
 
     Attributes:
         time: Of the measurement, since the start [s].
-        imu: What the IMU says.
+        imu: What the IMU measures.
         positions: Of the joints [rad], of the gripper [m]; in the order of the URDF.
         velocities: [rad/s], [m/s].
         torques: [N m], [N].

@@ -62,7 +62,7 @@ class TargetRamp:
             duration: How long it takes [s]; 0 for a step.
 
         Raises:
-            TargetError: A name is unknown, a value is no number, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
         indices, values = self._checked(targets)
         goal = np.clip(values, self._lower[indices], self._upper[indices])
@@ -76,7 +76,7 @@ class TargetRamp:
         """Refuse what :meth:`approach` would refuse, and change nothing.
 
         Raises:
-            TargetError: A name is unknown, a value is no number, or there are too many or few.
+            TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
         self._checked(targets)
 

@@ -11,7 +11,7 @@ from quad_description.rotations import about, Quaternion, Vector
 
 from ..exceptions import SetupError
 
-STEEPEST = math.radians(45.0)  # [rad] steeper than any foot holds
+MAX_SLOPE = math.radians(45.0)  # [rad] steeper than any foot holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,12 @@ class Terrain:
 
     def __post_init__(self) -> None:
         """Refuse ground that nothing stands on."""
-        if not abs(self.angle) <= STEEPEST:
-            raise SetupError(f'slope of {self.angle} rad: give -{STEEPEST:.2f} to {STEEPEST:.2f}')
+        if not abs(self.angle) <= MAX_SLOPE:
+            raise SetupError(
+                f'slope of {self.angle} rad: give -{MAX_SLOPE:.2f} to {MAX_SLOPE:.2f}'
+            )
         if not math.isfinite(self.direction):
-            raise SetupError(f'slope direction {self.direction} is no angle')
+            raise SetupError(f'slope direction {self.direction} is not an angle')
         if not 0.0 < self.friction < 10.0:
             raise SetupError(f'friction {self.friction}: give more than 0 and less than 10')
 

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which of several sources of velocities is heard. Pure; time is handed in.
+"""Which of several sources of velocities is active. Pure; time is handed in.
 
 As in twist_mux: of the sources that are not stale and not below a lock, the one of the highest
 priority is forwarded; of equal ones the first by name. A lock is closed while its last message
-was true, and when it is stale. Mended here: when the source that is heard falls silent or is
-locked, the robot is told to stop, and does not wait for its own time-out; and a source that was
-never heard does not hold others back, even with a time-out of 0.
+was true, and when it is stale. Mended here: when the source that is active falls silent or is
+locked, the robot is commanded to stop, and does not wait for its own time-out; and a source
+that never published does not block others, even with a time-out of 0.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Multiplexer:
     """Decides for each message whether it is forwarded, and when to send a zero."""
 
     def __init__(self, inputs: Inputs) -> None:
-        """Start with nothing heard; locks that have a time-out are closed.
+        """Start without a message; locks that have a time-out are closed.
 
         Args:
             inputs: What is listened to.
@@ -51,34 +51,34 @@ class Multiplexer:
         )
 
     def is_locked(self, lock: Input, now: float) -> bool:
-        """Say whether a lock is closed.
+        """Return whether a lock is closed.
 
         Args:
             lock: One of the inputs.
             now: Time [s].
         """
-        heard = self._locks[lock.name]
-        return heard.locked or lock.is_stale(heard.time, now)
+        received = self._locks[lock.name]
+        return received.locked or lock.is_stale(received.time, now)
 
     def is_masked(self, source: Input, now: float) -> bool:
-        """Say whether a source is not heard: stale, or locked.
+        """Return whether a source is not active: stale, or locked.
 
         Args:
             source: One of the inputs.
             now: Time [s].
         """
-        heard = self._sources[source.name].time
-        silent = heard == NEVER or source.is_stale(heard, now)
+        received = self._sources[source.name].time
+        silent = received == NEVER or source.is_stale(received, now)
         return silent or source.priority < self.lock_priority(now)
 
     def active(self, now: float) -> Input | None:
-        """Return the source that is heard; None when there is none.
+        """Return the source that is active; None when there is none.
 
         Args:
             now: Time [s].
         """
-        heard = [each for each in self.inputs.sources if not self.is_masked(each, now)]
-        return max(heard, key=lambda each: each.priority, default=None)
+        active = [each for each in self.inputs.sources if not self.is_masked(each, now)]
+        return max(active, key=lambda each: each.priority, default=None)
 
     def velocity(self, name: str, parts: tuple[float, ...], now: float) -> bool:
         """Take a velocity.
@@ -92,10 +92,10 @@ class Multiplexer:
             Whether to forward it.
 
         Raises:
-            CommandError: One of the numbers is none; the message does not count as heard.
+            CommandError: One of the numbers is none; the message does not count as received.
         """
         if not all(math.isfinite(part) for part in parts):
-            raise CommandError(f'{name} sends {parts}, which is no velocity; it is not forwarded')
+            raise CommandError(f'{name} sends {parts}, which is not finite; it is not forwarded')
         self._sources[name].time = now
         active = self.active(now)
         if active is None or active.name != name:
@@ -115,7 +115,7 @@ class Multiplexer:
         self._locks[name].locked = locked
 
     def zero_due(self, now: float) -> bool:
-        """Say whether to send a zero now: the robot moves, and nobody is heard any more.
+        """Return whether to send a zero now: the robot moves, and no source is active any more.
 
         Args:
             now: Time [s].

@@ -14,7 +14,7 @@ import math
 
 from ..exceptions import SettingError
 
-HIGHEST_PRIORITY = 255
+MAX_PRIORITY = 255
 FIELDS = ('topic', 'timeout', 'priority')
 
 
@@ -26,7 +26,7 @@ class Input:
         name: Name among the parameters.
         topic: Name of the topic.
         timeout: Silence after which it is stale [s]; 0 for never.
-        priority: 0 to 255; of those that speak, the highest is heard.
+        priority: 0 to 255; of those that publish, the highest is active.
 
     Raises:
         SettingError: A value makes no sense; the message names it.
@@ -45,24 +45,24 @@ class Input:
             raise SettingError(
                 f'{self.name}.timeout is {self.timeout}: it must be a time in [s], or 0 for never'
             )
-        if not 0 <= self.priority <= HIGHEST_PRIORITY:
+        if not 0 <= self.priority <= MAX_PRIORITY:
             raise SettingError(
-                f'{self.name}.priority is {self.priority}: it must be 0 to {HIGHEST_PRIORITY}'
+                f'{self.name}.priority is {self.priority}: it must be 0 to {MAX_PRIORITY}'
             )
 
-    def is_stale(self, heard: float, now: float) -> bool:
-        """Say whether it has been silent for too long.
+    def is_stale(self, received: float, now: float) -> bool:
+        """Return whether it has been silent for too long.
 
         Args:
-            heard: When it was heard last [s].
+            received: When it was received last [s].
             now: Time [s].
         """
-        return self.timeout > 0.0 and now - heard > self.timeout
+        return self.timeout > 0.0 and now - received > self.timeout
 
 
 @dataclass(frozen=True, slots=True)
 class Inputs:
-    """All that the multiplexer listens to.
+    """All that the multiplexer subscribes.
 
     Attributes:
         sources: Velocities, in the order of their names.
@@ -98,7 +98,7 @@ def read_inputs(topics: Mapping[str, object], locks: Mapping[str, object]) -> In
         The inputs; :data:`DEFAULTS` when there is not one parameter.
 
     Raises:
-        SettingError: One is misspelt, missing or wrong; the message says which.
+        SettingError: One is misspelt, missing or wrong; the message names it.
     """
     if not topics and not locks:
         return DEFAULTS

@@ -12,16 +12,16 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.task import Future
 
-ANSWER_PATIENCE = 3.0  # [s]
-DISCOVERY_PATIENCE = 2.0  # [s] that DDS may need to find a service after the start
-SAME_AGAIN = 0.7  # [s] within which the same question is the keyboard repeating a key
+ANSWER_TIMEOUT = 3.0  # [s]
+DISCOVERY_TIMEOUT = 2.0  # [s] that DDS may need to find a service after the start
+KEY_REPEAT_TIME = 0.7  # [s] within which the same question is the keyboard repeating a key
 
 
 @dataclass(frozen=True, slots=True)
 class _Question:
     what: str  # in words
     request: Any
-    asked: float  # [s]
+    requested_at: float  # [s]
 
 
 class CommandClient:
@@ -32,7 +32,7 @@ class CommandClient:
         node: Node,
         service_type: Any,  # noqa: ANN401
         service: str,
-        say: Callable[[str], None],
+        show: Callable[[str], None],
         granted: Callable[[str], None] = lambda _: None,
     ) -> None:
         """Make the client.
@@ -41,27 +41,27 @@ class CommandClient:
             node: The node; somebody has to spin it for answers to arrive.
             service_type: Type of the service.
             service: Its name.
-            say: Is told the answers, and why there is none.
-            granted: Is told what was asked for, when it was granted.
+            show: Receives the answers, and why there is none.
+            granted: Receives what was requested, when it was granted.
         """
         self._client = node.create_client(service_type, service)
         self._name = node.resolve_service_name(service)
-        self._say = say
+        self._show = show
         self._granted = granted
         self._question: _Question | None = None  # the last one
         self._future: Future | None = None
         self._is_waiting = False  # for the service to be found
 
-    def ask(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
+    def request(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
         """Ask; a question that is still open is dropped.
 
         Args:
-            what: What is asked for, in a word.
+            what: What is requested, in a word.
             request: The request.
             now: Time [s].
         """
         last = self._question
-        if last is not None and last.what == what and now - last.asked < SAME_AGAIN:
+        if last is not None and last.what == what and now - last.requested_at < KEY_REPEAT_TIME:
             return
         self._question = _Question(what, request, now)
         self._forget()
@@ -77,21 +77,21 @@ class CommandClient:
         question = self._question
         if question is None:
             return
-        age = now - question.asked
+        age = now - question.requested_at
         if self._is_waiting and self._client.service_is_ready():
             self._is_waiting = False
             self._future = self._client.call_async(question.request)
             self._future.add_done_callback(partial(self._answered, question.what))
-        elif self._is_waiting and age > DISCOVERY_PATIENCE:
+        elif self._is_waiting and age > DISCOVERY_TIMEOUT:
             self._is_waiting = False
-            self._say(
-                f'{question.what}: there is no service {self._name}; is controller_node '
+            self._show(
+                f'{question.what}: no service {self._name}; is controller_node '
                 'running, with this ROS_DOMAIN_ID and namespace?'
             )
-        elif self._future is not None and age > ANSWER_PATIENCE:
+        elif self._future is not None and age > ANSWER_TIMEOUT:
             self._forget()
-            self._say(
-                f'{question.what}: no answer of {self._name} within {ANSWER_PATIENCE:.0f} s; '
+            self._show(
+                f'{question.what}: no answer of {self._name} within {ANSWER_TIMEOUT:.0f} s; '
                 'does controller_node still run?'
             )
 
@@ -109,6 +109,6 @@ class CommandClient:
             return
         if response.success:
             self._granted(what)
-            self._say(f'{what}: {response.message or "done"}')
+            self._show(f'{what}: {response.message or "done"}')
         else:
-            self._say(f'{what} refused: {response.message}')
+            self._show(f'{what} refused: {response.message}')

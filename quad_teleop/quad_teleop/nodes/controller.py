@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The controller as the person's programs see it: what it is asked for, and what it says."""
+"""The controller as teleop programs see it: requests to it, and its reports."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ class Controller:
         mode: The mode that was granted last; None before.
     """
 
-    def __init__(self, node: Node, say: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, show: Callable[[str], None]) -> None:
         """Make the clients.
 
         Args:
             node: The node; somebody has to spin it for answers to arrive.
-            say: Is told the answers, and why there is none.
+            show: Receives the answers, and why there is none.
         """
         self.mode: Mode | None = None
         self._report: ControllerReport | None = None
-        self._modes = CommandClient(node, SetMode, 'set_mode', say, self._granted)
-        self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', say)
+        self._modes = CommandClient(node, SetMode, 'set_mode', show, self._granted)
+        self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', show)
         node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 10)
 
     def ask_mode(self, mode: Mode, now: float) -> None:
-        """Ask for a mode.
+        """Request a mode.
 
         Args:
             mode: Which.
             now: Time [s].
         """
-        self._modes.ask(mode.value, SetMode.Request(mode=mode.value), now)
+        self._modes.request(mode.value, SetMode.Request(mode=mode.value), now)
 
     def clear_fault(self, now: float) -> None:
         """Ask to forget the latched faults.
@@ -53,7 +53,7 @@ class Controller:
         Args:
             now: Time [s].
         """
-        self._faults.ask('clear fault', Trigger.Request(), now)
+        self._faults.request('clear fault', Trigger.Request(), now)
 
     def report(self, now: float) -> ControllerReport | None:
         """Return what the controller said last; None when that is long ago.

@@ -15,7 +15,7 @@ from ..body_pose import BodyPose
 from ..exceptions import SettingError
 from ..velocity import Velocity
 
-FLUSH_PATIENCE = Duration(nanoseconds=300_000_000)
+FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 
 
 class Outputs:
@@ -50,7 +50,7 @@ class Outputs:
         self.topics = [publisher.topic_name for publisher in self._publishers()]
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscriber(self) -> bool:
         """Whether anybody listens to the velocities."""
         return any(publisher.get_subscription_count() for publisher in self._publishers())
 
@@ -89,7 +89,7 @@ class Outputs:
     def flush(self) -> None:
         """Wait until what was published has arrived, before the program ends."""
         for publisher in self._publishers():
-            publisher.wait_for_all_acked(FLUSH_PATIENCE)
+            publisher.wait_for_all_acked(FLUSH_TIMEOUT)
 
     def _publishers(self) -> list[Publisher]:
         return [each for each in (self._twist, self._stamped) if each is not None]

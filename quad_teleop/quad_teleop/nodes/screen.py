@@ -22,12 +22,12 @@ class View:
 
     Attributes:
         mode: Mode that was granted last.
-        report: What the controller says of itself; None when it says nothing.
+        report: What the controller reports of itself; None when there is none.
         speeds: The speeds that are set.
         velocity: What is wanted now.
         pose: How the body shall stand.
         source: Who says when a key goes up.
-        is_heard: Whether anybody listens.
+        has_subscriber: Whether anybody listens.
     """
 
     mode: Mode | None
@@ -36,7 +36,7 @@ class View:
     velocity: Velocity | None
     pose: BodyPose
     source: ReleaseSource
-    is_heard: bool
+    has_subscriber: bool
 
 
 def status(view: View, colour: bool) -> str:
@@ -51,8 +51,8 @@ def status(view: View, colour: bool) -> str:
         (f'{view.speeds.linear:.2f} m/s {view.speeds.angular:.2f} rad/s', Style.BOLD),
         (_motion(view.velocity), Style.GREEN if view.velocity else Style.DIM),
     ]
-    if not view.is_heard:
-        parts.append(('nobody listens', Style.YELLOW))
+    if not view.has_subscriber:
+        parts.append(('no subscriber', Style.YELLOW))
     if view.pose != NEUTRAL:
         parts.append((_body(view.pose), Style.PLAIN))
     parts.append((RELEASE_WORDS[view.source], Style.DIM))
@@ -60,7 +60,7 @@ def status(view: View, colour: bool) -> str:
 
 
 def hint(view: View) -> str:
-    """Say why the robot may not move although it is asked to; empty for nothing to say.
+    """Return why the robot may not move although it is commanded to; empty for no reason.
 
     Args:
         view: What is shown.
@@ -68,7 +68,7 @@ def hint(view: View) -> str:
     report = view.report
     if report is not None and report.has_fault:
         return f'fault: {report.message}; Backspace clears it, 0 lies down'
-    if view.velocity is None or not view.is_heard:
+    if view.velocity is None or not view.has_subscriber:
         return ''
     moves = report.follows_velocities if report else view.mode is None or view.mode.moves
     if moves:

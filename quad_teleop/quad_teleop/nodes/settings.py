@@ -10,10 +10,13 @@ from node_runner import ParameterReader
 from operator_input import CommandStream
 
 from ..body_pose import PoseSteps
-from ..speeds import SLOWEST, Speeds
+from ..speeds import MIN_SPEED, Speeds
 from ..velocity import rest_of, Velocity
 
-FASTEST, FASTEST_TURN = 3.0, 10.0  # [m/s], [rad/s] of any legged robot that people drive by hand
+MAX_SPEED, MAX_TURN_SPEED = (
+    3.0,
+    10.0,
+)  # [m/s], [rad/s] of any legged robot that people drive by hand
 
 
 def declare_speeds(node: Node, prefix: str, default: Speeds) -> Speeds:
@@ -28,12 +31,12 @@ def declare_speeds(node: Node, prefix: str, default: Speeds) -> Speeds:
         ParameterError: A value is of another kind or out of its range.
         SettingError: The values make no sense together.
     """
-    read, low = ParameterReader(node), SLOWEST
+    read, low = ParameterReader(node), MIN_SPEED
     return Speeds(
-        read.number(f'{prefix}speed', default.linear, (low, FASTEST), 'Speed of walking [m/s]'),
-        read.number(f'{prefix}turn', default.angular, (low, FASTEST_TURN), 'of turning [rad/s]'),
-        _limit(node, 'speed_limit', default.linear_limit, FASTEST, 'Highest speed [m/s]'),
-        _limit(node, 'turn_limit', default.angular_limit, FASTEST_TURN, 'Highest turn [rad/s]'),
+        read.number(f'{prefix}speed', default.linear, (low, MAX_SPEED), 'Speed of walking [m/s]'),
+        read.number(f'{prefix}turn', default.angular, (low, MAX_TURN_SPEED), 'of turning [rad/s]'),
+        _limit(node, 'speed_limit', default.linear_limit, MAX_SPEED, 'Highest speed [m/s]'),
+        _limit(node, 'turn_limit', default.angular_limit, MAX_TURN_SPEED, 'Highest turn [rad/s]'),
     )
 
 
@@ -74,4 +77,4 @@ def declare_stream(node: Node) -> CommandStream[Velocity]:
 def _limit(node: Node, name: str, default: float, high: float, meaning: str) -> float:
     if node.has_parameter(name):  # one limit for normal and turbo
         return float(node.get_parameter(name).value)
-    return ParameterReader(node).number(name, default, (SLOWEST, high), meaning)
+    return ParameterReader(node).number(name, default, (MIN_SPEED, high), meaning)

@@ -26,7 +26,7 @@ NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
 
 
 class TeleopGamepad(GamepadNode):
-    """Publishes velocities and body poses, and asks for modes.
+    """Publishes velocities and body poses, and requests modes.
 
     Attributes:
         teleop: Decides what to publish.
@@ -76,7 +76,7 @@ class Session(GamepadSession[Velocity]):
         self._node.outputs.publish(command)
 
     def take(self, state: GamepadState) -> None:
-        """Do what the buttons ask for."""
+        """Do what the buttons request."""
         for request in self._node.teleop.feed(state):
             self._handle(request)
 

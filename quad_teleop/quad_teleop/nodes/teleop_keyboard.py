@@ -25,7 +25,7 @@ from .settings import declare_speeds, declare_steps, declare_stream
 
 
 class TeleopKeyboard(KeyboardNode):
-    """Publishes velocities and body poses, and asks for modes.
+    """Publishes velocities and body poses, and requests modes.
 
     Attributes:
         teleop: Decides what to publish.
@@ -95,7 +95,7 @@ class Session(KeyboardSession[Velocity, Request]):
             teleop.wanted(now),
             teleop.pose,
             self.keyboard.release_source,
-            self._node.outputs.is_heard,
+            self._node.outputs.has_subscriber,
         )
         text = hint(view)
         if text and text != self._hint:

@@ -21,7 +21,7 @@ from node_runner import destroyed_when_refused, ParameterReader, refuse_similar,
 from ..exceptions import CommandError, TeleopError
 from ..mux import Input, Inputs, Multiplexer, read_inputs
 
-WATCH_PERIOD = 0.05  # [s] between two looks whether the heard source fell silent
+WATCH_PERIOD = 0.05  # [s] between two looks whether the active source fell silent
 DIAGNOSTIC_PERIOD = 1.0  # [s]
 GROUPS = ('topics', 'locks')
 
@@ -116,7 +116,7 @@ class TwistMux(Node):
         return DiagnosticStatus(
             level=DiagnosticStatus.OK,
             name='twist_mux: Twist mux status',
-            message=f'{active.name} is heard' if active else 'no source is heard',
+            message=f'{active.name} is active' if active else 'no source is active',
             hardware_id='none',
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
