@@ -57,7 +57,12 @@ setup(
         sibling('libraries/urdf_reader'),
     ],
     extras_require={
-        'motion': ['numpy>=1.26', sibling('arm_model'), sibling('arm_servo')],
+        'motion': [
+            'numpy>=1.26',
+            sibling('arm_model'),
+            sibling('arm_servo'),
+            sibling('arm_trajectory'),
+        ],
         'ros': [
             sibling('canopen_sim'),
             sibling('libraries/node_runner'),
