@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What roboplan's Oink answers where a servo must not fail; arm_servo/README.md tells the result.
+"""What roboplan's Oink answers where a servo must not fail; arm_servo/README.md has the result.
 
 Run: ``python arm_servo/bench/oink_study.py`` in the sourced workspace; it needs
 roboplan-core and roboplan-oink.

@@ -28,7 +28,7 @@ class Elsewhere:
 
     Attributes:
         at: Where it is in [rad].
-        heard: Whether its state is published.
+        is_published: Whether its state is published.
         moves: Whether it goes to set-points.
         delay: How many set-points it is behind.
         sag: How far it stands below its set-points in [rad].
@@ -42,7 +42,7 @@ class Elsewhere:
         model = robot('gp110')
         self.now = 50.0
         self.at = np.array(ready('gp110'))
-        self.heard = True
+        self.is_published = True
         self.moves = True
         self.delay = 0
         self.sag = 0.0
@@ -67,7 +67,7 @@ class Elsewhere:
         """Run some cycles."""
         for _ in range(cycles):
             self.now += PERIOD
-            if self.heard:
+            if self.is_published:
                 at = (self.at - self.sag).tolist()
                 self.feedback.receive(self.gateway.model.joints, at, [], self.now)
             self.cycle.step(self.now, PERIOD)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The other end of the programs for jogging: hears commands, and answers as a servo node."""
+"""The other end of the programs for jogging: receives commands, and answers as a servo node."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from moveit_msgs.srv import ServoCommandType
 from ros_client import RosClient
 from std_srvs.srv import SetBool
 
-PATIENCE = 30.0  # [s] of a test on a busy machine
+TIMEOUT = 30.0  # [s] of a test on a busy machine
 
 Twist = tuple[str, tuple[float, ...]]
 
@@ -52,7 +52,7 @@ class ServoListener:
         self._status.publish(ServoStatus(code=code, message=message))
 
     @property
-    def heard(self) -> list[Twist]:
+    def received(self) -> list[Twist]:
         """Frame and numbers of each twist."""
         return [(each.header.frame_id, _numbers(each)) for each in self.twists]
 
@@ -63,7 +63,7 @@ class ServoListener:
 
     def _pause(self, request: Any, response: Any) -> Any:
         self.pauses.append(request.data)
-        response.success, response.message = True, 'as you wish'
+        response.success, response.message = True, 'done'
         return response
 
 

@@ -84,7 +84,7 @@ def test_an_arm_comes_back_from_the_border_on_the_same_side(
 
 
 @pytest.mark.parametrize('name', ROBOTS)
-def test_what_is_told_at_the_border_is_what_happens(name: str) -> None:
+def test_what_is_reported_at_the_border_is_what_happens(name: str) -> None:
     """Pushing on, the tool stands still, and the report says that nothing is left of its speed."""
     jogger = Jogger(name, 0.01, 0.0)
     while jogger.jog(0.1) > STUCK * 0.1 or jogger.now < 0.5:

@@ -13,7 +13,7 @@ from model_robots import texts
 import pytest
 import rclpy
 from ros_client import RosClient
-from servo_listener import PATIENCE, ServoListener
+from servo_listener import ServoListener, TIMEOUT
 
 from arm_servo.teleop.servo_gamepad import ServoGamepad, Session
 from operator_input.ros import run_session
@@ -42,7 +42,9 @@ def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
         with RosClient(isolation.domain_id, 'servo_node') as client:
             servo = ServoListener(client, *texts('gp110'))
             client.spin_until(
-                lambda: node.link.is_heard and node.link.scales.linear == 0.2, PATIENCE, 'link'
+                lambda: node.link.has_subscriber and node.link.scales.linear == 0.2,
+                TIMEOUT,
+                'link',
             )
             yield servo
     finally:
@@ -56,14 +58,14 @@ def test_deadman_stick_turbo_and_release(pad: InjectedDevice, servo: ServoListen
     pad.move(ABS_Y, -32768)
     pad.press(LEFT_SHOULDER)
     forward, fast = (0.06, 0.0, 0.0, 0.0, 0.0, 0.0), (0.2, 0.0, 0.0, 0.0, 0.0, 0.0)
-    servo.client.spin_until(lambda: ('base_link', forward) in servo.heard, PATIENCE, 'motion')
-    assert servo.heard[0] == ('base_link', forward), 'nothing before the deadman'
+    servo.client.spin_until(lambda: ('base_link', forward) in servo.received, TIMEOUT, 'motion')
+    assert servo.received[0] == ('base_link', forward), 'nothing before the deadman'
     pad.press(RIGHT_SHOULDER)
-    servo.client.spin_until(lambda: ('base_link', fast) in servo.heard, PATIENCE, 'turbo')
+    servo.client.spin_until(lambda: ('base_link', fast) in servo.received, TIMEOUT, 'turbo')
     pad.release(RIGHT_SHOULDER)
     pad.release(LEFT_SHOULDER)
     rest = ('base_link', (0.0,) * 6)
-    servo.client.spin_until(lambda: servo.heard[-3:] == [rest] * 3, PATIENCE, 'rest')
+    servo.client.spin_until(lambda: servo.received[-3:] == [rest] * 3, TIMEOUT, 'rest')
 
 
 def test_frames_and_joints(pad: InjectedDevice, servo: ServoListener) -> None:
@@ -71,12 +73,12 @@ def test_frames_and_joints(pad: InjectedDevice, servo: ServoListener) -> None:
     pad.press(LEFT_SHOULDER)
     pad.press(START)
     pad.move(ABS_X, -32768)
-    servo.client.spin_until(lambda: bool(servo.twists), PATIENCE, 'motion')
-    assert servo.heard[0] == ('tool0', (0.0, 0.06, 0.0, 0.0, 0.0, 0.0))
+    servo.client.spin_until(lambda: bool(servo.twists), TIMEOUT, 'motion')
+    assert servo.received[0] == ('tool0', (0.0, 0.06, 0.0, 0.0, 0.0, 0.0))
     pad.move(ABS_X, 0)
     pad.press(EAST)
     pad.move(ABS_HAT0Y, -1)
-    servo.client.spin_until(lambda: bool(servo.jogs), PATIENCE, 'joint')
+    servo.client.spin_until(lambda: bool(servo.jogs), TIMEOUT, 'joint')
     assert list(servo.jogs[0].joint_names) == ['joint_2_l']
     assert list(servo.jogs[0].velocities) == [pytest.approx(0.15)]
 
@@ -85,6 +87,6 @@ def test_pad_unplugged_while_moving(pad: InjectedDevice, servo: ServoListener) -
     """The cable is pulled with the deadman held: rests leave."""
     pad.press(LEFT_SHOULDER)
     pad.move(ABS_Y, -32768)
-    servo.client.spin_until(lambda: bool(servo.twists), PATIENCE, 'motion')
+    servo.client.spin_until(lambda: bool(servo.twists), TIMEOUT, 'motion')
     pad.unplug()
-    servo.client.spin_until(lambda: servo.heard[-1][1] == (0.0,) * 6, PATIENCE, 'rest')
+    servo.client.spin_until(lambda: servo.received[-1][1] == (0.0,) * 6, TIMEOUT, 'rest')

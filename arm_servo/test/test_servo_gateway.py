@@ -321,7 +321,7 @@ def test_zeros_of_another_client_do_not_touch_a_jog() -> None:
 
 
 def test_displacements_by_nothing_change_nothing() -> None:
-    """Neither a trajectory, nor a jog, nor a drive that somebody halted; what is wrong is told."""
+    """Neither a trajectory, nor a jog, nor a halted drive; what is wrong is reported."""
     drives = ready()
     command = drives.gateway.request(wave(drives, 20))
     begun(drives, command)

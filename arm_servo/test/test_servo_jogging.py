@@ -63,7 +63,7 @@ def holds_up(model: RobotModel, state: RobotState, limiter: Limiter) -> bool:
     return limiter.cause is Cause.JOINT_POSITION and bool(ways.min() < AT_BOUND)
 
 
-def moves_or_tells(model: RobotModel, result: Run, twist: Array) -> bool:
+def moves_or_reports(model: RobotModel, result: Run, twist: Array) -> bool:
     """Whether the tool moved as asked by a twentieth, or the cause that is named is so."""
     axis = int(np.argmax(np.abs(twist)))
     asked = twist[axis] * PERIOD * (len(result.states) - 1)
@@ -112,7 +112,7 @@ def test_no_trap_in_the_straight_pose(name: str, twist: Array) -> None:
     """From the singular pose each direction moves, or the report names what is lost."""
     model = robot(name)
     result = run(model, STRAIGHT[name], TwistCommand(twist), 1.0)
-    assert moves_or_tells(model, result, twist)
+    assert moves_or_reports(model, result, twist)
     kept(model, result)
 
 
@@ -135,7 +135,7 @@ def test_no_trap_at_a_joint_limit(name: str, twist: Array) -> None:
     start = np.array(ready(name))
     start[4] = model.limits.upper[4]
     result = run(model, start, TwistCommand(twist), 1.0)
-    assert moves_or_tells(model, result, twist)
+    assert moves_or_reports(model, result, twist)
     kept(model, result)
 
 
@@ -175,7 +175,7 @@ def test_no_trap_in_contact(name: str, twist: Array) -> None:
     before = model.clearance(start)
     assert before < 0.005
     result = run(model, start, TwistCommand(twist), 1.0)
-    assert moves_or_tells(model, result, twist)
+    assert moves_or_reports(model, result, twist)
     assert model.clearance(result.states[-1].position) > min(before, 0.004) - 1e-3
     kept(model, result)
 

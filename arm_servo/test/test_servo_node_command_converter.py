@@ -72,7 +72,7 @@ def test_unitless_numbers_are_shares_of_the_scales() -> None:
 
 
 def test_speeds_are_taken_as_they_are_up_to_the_cap() -> None:
-    """The direction is kept, and what was cut off is told."""
+    """The direction is kept, and what was cut off is reported."""
     made = converter(SPEED)
     reached, _ = tool_twist(made, twist([0, 0.05, 0.05, 0, 0, 0]))
     assert reached == pytest.approx([0, 0.05, 0.05, 0, 0, 0], abs=1e-3)

@@ -181,7 +181,7 @@ def test_a_command_that_waited_too_long_is_refused() -> None:
         command.future.result(0.0)
 
 
-def test_a_defect_of_the_core_is_told_and_latched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_defect_of_the_core_is_reported_and_latched(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bus learns of it and detaches the source, which then has to be attached again."""
     drives = attached()
 
@@ -254,7 +254,7 @@ def test_a_drive_on_its_way_to_a_single_target_is_waited_for_or_halted() -> None
     )
 
 
-def test_the_cause_is_told_and_not_what_followed_from_it() -> None:
+def test_the_cause_is_reported_and_not_what_followed_from_it() -> None:
     """A master that shuts down disables the drives: that they are disabled is a consequence."""
     drives = attached()
     command = swing(drives)

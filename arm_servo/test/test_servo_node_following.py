@@ -35,7 +35,7 @@ def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> No
 
 
 def test_a_stream_of_commands_does_not_start_it_again() -> None:
-    """Who lets go and commands again begins where the arm is; who does not is told why."""
+    """Who lets go and commands again begins where the arm is; who does not gets the reason."""
     arm = Elsewhere()
     arm.run(5)
     arm.moves = False
@@ -78,26 +78,26 @@ def test_an_arm_that_is_late_follows(delay: int) -> None:
 
 
 def test_no_limit_lets_it_run() -> None:
-    """An error of 0 switches it off, for drives that tell no positions of their own."""
+    """An error of 0 switches it off, for drives that report no positions of their own."""
     arm = Elsewhere(FollowingLimits(0.0))
     arm.run(5)
     arm.moves = False
     assert jog(arm, 200) == []
 
 
-def test_silence_is_told_as_silence() -> None:
+def test_silence_is_reported_as_silence() -> None:
     """Joint states that are lost in motion are named as such, not as an arm that is stuck."""
     arm = Elsewhere(FollowingLimits(0.01, 0.0))
     arm.run(5)
     jog(arm, 50, 2.0)
-    arm.heard = False
+    arm.is_published = False
     refusals = jog(arm, 60, 2.0)
     assert refusals
     assert all('no joint states' in refusal for refusal in refusals)
 
 
 def test_continuous_joints_may_be_whole_turns_off() -> None:
-    """A driver that tells angles between -pi and pi follows, too."""
+    """A driver that reports angles between -pi and pi follows, too."""
     endless = np.array([math.inf])
     one = np.ones(1)
     watch = FollowingWatch(

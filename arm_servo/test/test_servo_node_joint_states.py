@@ -45,7 +45,7 @@ def test_a_cycle_that_stands_still_makes_no_new_states() -> None:
 
 
 def test_a_drive_that_is_silent_is_left_out() -> None:
-    """Its last position is not told for the present one; the others go on."""
+    """Its last position does not pass for the present one; the others go on."""
     drives, samples = ready()
     drives.axes[2] = replace(drives.axes[2], age=0.3)
     drives.run()
@@ -73,7 +73,7 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
     rclpy.init(domain_id=isolation.domain_id)
     drives, _ = ready()
     drives.axes[2] = replace(drives.axes[2], age=0.3)
-    heard: list[JointState] = []
+    received: list[JointState] = []
     nodes: list[Any] = [Node('joint_state_broadcaster'), Node('gripper')]
     node, gripper = nodes
     try:
@@ -81,12 +81,12 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
             node, drives.gateway, ['gripper'], {'finger': Mimic('gripper', -2.0, 1.0)}, active=True
         )
         publisher = gripper.create_publisher(JointState, 'gripper/joint_states', 10)
-        gripper.create_subscription(JointState, 'joint_states', heard.append, 10)
+        gripper.create_subscription(JointState, 'joint_states', received.append, 10)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
         executor.add_node(gripper)
         deadline = time.monotonic() + 30.0
-        while not any('gripper' in message.name for message in heard):
+        while not any('gripper' in message.name for message in received):
             drives.now = time.monotonic() - PERIOD
             drives.run()
             publisher.publish(JointState(name=['gripper'], position=[0.04], velocity=[0.0]))
@@ -96,7 +96,7 @@ def test_a_gripper_is_published_with_the_arm(isolation: Isolation) -> None:
         for each in nodes:
             each.destroy_node()
         rclpy.shutdown()
-    whole = next(message for message in heard if 'gripper' in message.name)
+    whole = next(message for message in received if 'gripper' in message.name)
     assert [*whole.name] == [*drives.source.axes, 'gripper', 'finger']
     assert [*whole.position[-2:]] == pytest.approx([0.04, 0.92])
     age = time.time() - (whole.header.stamp.sec + 1e-9 * whole.header.stamp.nanosec)

@@ -63,7 +63,7 @@ def test_it_begins_where_others_have_moved_the_arm_by_little(aside: float) -> No
     assert np.abs(arm.path()[sent] - before).max() < 1e-4
 
 
-def test_an_arm_that_stands_a_little_off_is_not_told_to_go_there() -> None:
+def test_an_arm_that_stands_a_little_off_is_not_sent_there() -> None:
     """What a drive lacks to its set-point at rest does not shift the next motion."""
     arm = Elsewhere()
     arm.run(5)
@@ -83,7 +83,7 @@ def test_an_arm_that_stands_a_little_off_is_not_told_to_go_there() -> None:
 
 
 def test_a_cycle_that_raises_is_the_end_and_the_arm_comes_to_rest() -> None:
-    """The thread tells of the error, and brakes without the core before it ends."""
+    """The thread reports the error, and brakes without the core before it ends."""
     arm = Elsewhere()
     arm.run(5)
     jog(arm, 30)
@@ -130,7 +130,7 @@ def test_a_stall_is_no_burst_of_cycles() -> None:
 def test_commands_are_refused_before_the_first_joint_state() -> None:
     """The reason names the joints that are silent."""
     arm = Elsewhere()
-    arm.heard = False
+    arm.is_published = False
     future = jog_joints(arm.gateway, {'joint_1_s': 0.1}, arm.now)
     arm.run()
     with pytest.raises(NotReadyError, match='no joint states of'):
@@ -144,7 +144,7 @@ def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
     goal = swing(arm, 0.5)
     command = arm.gateway.request(goal)
     arm.run(80)
-    arm.heard = False
+    arm.is_published = False
     arm.run(200)
     ending = outcome(command)
     assert ending.code is GoalCode.INVALID_GOAL
@@ -155,7 +155,7 @@ def test_the_arm_comes_to_rest_on_its_path_when_joint_states_are_lost() -> None:
     jumps = np.abs(np.diff(speeds, axis=0)) / PERIOD
     assert (jumps.max(axis=0) < 1.01 * arm.gateway.model.limits.acceleration).all()
     assert not arm.points[-1].state.moving
-    arm.heard = True
+    arm.is_published = True
     arm.run(5)
     assert arm.gateway.snapshot.blocked == ''
 

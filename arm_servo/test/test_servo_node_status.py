@@ -57,7 +57,7 @@ def test_a_free_jog_has_no_warning() -> None:
     assert codes(drives, 60)[-1] == (StatusCode.NO_WARNING, 'free')
 
 
-def test_a_jog_to_a_joint_limit_is_told() -> None:
+def test_a_jog_to_a_joint_limit_is_reported() -> None:
     """With the joint, as soon as it is slowed down."""
     drives = attached()
     jog(drives.gateway, {'panda_joint1': 2.0}, drives.now, 60.0)
@@ -78,7 +78,7 @@ def test_a_jog_into_contact_is_slowed_down_and_then_halted() -> None:
     assert 'panda_hand' in words
 
 
-def test_a_direction_that_is_lost_is_told() -> None:
+def test_a_direction_that_is_lost_is_reported() -> None:
     """The straight arm cannot go sideways without its elbow."""
     drives = attached('gp110', STRAIGHT['gp110'].tolist())
     twist(drives.gateway, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], drives.now, 60.0)
@@ -109,7 +109,7 @@ def test_a_stop_of_the_safety_filter_is_no_free_motion() -> None:
     assert core.model.clearance(core.state.position) > 0.004
 
 
-def test_what_stops_a_trajectory_is_told_too() -> None:
+def test_what_stops_a_trajectory_is_reported_too() -> None:
     """The safety filter holds whatever moves the arm; its code is not only the jog's."""
     drives = attached()
     move_by(drives.gateway, {'panda_joint1': 0.3})
@@ -141,7 +141,7 @@ def test_a_refusal_comes_before_everything_else() -> None:
     assert status_of(drives.gateway.snapshot, 'stale', 'paused', 'cut') == (-1, 'stale')
 
 
-def test_a_cycle_that_stands_still_is_told() -> None:
+def test_a_cycle_that_stands_still_is_reported() -> None:
     """What the last cycle said is not repeated for ever."""
     drives = attached()
     code, words = status_of(drives.gateway.snapshot, '', '', '', 3.0)
@@ -159,7 +159,7 @@ def test_a_blocked_arm_says_so() -> None:
     assert 'panda_joint1' in words
 
 
-def test_it_tells_what_moves_the_arm() -> None:
+def test_it_reports_what_moves_the_arm() -> None:
     """Also while nobody jogs."""
     drives = attached()
     assert status_of(drives.gateway.snapshot, '', '', '') == (StatusCode.NO_WARNING, 'ready')
@@ -172,7 +172,7 @@ def test_it_tells_what_moves_the_arm() -> None:
 
 
 @pytest.mark.parametrize('paused', [False, True])
-def test_a_pause_of_the_arm_is_told(paused: bool) -> None:
+def test_a_pause_of_the_arm_is_reported(paused: bool) -> None:
     """Jogging is refused then, and the message names the service that ends it."""
     drives = attached()
     if paused:

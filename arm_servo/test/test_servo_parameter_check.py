@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes would refuse of a parameter file is told without them."""
+"""What the nodes would refuse of a parameter file is reported without them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def refused(node: str, **parameters: object) -> list[tuple[str, str]]:
         ('/joint_state_broadcaster', {'update_rate': 'often'}, "'often'"),
     ],
 )
-def test_each_mistake_is_told_in_the_words_of_the_node(
+def test_each_mistake_is_reported_in_the_words_of_the_node(
     node: str, parameters: dict[str, object], words: str
 ) -> None:
     """The node is named, and no other one complains."""

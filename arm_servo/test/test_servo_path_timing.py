@@ -309,5 +309,5 @@ def test_what_is_late_counts_from_the_last_time_from_start(
     follow(core, execution)
     assert execution.ending is not None
     found = re.search(r'(\S+) s later than requested', execution.ending.reason)
-    told = float(found[1]) if found else 0.0
-    assert told == pytest.approx(execution.duration - asked, abs=0.011)
+    reported = float(found[1]) if found else 0.0
+    assert reported == pytest.approx(execution.duration - asked, abs=0.011)

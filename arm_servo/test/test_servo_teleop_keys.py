@@ -204,13 +204,13 @@ def test_a_tap_without_releases_moves_a_fifth_of_the_way() -> None:
         assert jog.velocity == pytest.approx(0.5 if number else 0.1)
 
 
-def test_a_joint_that_there_is_not_is_told_once_while_its_key_repeats() -> None:
+def test_a_joint_that_there_is_not_is_reported_once_while_its_key_repeats() -> None:
     """Without releases each repeat is a stroke of its own; the help stays in sight."""
     teleop = make()
     teleop.joints = 6
-    told: list[object] = []
+    reported: list[object] = []
     for number in range(40):
-        told += teleop.feed(KeyEvent('7', KeyAction.TYPED, 0.05 * number))
-    assert len(told) == 1
+        reported += teleop.feed(KeyEvent('7', KeyAction.TYPED, 0.05 * number))
+    assert len(reported) == 1
     assert len(teleop.feed(KeyEvent('7', KeyAction.TYPED, 4.0))) == 1
     assert len(teleop.feed(KeyEvent('8', KeyAction.TYPED, 4.1))) == 1

@@ -13,7 +13,7 @@ from isolation import Isolation
 from model_robots import texts
 import pytest
 from ros_client import RosClient
-from servo_listener import PATIENCE, ServoListener
+from servo_listener import ServoListener, TIMEOUT
 from tmux_pane import Pane
 
 pytestmark = [
@@ -45,13 +45,15 @@ def servo(isolation: Isolation) -> Iterator[ServoListener]:
 
 def wait_on_screen(servo: ServoListener, pane: Pane, pattern: str) -> None:
     """Wait until something is on the screen, and serve the servo meanwhile."""
-    servo.client.spin_until(lambda: bool(re.search(pattern, pane.screen())), PATIENCE, pattern)
+    servo.client.spin_until(lambda: bool(re.search(pattern, pane.screen())), TIMEOUT, pattern)
 
 
 def wait_for_rest(servo: ServoListener, begin: int) -> None:
     """Wait for the three rests that end a motion of the tool."""
     servo.client.spin_until(
-        lambda: [values for _, values in servo.heard[begin:]][-3:] == [REST] * 3, PATIENCE, 'rest'
+        lambda: [values for _, values in servo.received[begin:]][-3:] == [REST] * 3,
+        TIMEOUT,
+        'rest',
     )
 
 
@@ -62,17 +64,17 @@ def test_jogging_with_real_key_presses(pane: Pane, servo: ServoListener) -> None
 
     pane.press('Up')
     wait_for_rest(servo, 0)
-    assert servo.heard[0] == ('base_link', (0.02, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert servo.received[0] == ('base_link', (0.02, 0.0, 0.0, 0.0, 0.0, 0.0))
 
     count = len(servo.twists)
     pane.press('e', '\\;')  # of tmux
     wait_for_rest(servo, count)
-    assert servo.heard[count] == ('tool0', (0.0, 0.0, 0.02, 0.0, 0.0, 0.0))
+    assert servo.received[count] == ('tool0', (0.0, 0.0, 0.02, 0.0, 0.0, 0.0))
 
     pane.press('R', '6')
     servo.client.spin_until(
         lambda: [list(each.velocities) for each in servo.jogs][-3:] == [[0.0]] * 3,
-        PATIENCE,
+        TIMEOUT,
         'rest',
     )
     assert list(servo.jogs[0].joint_names) == ['joint_6_t']
@@ -81,12 +83,12 @@ def test_jogging_with_real_key_presses(pane: Pane, servo: ServoListener) -> None
     wait_on_screen(servo, pane, 'the arm has 6 joints: there is no joint 7')
 
     pane.press('J', 't', 'p')
-    wait_on_screen(servo, pane, 'pause: as you wish')
+    wait_on_screen(servo, pane, 'pause: done')
     wait_on_screen(servo, pane, r'paused +\|')
     assert servo.types == [0, 1]
     assert servo.pauses == [True]
     pane.press('p')
-    wait_on_screen(servo, pane, 'go on: as you wish')
+    wait_on_screen(servo, pane, 'go on: done')
 
     servo.say(6, 'joint limit: joint_5_b')
     wait_on_screen(servo, pane, r'joint limit: joint_5_b +\|')
@@ -100,9 +102,9 @@ def test_held_key_moves_until_it_is_released(pane: Pane, servo: ServoListener) -
     wait_on_screen(servo, pane, LINKED)
     for _ in range(10):
         pane.press('Left')
-        servo.client.spin_until(lambda: True, PATIENCE, '')
+        servo.client.spin_until(lambda: True, TIMEOUT, '')
     wait_for_rest(servo, 0)
-    values = [numbers for _, numbers in servo.heard]
+    values = [numbers for _, numbers in servo.received]
     assert values[-3:] == [REST] * 3
     slow, fast = ((0.0, -speed, 0.0, 0.0, 0.0, 0.0) for speed in (0.02, 0.1))
     assert fast in values

@@ -286,7 +286,7 @@ def test_nodes_begin_with_upstream_parameters(
     file.write_text(yaml.dump(document(**nodes), Dumper=NoAliases), encoding='utf-8')
     rclpy.init(args=['--ros-args', '--params-file', str(file)], domain_id=isolation.domain_id)
     made: list[Any] = []
-    told: list[str] = []
+    reported: list[str] = []
 
     def make_node(name: str) -> Node:
         node = Node(name)
@@ -297,7 +297,7 @@ def test_nodes_begin_with_upstream_parameters(
         build_motion(make_node, offers)
         for node in made:
             sheet: Any = SimpleNamespace(
-                get_logger=lambda: SimpleNamespace(info=told.append),
+                get_logger=lambda: SimpleNamespace(info=reported.append),
                 get_parameters_by_prefix=node.get_parameters_by_prefix,
                 has_parameter=node.has_parameter,
                 _parameter_overrides=node._parameter_overrides,
@@ -307,9 +307,9 @@ def test_nodes_begin_with_upstream_parameters(
         for node in made:
             node.destroy_node()
         rclpy.shutdown()
-    assert len(told) == len(made)
-    assert any('moveit_servo.use_smoothing' in line for line in told)
-    assert not any('moveit_servo.check_collisions' in line for line in told)
+    assert len(reported) == len(made)
+    assert any('moveit_servo.use_smoothing' in line for line in reported)
+    assert not any('moveit_servo.check_collisions' in line for line in reported)
 
 
 def servo_parameters(**values: object) -> ServoParameters:

@@ -213,7 +213,7 @@ class CommandGateway:
                 if isinstance(request, JogRequest) and not self._core.ignores(request):
                     self._admit(Source.JOG, number, since, cycle)
                 self._core.commit(prepared, cycle.now)
-            except Exception as error:  # noqa: BLE001  # whoever commanded it is told
+            except Exception as error:  # noqa: BLE001  # its future carries it
                 future.set_exception(error)
                 return True
             if isinstance(request, JogRequest) and not request.is_zero:
@@ -512,7 +512,7 @@ class CommandGateway:
             else:
                 self._refuse(command, error)
             return False
-        except (Exception, CancelledError) as error:  # noqa: BLE001  # whoever requested it is told
+        except (Exception, CancelledError) as error:  # noqa: BLE001  # its future carries it
             self._refuse(command, error)
             return False
         return True

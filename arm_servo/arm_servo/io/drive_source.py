@@ -140,7 +140,7 @@ class DriveSource:
 
 
 def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:
-    """Return what the drives measure; None while one of them has told nothing yet.
+    """Return what the drives measure; None while one of them has sent nothing yet.
 
     Args:
         feedback: State of each drive.

@@ -53,7 +53,7 @@ class JointFeedback:
 
     @property
     def time(self) -> float:
-        """Steady time since which every joint was heard in [s]."""
+        """Steady time since which every joint was received in [s]."""
         return min(time for _, _, time in self._values)
 
     def state(self, now: float) -> tuple[RobotState | None, str]:

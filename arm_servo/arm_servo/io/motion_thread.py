@@ -122,7 +122,7 @@ class MotionCycle:
             self._begin(position)
         if self._quiet:
             return ''
-        if self._feedback.time == self._compared:  # nothing new was heard
+        if self._feedback.time == self._compared:  # nothing new was received
             return ''
         self._compared = self._feedback.time
         self._failure, self._failed = self._watch.problem(position), now
@@ -193,7 +193,7 @@ class MotionThread:
         try:
             self._begin()
             self._cycles(self._cycle.step, self._ends)
-        except Exception as error:  # noqa: BLE001  # the program tells it, and ends
+        except Exception as error:  # noqa: BLE001  # the program logs it, and ends
             self.error = error
             self._failed()
             with suppress(Exception):  # what has failed may be the output

@@ -30,7 +30,7 @@ MAX_STEP_MOTION = 0.05
 """Motion of a joint between two steps from which on something else moved the arm in [rad]."""
 
 MIN_SIDE_DISTANCE = 1e-3
-"""Least distance along a way out that tells on which side of a singular pose one is in [rad]."""
+"""Least distance along a way out that shows on which side of a singular pose one is in [rad]."""
 
 MAX_SINGULAR_VALUE_RATE = 3.0
 """Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""

@@ -8,7 +8,7 @@ import math
 import re
 
 STATUS_PERIOD = 0.5
-"""How long a refusal is told in the status in [s]."""
+"""How long a refusal stands in the status in [s]."""
 
 REPEAT_PERIOD = 5.0
 """Time without a refusal after which one that was logged is logged again in [s]."""
@@ -18,7 +18,7 @@ NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
 
 
 class Refusals:
-    """Remembers the last refusal; any thread may note one, a single thread tells."""
+    """Remembers the last refusal; any thread may note one, a single thread reports."""
 
     def __init__(self) -> None:
         """Nothing was refused yet."""

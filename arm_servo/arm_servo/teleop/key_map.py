@@ -55,7 +55,7 @@ HELP = """\
     right left   y                     d c  about y          R  other direction
     ;  .         z                     f v  about z
   W base axes  E tool axes    + -  speed    M  single steps    P  pause, go on
-  J joint, T twist commands only (MoveIt's servo wants to be told)    ?  this help
+  J joint, T twist commands only (MoveIt's servo needs the choice)    ?  this help
   Space, letting go, any other key stop     Q or Ctrl-C quits\
 """
 """The map, for the eye: plain characters, fits into 82 columns."""

@@ -42,7 +42,7 @@ from .scales import Scales, Steps
 SPEED_STEP_FACTOR = 1.25  # of a speed key
 MIN_SPEED = 0.01  # share of full speed
 TAP_SPEED_FACTOR = 0.2  # while a key may be up already: without releases that takes 0.5 s
-NOTE_PERIOD = 1.0  # [s] in which a stroke that moves nothing is not told again
+NOTE_PERIOD = 1.0  # [s] in which a stroke that moves nothing is not reported again
 
 REQUESTS: dict[str, Request] = {
     HELP_KEY: Note(HELP),
@@ -98,7 +98,7 @@ class KeyboardTeleop:
         self._held = held
         self._stream = stream
         self._step: tuple[Jog, float] | None = None  # motion, end [s]
-        self._told = ('', 0.0)  # a key that moves nothing, and when it was struck last [s]
+        self._last_note = ('', 0.0)  # a key that moves nothing, and when it was struck last [s]
 
     def wanted(self, now: float) -> Jog | None:
         """Return the motion that is wanted; None when no key asks for one.
@@ -174,10 +174,10 @@ class KeyboardTeleop:
 
     def _no_joint(self, event: KeyEvent) -> list[Request]:
         self._let_go()
-        again = self._told[0] == event.key and event.time < self._told[1] + NOTE_PERIOD
+        again = self._last_note[0] == event.key and event.time < self._last_note[1] + NOTE_PERIOD
         if not event.is_stroke or event.action is KeyAction.REPEATED:
             return []
-        self._told = event.key, event.time
+        self._last_note = event.key, event.time
         return [Note(f'the arm has {self.joints} joints: there is no joint {event.key}')] * (
             not again
         )

@@ -19,7 +19,7 @@ class CommandType(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class SwitchType:
-    """Tell the servo which kind of command comes.
+    """Choose in the servo which kind of command comes.
 
     Attributes:
         command_type: Which.

@@ -21,7 +21,7 @@ class Scales:
         linear: Of the tool [m/s].
         rotational: Of the tool [rad/s].
         joint: Of a joint [rad/s].
-        unitless: The servo multiplies by these itself; else it is told speeds.
+        unitless: The servo multiplies by these itself; else it receives speeds.
     """
 
     linear: float = 0.4

@@ -43,7 +43,7 @@ class View:
         paused: The servo is paused.
         jog: What is wanted now.
         source: Who says when a key goes up.
-        is_heard: Whether anybody listens.
+        has_subscriber: Whether anything subscribes.
     """
 
     servo: ServoView | None
@@ -56,7 +56,7 @@ class View:
     paused: bool
     jog: Jog | None
     source: ReleaseSource
-    is_heard: bool
+    has_subscriber: bool
 
 
 def status(view: View, colour: bool) -> str:
@@ -75,7 +75,7 @@ def status(view: View, colour: bool) -> str:
     ]
     if view.stepping:
         parts.append(('steps', Style.YELLOW))
-    if not view.is_heard:
+    if not view.has_subscriber:
         parts.append(('nobody listens', Style.YELLOW))
     parts.append((RELEASE_WORDS[view.source], Style.DIM))
     return status_text(parts, colour=colour)

@@ -98,7 +98,7 @@ class Session(KeyboardSession[Jog, Request]):
             link.paused,
             teleop.wanted(now),
             self.keyboard.release_source,
-            link.is_heard,
+            link.has_subscriber,
         )
         self.line.show(status(view, self.colour))
 

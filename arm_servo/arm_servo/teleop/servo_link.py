@@ -99,7 +99,7 @@ class ServoLink:
         self.paused = False
         self._node, self._servo, self._say = node, servo, say
         self._urdf = ''
-        self._told: ServoSettings = ServoSettings()
+        self._received: ServoSettings = ServoSettings()
         self._status: tuple[ServoView, float] | None = None
         self._complained = ''
         self._twist: Publisher = node.create_publisher(
@@ -116,7 +116,7 @@ class ServoLink:
         node.create_subscription(JointState, 'joint_states', self._take_joints, 10)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscriber(self) -> bool:
         """Whether anybody listens."""
         return any(each.get_subscription_count() for each in (self._twist, self._jog))
 
@@ -161,7 +161,7 @@ class ServoLink:
         self._twist.publish(twist)
 
     def switch(self, command_type: CommandType) -> None:
-        """Tell the servo which kind of command comes.
+        """Choose in the servo which kind of command comes.
 
         Args:
             command_type: Which.
@@ -215,13 +215,13 @@ class ServoLink:
         self._complained = text
 
     def _learn(self, settings: ServoSettings) -> None:
-        self._told = settings
+        self._received = settings
         self.scales = settings.scales()
         self._name()
 
     def _name(self) -> None:
         try:
-            names = self._told.names(self._urdf)
+            names = self._received.names(self._urdf)
         except ModelError as error:
             self._complain(str(error))
             return

@@ -60,7 +60,7 @@ class ServoSettings:
         return not self.unanswered
 
     def scales(self) -> Scales:
-        """Return its full speeds; those that it did not tell are moveit_servo's defaults."""
+        """Return its full speeds; those that it did not answer are moveit_servo's defaults."""
         default = Scales()
         return Scales(
             _positive(self.values, 'scale.linear', default.linear),
@@ -73,7 +73,7 @@ class ServoSettings:
         """Return the names of the arm's parts.
 
         Args:
-            urdf: The description from /robot_description, for a servo that tells none.
+            urdf: The description from /robot_description, for a servo that has none.
 
         Raises:
             ModelError: The texts make no arm.

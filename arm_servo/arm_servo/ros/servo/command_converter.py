@@ -132,7 +132,7 @@ class CommandConverter:
         return self._frames.link(frame) or self._frames.pose(frame)
 
     def _scaled(self, twist: Array) -> Array:
-        """Return a twist in [m/s] and [rad/s]; what is cut off is told."""
+        """Return a twist in [m/s] and [rad/s]; what is cut off is in ``capped``."""
         scales = self.scales
         most = np.array([scales.linear, scales.rotational])
         if scales.units is Units.UNITLESS:

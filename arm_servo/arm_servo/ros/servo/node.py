@@ -103,7 +103,7 @@ class Servo:
         if not request.is_zero:
             self._last = begin
         if isinstance(request, JogRequest):
-            # the events executor hands out no publisher, so topic and frame tell who asks
+            # the events executor hands out no publisher, so topic and frame stand for the client
             request = replace(request, client=(kind, message.header.frame_id))
             self._gateway.command(request).add_done_callback(self._note)
             return

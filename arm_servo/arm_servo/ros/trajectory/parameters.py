@@ -22,7 +22,7 @@ GOAL_TOLERANCE = 0.05
 """Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
 
 GOAL_TIME = 5.0
-"""Default of the time to come within it in [s]: who waits for a stuck arm is told in the end."""
+"""Default of the time to come within it in [s]: a client of a stuck arm gets a result."""
 
 
 @dataclass(frozen=True, slots=True)
