@@ -66,7 +66,9 @@ def test_bring_up_ends_when_the_master_dies(isolation: Isolation) -> None:
         bringup.wait_for('all is ready', 40.0)
         started = children(bringup)
         master = next(
-            child for child in started if any(word.endswith('master') for word in child.cmdline())
+            child
+            for child in started
+            if any(word.endswith(('/master', '/motion_node')) for word in child.cmdline())
         )
         master.send_signal(signal.SIGKILL)
         assert bringup.wait(30.0) == 1, bringup.output
