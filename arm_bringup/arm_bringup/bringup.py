@@ -80,8 +80,8 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     kinds.add_argument(
         '--controller-only',
         action='store_true',
-        help='trajectories and jogging only, for drives of another process: it hears '
-        '/joint_states, and publishes set-points',
+        help='trajectories and jogging only, for drives of another process: it subscribes '
+        'to /joint_states, and publishes set-points',
     )
     return parse_with_ros(parser, argv)
 
@@ -133,7 +133,7 @@ def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     if robot.lacking:
         raise RobotError(
             f'{robot.name} lacks {robot.lacking}: '
-            f'ros2 run arm_bringup check {arguments.robot} tells more'
+            f'ros2 run arm_bringup check {arguments.robot} reports all of it'
         )
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
         parameters = Path(folder) / 'robot_description.yaml'

@@ -54,7 +54,7 @@ def check_robot(robot: Robot) -> list[Finding]:
         return [*findings, *found]
     moving = [joint.name for joint in tree.joints if joint.independent]
     if not drives or set(drives) - set(moving):
-        drives = moving  # what is wrong with the names of drives is told already
+        drives = moving  # what is wrong with the names of drives is reported already
     return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
 
 
@@ -132,8 +132,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_bringup check',
-        description='Tell what is missing or inconsistent in a robot folder: bus.yml, joint names '
-        'in it, description, SRDF and limits; a start that is singular or in collision.',
+        description='Report what is missing or inconsistent in a robot folder: bus.yml, joint '
+        'names in it, description, SRDF and limits; a start that is singular or in collision.',
         epilog=robots_epilog(),
     )
     add_robot(parser)

@@ -95,7 +95,7 @@ def expand_xacro(
     """
     import xacro
 
-    complaints = io.StringIO()  # xacro tells on stderr where in the file it was
+    complaints = io.StringIO()  # xacro writes to stderr where in the file it was
     try:
         with (
             contextlib.redirect_stderr(complaints),

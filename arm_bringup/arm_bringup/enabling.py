@@ -16,7 +16,7 @@ from process_supervisor import CallError, GivenUpError
 if TYPE_CHECKING:
     from .service_client import ServiceClient
 
-PATIENCE = 60.0
+ENABLE_TIMEOUT = 60.0
 """Longest time for all drives to boot and to be enabled in [s]."""
 AGAIN = 1.0
 """Pause after a refusal in [s]: a drive that has not booted yet says so."""
@@ -67,7 +67,7 @@ def _enable(
 
     client = ServiceClient('bringup', ended.is_set, namespace)
     groups = enabling_services(drives, mode_service)
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + ENABLE_TIMEOUT
     try:
         client.prepare(itertools.chain(*groups))
         while (refusal := _refusal(client, groups)) and time.monotonic() < deadline:
@@ -86,7 +86,7 @@ def _refusal(client: ServiceClient, groups: Sequence[list[str]]) -> str:
     """Call services one group after the other; return why one refused, empty when none did."""
     try:
         for services in groups:
-            client.call(services, PATIENCE)
+            client.call(services, ENABLE_TIMEOUT)
     except CallError as error:
         return str(error)
     return ''

@@ -9,7 +9,7 @@
     ├── DescriptionError (ValueError)   a xacro file cannot be expanded, or its URDF is not usable
     └── WaveError (ValueError)    the wave cannot be planned within the limits of a joint
 
-What cannot be started, or refuses, is told by the errors of ``process_supervisor``. Arguments of
+What cannot be started, or refuses, raises the errors of ``process_supervisor``. Arguments of
 the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
 

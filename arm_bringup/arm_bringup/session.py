@@ -39,9 +39,9 @@ REAL_BUS = 'can0'
 SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
 BUS_REMEDY = 'another bus with --can'
-"""What a second bring-up on a bus is told to take."""
+"""What a second bring-up on a bus is advised to take."""
 NAMESPACE_REMEDY = 'another --namespace'
-"""What a second bring-up in a namespace is told to take."""
+"""What a second bring-up in a namespace is advised to take."""
 INTERPOLATED_POSITION = 7
 """Mode of operation (CiA 402-2, 0x6060)."""
 
@@ -236,7 +236,7 @@ def own_bus(wanted: str | None, *, simulate: bool) -> Iterator[str]:
 
 
 def _first_free(names: Iterator[str], stack: contextlib.ExitStack) -> str:
-    """Hold the first bus that no other bring-up has; if all are taken, tell who has the first."""
+    """Hold the first bus that no other bring-up has; if all are taken, name who has the first."""
     name = next(names)
     try:
         stack.enter_context(exclusive(f'bus {name}', BUS_REMEDY))

@@ -119,7 +119,7 @@ def test_a_robot_without_its_eds_says_which_file_and_line(workspace: SmallWorksp
 
 
 def test_a_workspace_that_is_not_built_says_how(workspace: SmallWorkspace) -> None:
-    """A missing executable is told with the remedy."""
+    """A missing executable is reported with the remedy."""
     (workspace.folder / 'prefix/lib/canopen_sim/fake_slaves').unlink()
     code, output = workspace.run('panda', '--simulate', '--can', 'auto')
     assert code == 2
@@ -148,7 +148,7 @@ def test_a_second_bring_up_on_the_same_is_refused(
 
 
 def test_a_second_simulated_arm_has_a_bus_of_its_own(workspace: SmallWorkspace) -> None:
-    """In a namespace of the same domain, without being told which bus."""
+    """In a namespace of the same domain, without a choice of the bus."""
     with contextlib.ExitStack() as stack:
         running, buses = [], set()
         for side in ('left', 'right'):

@@ -185,7 +185,7 @@ def test_joints_that_mimic_are_joints(robot: Robot) -> None:
     assert 'follows left_joint' in wrong.problem
 
 
-def test_everything_of_a_kind_is_told_at_once(robot: Robot) -> None:
+def test_everything_of_a_kind_is_reported_at_once(robot: Robot) -> None:
     """All joints in one run, and no name is suggested that is taken already."""
     replace(robot.limits, 'max_jerk: ', 'max_jerk: -')
     (found,) = check_robot(robot)
@@ -200,7 +200,7 @@ def test_everything_of_a_kind_is_told_at_once(robot: Robot) -> None:
     assert 'joint_3_u' in idle.problem
 
 
-def test_a_start_at_the_end_of_a_range_is_told(robot: Robot) -> None:
+def test_a_start_at_the_end_of_a_range_is_reported(robot: Robot) -> None:
     """From there, a joint can be jogged in one direction only."""
     text = robot.limits.read_text()
     head = '  joint_1_s:\n'

@@ -176,7 +176,7 @@ def test_a_joint_is_judged_in_its_own_unit_and_range(
     assert [words in text for text in found] == [True] * bool(words)
 
 
-def test_a_joint_never_heard_of_is_a_problem() -> None:
+def test_a_joint_without_diagnostics_is_a_problem() -> None:
     """An empty /diagnostics is no success."""
     assert [text.split()[0] for text in problems(Figures(), RANGES)] == JOINTS
 

@@ -167,7 +167,7 @@ def test_drivers_of_ros2_control_and_gazebo_need_not_be_there(tmp_path: Path) ->
         expand_xacro(file)
 
 
-def test_one_that_is_there_and_wrong_is_told(tmp_path: Path) -> None:
+def test_one_that_is_there_and_wrong_is_reported(tmp_path: Path) -> None:
     """Only what is missing is left out."""
     (tmp_path / 'arm.ros2_control.xacro').write_text(
         f'<robot {XACRO}><link name="${{1/0}}"/></robot>'
@@ -222,7 +222,7 @@ def test_all_arms_and_tools_with_drives_are_moved(folder: Path) -> None:
         ('d', '', 'no group of arm.srdf has a drive for each joint'),
     ],
 )
-def test_groups_that_cannot_be_moved_are_told(
+def test_groups_that_cannot_be_moved_are_reported(
     folder: Path, drives: str, settings: str, words: str
 ) -> None:
     """With those that there are, and where one is chosen."""

@@ -54,7 +54,7 @@ def state(cycle: int, position: float, velocity: float, acceleration: float) -> 
     delay=st.floats(-0.009, 0.3),
 )
 def test_late_stamps_do_not_matter(jerk: Array, begin: int, cycles: int, delay: float) -> None:
-    """The motion tells how many cycles lie between two states; none is taken for a jump."""
+    """The motion shows how many cycles lie between two states; none is taken for a jump."""
     first = sample(begin * PERIOD, jerk)
     end = (begin + cycles) * PERIOD
     second = sample(end, jerk, end + delay)
@@ -145,7 +145,7 @@ def test_speed_of_the_middle() -> None:
 
 
 def test_tracking_is_measured_a_cycle_later() -> None:
-    """A drive that does what it is told is where it was sent in the cycle before."""
+    """A drive that follows is where it was sent in the cycle before."""
     jerk = np.array([30.0])
     sent = [sample(n * PERIOD, jerk) for n in range(10, 20)]
     good = [

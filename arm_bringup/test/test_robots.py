@@ -28,7 +28,7 @@ def test_a_robot_is_found_by_name() -> None:
 
 
 def test_an_unknown_robot_lists_those_that_exist() -> None:
-    """And tells how to give a folder of one's own."""
+    """And shows how to give a folder of one's own."""
     with pytest.raises(RobotError, match=r"'pandora'.*robots: .*panda.*\./pandora"):
         find_robot('pandora', ROBOTS)
 

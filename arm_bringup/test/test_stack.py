@@ -112,7 +112,7 @@ def test_rcl_takes_what_a_person_says(tmp_path: Path, spelling: str, namespace: 
 
 
 def test_master_without_arm_servo(tmp_path: Path) -> None:
-    """Where it is not built, or the robot lacks its files, the plain master runs; it is told."""
+    """Where it is not built, or the robot lacks its files, the plain master runs, and why."""
     robot = my_robot(tmp_path)
     bare = Underlay(tmp_path, 'arm_canopen').find
     full = Underlay(tmp_path, 'arm_canopen', 'arm_servo').find
@@ -190,7 +190,7 @@ def test_the_public_robot_state_publisher_runs_where_it_is_installed(
 
 
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
-    """A missing package and a missing executable are told apart."""
+    """A missing package and a missing executable are distinguished."""
     stack = Stack(ROBOT, 'can0', simulate=True)
     with pytest.raises(StartError, match=r'canopen_sim is not in AMENT_PREFIX_PATH.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: None)

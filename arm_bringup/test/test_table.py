@@ -142,6 +142,6 @@ def test_before_the_first_message_the_rows_are_empty() -> None:
     ('width', 'height', 'room'),
     [(80, 24, True), (79, 24, False), (80, 14, True), (80, 13, False)],
 )
-def test_too_small_a_terminal_is_told_in_time(width: int, height: int, room: bool) -> None:
+def test_too_small_a_terminal_is_noticed_in_time(width: int, height: int, room: bool) -> None:
     """The usual 80 x 24 is enough for seven joints."""
     assert VIEW.fits(width, height) is room

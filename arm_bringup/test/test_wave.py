@@ -33,7 +33,7 @@ HALTED = Refusal(RefusalCause.HALTED)
 
 @dataclass(frozen=True)
 class Feedback:
-    """What a master tells of a drive, as far as the wave looks at it."""
+    """What a master reports of a drive, as far as the wave looks at it."""
 
     name: str
     position: float
@@ -233,7 +233,7 @@ def test_the_report_measures_error_and_range() -> None:
     arm.run(20.0)
     for swing, axis in zip(arm.swings, arm.source.report.axes, strict=True):
         assert axis.samples > 1900
-        assert axis.error_max == 0.0  # these drives are where they are told to be
+        assert axis.error_max == 0.0  # these drives are where they are sent to
         late = arm.tracks[swing.name]
         assert axis.highest == pytest.approx(max(late), abs=0.01)
         assert axis.lowest == pytest.approx(min(late), abs=0.01)
@@ -293,7 +293,7 @@ def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:
 
 
 def test_a_bus_without_a_joint_of_the_robot_is_refused() -> None:
-    """The names on both sides are told: they differ by a prefix, usually."""
+    """The names on both sides are named: they differ by a prefix, usually."""
     limits = {'panda_joint1': JointRange('panda_joint1', -1.0, 1.0, 1.0)}
     with pytest.raises(WaveError, match='drives: joint1; joints: panda_joint1'):
         plan_wave(limits, ['joint1'], STYLE)

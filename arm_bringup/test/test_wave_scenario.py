@@ -24,7 +24,7 @@ GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED), 
 
 
 class Client:
-    """A client whose services answer as they are told to, and whose wave stops at once."""
+    """A client whose services answer as they are given, and whose wave stops at once."""
 
     def __init__(self, refuses: str = '', when: Callable[[str], None] = lambda what: None) -> None:
         self.figures = GOOD

@@ -120,7 +120,7 @@ def problems(figures: Figures, joints: Mapping[str, JointRange]) -> list[str]:
         drive = figures.drives.get(name, DriveFigures())
         axis = figures.axes.get(name, AxisFigures())
         if not drive.enabled:
-            why = drive.message or drive.state or 'not heard of'
+            why = drive.message or drive.state or 'no diagnostics'
             found.append(f'{name} is not enabled: {why}')
         elif axis.moved < least:
             far = f'{axis.moved:.3f} {limits.unit}, less than {least:g}'

@@ -27,7 +27,7 @@ from .figures import MotionFigures
 from .samples import cycles_between, peak_jerk, Sample
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATIENCE = 15.0
+ANSWER_TIMEOUT = 15.0
 """Longest time for an answer in [s]."""
 
 
@@ -127,7 +127,7 @@ class MotionClient(ArmClient):
             CallError: It was refused, or nobody answers.
             GivenUpError: It is no longer wanted.
         """
-        self.wait_until(self._action.server_is_ready, PATIENCE, 'the trajectory controller')
+        self.wait_until(self._action.server_is_ready, ANSWER_TIMEOUT, 'the trajectory controller')
         rest = [0.0] * len(end)
         point = JointTrajectoryPoint(positions=end.tolist(), velocities=rest, accelerations=rest)
         point.time_from_start.sec = int(duration)
@@ -137,7 +137,7 @@ class MotionClient(ArmClient):
             trajectory=JointTrajectory(joint_names=names, points=[point])
         )
         sent = self._action.send_goal_async(goal)
-        self.wait_until(sent.done, PATIENCE, 'the answer to a trajectory')
+        self.wait_until(sent.done, ANSWER_TIMEOUT, 'the answer to a trajectory')
         if not sent.result().accepted:
             raise CallError(f'the trajectory was refused: {self.words}')
         return GoalRun(self, sent.result())
@@ -218,7 +218,7 @@ class GoalRun:
             GivenUpError: It is no longer wanted.
         """
         future = self._handle.cancel_goal_async()
-        self._client.wait_until(future.done, PATIENCE, 'the answer to the cancel')
+        self._client.wait_until(future.done, ANSWER_TIMEOUT, 'the answer to the cancel')
 
     def end(self) -> tuple[int, str]:
         """Return how it ended: status of the action, and why in words; once it is done."""

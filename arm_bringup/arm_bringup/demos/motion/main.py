@@ -192,7 +192,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if robot.lacking:
             raise RobotError(
                 f'{robot.name} lacks {robot.lacking}: '
-                f'ros2 run arm_bringup check {arguments.robot} tells more'
+                f'ros2 run arm_bringup check {arguments.robot} reports all of it'
             )
         groups = moved_groups(robot)
         with session(

@@ -77,7 +77,7 @@ def peak_jerk(samples: Sequence[Sample], period: float, limits: Array) -> float:
     """Return the greatest jerk of a set-point, as a share of the joint's limit.
 
     It is the least one that makes each state from the one before, in as many cycles as their
-    stamps tell; where that is beyond the limit, in any number that a late cycle may have hidden.
+    stamps have; where that is beyond the limit, in any number that a late cycle may have hidden.
     So a set-point that jumps counts, even where the acceleration shows nothing.
 
     Args:

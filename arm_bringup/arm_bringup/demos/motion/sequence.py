@@ -38,7 +38,7 @@ SLOW = 0.3
 """Speed override."""
 EARLY, HALF, LATE = 0.2, 0.4, 0.6
 """Shares of the way of a trajectory at which something is asked."""
-PATIENCE = 60.0
+MOTION_TIMEOUT = 60.0
 """Longest time of a trajectory in [s]."""
 
 
@@ -56,7 +56,7 @@ class MotionSequence:
         start: The pose from which the parts begin in [rad].
         period: Period of the cycle in [s].
         results: Where figures go.
-        enter: Told of each part.
+        enter: Called with the name of each part.
         look: Called often; shows how it goes, and raises EndRequested.
     """
 
@@ -183,7 +183,7 @@ class MotionSequence:
         run = self.client.send(end, nominal)
         self._reach(run, begin, end, HALF)
         run.cancel()
-        self.client.wait_until(lambda: self._seen(run), PATIENCE, 'the end of the canceled')
+        self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of the canceled')
         self._rest()
         error = self._path_error(first, begin, end)
         status, words = run.end()
@@ -236,7 +236,7 @@ class MotionSequence:
         return way < STUCK * SETTLE
 
     def _finish(self, run: GoalRun) -> None:
-        self.client.wait_until(lambda: self._seen(run), PATIENCE, 'the end of a trajectory')
+        self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of a trajectory')
         status, words = run.end()
         if status != GoalStatus.STATUS_SUCCEEDED:
             raise CallError(f'a trajectory failed: {words}')
@@ -249,7 +249,7 @@ class MotionSequence:
             done = float((self.client.last.position - begin) @ way) / float(way @ way)
             return self._seen(run) or done >= share
 
-        self.client.wait_until(there, PATIENCE, f'{100 * share:.0f} % of a trajectory')
+        self.client.wait_until(there, MOTION_TIMEOUT, f'{100 * share:.0f} % of a trajectory')
 
     def _moving_time(self, first: int) -> float:
         times = [each.time for each in self.client.samples[first:] if each.velocity.any()]
@@ -267,7 +267,7 @@ class MotionSequence:
             self.look()
             return self.client.age < FRESH and not self.client.last.velocity.any()
 
-        self.client.wait_until(at_rest, PATIENCE, 'the arm to rest')
+        self.client.wait_until(at_rest, MOTION_TIMEOUT, 'the arm to rest')
 
     def _wait(self, pause: float) -> None:
         end = time.monotonic() + pause

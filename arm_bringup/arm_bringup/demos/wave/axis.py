@@ -91,7 +91,7 @@ class WaveAxis:
         """Take no part any more.
 
         Args:
-            reason: Why; empty when nobody needs to be told.
+            reason: Why; empty when there is nothing to log.
         """
         if self.active:
             self.left = reason

@@ -70,12 +70,12 @@ class WaveNode(Node):
 
     def _publish(self) -> None:
         report = self._source.report
-        self._tell_who_left(report)
+        self._log_who_left(report)
         message = DiagnosticArray(status=[_motion_status(report), *map(_axis_status, report.axes)])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
-    def _tell_who_left(self, report: WaveReport) -> None:
+    def _log_who_left(self, report: WaveReport) -> None:
         before, self._left = self._left, {axis.name: axis.left for axis in report.axes}
         for name, reason in self._left.items():
             if reason and not before.get(name):

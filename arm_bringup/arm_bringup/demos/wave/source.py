@@ -131,7 +131,7 @@ class WaveSource:
         """
         del now
         while self._commands:  # first: a release says why an axis can no longer follow
-            self._obey(self._commands.popleft(), feedback)
+            self._carry_out(self._commands.popleft(), feedback)
         for axis, state in zip(self._axes, feedback, strict=True):
             axis.measure(state.position)
             if axis.active and state.refusal is not None:
@@ -143,7 +143,7 @@ class WaveSource:
             self._report = self._make_report()
         return setpoints
 
-    def _obey(self, command: Command | _Release, feedback: Sequence[AxisFeedback]) -> None:
+    def _carry_out(self, command: Command | _Release, feedback: Sequence[AxisFeedback]) -> None:
         if command is Command.START:
             self._enter(feedback)
         elif command is Command.STOP:
