@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import pairwise
 import threading
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -508,6 +508,7 @@ def test_a_stamped_trajectory_keeps_its_times(
     st.sampled_from([(1.0, 0.5), (0.4, 1.0), (1.0, 0.1), (0.5, 0.0)]),
     st.integers(0, 12),
 )
+@example(14, (0.4, 1.0), 9)
 @settings(max_examples=15, deadline=None)
 def test_a_trajectory_takes_over_while_the_speed_override_changes(
     points: int, since: int, speeds: tuple[float, float], worked: int

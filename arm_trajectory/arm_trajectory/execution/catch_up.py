@@ -30,6 +30,9 @@ JERK_TOLERANCE = 0.1
 As shares of j T^2 and j T^3.
 """
 
+ACCELERATION_TOLERANCE = 0.01
+"""The same change of place where a path is met, as a share of a T^2."""
+
 FOLLOWING_JERK_TOLERANCE = (0.25, 0.129)
 """The same where the state that is followed goes on: a limited jerk that turns makes as much."""
 
@@ -109,7 +112,12 @@ class CatchUpInterpolator:
             return False
         bend = (2.0 * state.acceleration + wanted.acceleration) / 6.0 * period
         way = wanted.position - state.position - (state.velocity + bend) * period
-        return bool(np.all(np.abs(way) <= shift * most * period**2))
+        allowed = shift * most * period**2
+        if not self._exact:  # seen on the positions it is a change of speed
+            allowed = np.minimum(
+                allowed, ACCELERATION_TOLERANCE * self._limits.acceleration * period**2
+            )
+        return bool(np.all(np.abs(way) <= allowed))
 
     def _soft(self, state: RobotState, wanted: RobotState, period: float) -> bool:
         """Whether a state is within the limits, and its acceleration near the present one."""
