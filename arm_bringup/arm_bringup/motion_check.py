@@ -66,9 +66,10 @@ def check_motion(
         return [error(robot.semantic.name, str(problem), f'see {SETTINGS} in README')]
     findings = list(_limits(robot, limits, tree))
     text, notes, models = read_semantic(robot), {}, {}
-    for group in groups.arms:
+    for group in groups.names:
+        tip = robot.tip_link if group == groups.names[0] else ''
         try:
-            model = RobotModel(urdf, text, limits, group, robot.tip_link or None)
+            model = RobotModel(urdf, text, limits, group, tip or None)
             check_arm(model)
         except LimitsError as problem:
             findings.append(error(robot.limits.name, str(problem), _limits_remedy(robot)))
@@ -80,7 +81,7 @@ def check_motion(
             continue
         notes.update(dict.fromkeys(model.notes))
         models[group] = model
-        findings += _start(robot, model)
+        findings += _start(robot, model) if group in groups.arms else []
     findings += [warning(*_note(robot, note)) for note in notes]
     return findings + list(_controllers(robot, models))
 

@@ -185,6 +185,26 @@ def test_joints_that_mimic_are_joints(robot: Robot) -> None:
     assert 'follows left_joint' in wrong.problem
 
 
+def test_a_gripper_without_limits_is_found_before_it_ends_the_master(robot: Robot) -> None:
+    """End effectors that have drives are moved, so they are checked as arms are."""
+    finger = (
+        '<link name="finger"/><joint name="finger_joint" type="prismatic"><parent link="tool0"/>'
+        '<child link="finger"/><limit lower="0" upper="0.04" velocity="0.1" effort="1"/></joint>'
+    )
+    replace(robot.description, '</robot>', f'{finger}</robot>')
+    effector = '<end_effector name="hand" group="hand" parent_link="tool0"/>'
+    hand = f'<group name="hand"><joint name="finger_joint"/></group>{effector}</robot>'
+    replace(robot.semantic, '</robot>', hand)
+    with robot.bus_config.open('a') as file:
+        file.write('  finger_joint:\n    node_id: 9\n')
+    (found,) = check_robot(robot)
+    assert (found.severity, found.place) == (ERROR, 'limits.yaml')
+    assert 'joint finger_joint is missing' in found.problem
+    with robot.limits.open('a') as file:
+        file.write('  finger_joint: {max_velocity: 0.1, max_acceleration: 1.0, max_jerk: 9.0}\n')
+    assert check_robot(robot) == []
+
+
 def test_everything_of_a_kind_is_reported_at_once(robot: Robot) -> None:
     """All joints in one run, and no name is suggested that is taken already."""
     replace(robot.limits, 'max_jerk: ', 'max_jerk: -')
