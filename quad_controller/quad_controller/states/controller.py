@@ -357,7 +357,7 @@ class Controller:
         state = machine.state if machine.state is machine.goal else State.STAND
         return Situation(
             joints=None if health.held else health.joints,
-            imu=health.imu if health.tilt is not None else None,
+            imu=health.attitude,
             velocity=self._commands.velocity(state),
             pose=self._commands.pose,
         )

@@ -91,11 +91,9 @@ class Health:
         self.joints, self.joints_age = None, math.inf
 
     @property
-    def tilt(self) -> tuple[float, float] | None:
-        """Roll and pitch in [rad], None when they are not known any more."""
-        if self.imu is None or self.imu_age > self._parameters.hold_age:
-            return None
-        return self.imu.roll_pitch_yaw[:2]
+    def attitude(self) -> ImuSample | None:
+        """The newest attitude, None when it is too old to act upon."""
+        return self.imu if self.imu_age <= self._parameters.hold_age else None
 
     @property
     def complete(self) -> bool:
@@ -169,10 +167,11 @@ class Health:
         return waited
 
     def _falls(self) -> bool:
-        if self.imu is None or self.imu_age > self._parameters.hold_age:
+        imu = self.attitude
+        if imu is None:
             return False
-        turns = _turn_rate(self.imu) > self._parameters.max_turn_rate
-        return turns or self.imu.tilt > self._parameters.max_tilt
+        turns = _turn_rate(imu) > self._parameters.max_turn_rate
+        return turns or imu.tilt > self._parameters.max_tilt
 
     def _fall(self, imu: ImuSample) -> str:
         most, fastest = self._parameters.max_tilt, self._parameters.max_turn_rate
