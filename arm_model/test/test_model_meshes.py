@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+import errno
+import io
 from itertools import product
 import math
 from pathlib import Path
@@ -191,6 +194,68 @@ def test_without_a_cache_hulls_are_made_all_the_same(
     (tmp_path / 'file').write_text('', encoding='utf-8')
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'file'))
     assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+
+
+def test_without_a_home_hulls_are_made_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A container may run as a user whom it does not know."""
+
+    def unknown(_: int) -> None:
+        raise KeyError
+
+    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
+    monkeypatch.delenv('XDG_CACHE_HOME')
+    monkeypatch.delenv('HOME', raising=False)
+    monkeypatch.setattr('pwd.getpwuid', unknown)
+    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+
+
+def npz(points: list[list[float]]) -> bytes:
+    """Return a file of the cache."""
+    file = io.BytesIO()
+    np.savez(file, points=np.array(points), fullness=1.0)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    'damage',
+    [
+        lambda _: b'',
+        lambda whole: whole[: len(whole) // 2],
+        lambda whole: whole[:40] + b'\xff' * 40 + whole[80:],
+        lambda whole: bytes(len(whole)),
+        lambda _: npz([]),
+        lambda _: npz([[math.nan] * 3]),
+    ],
+)
+def test_a_damaged_file_of_the_cache_is_written_again(
+    tmp_path: Path, cache: Path, damage: Callable[[bytes], bytes]
+) -> None:
+    """Such as the empty one that a loss of power leaves."""
+    path = tmp_path / 'cube.stl'
+    path.write_text(stl(), encoding='utf-8')
+    meshes.load_hull(path)
+    (file,) = cache.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(damage(whole))
+    meshes._hull.cache_clear()
+    assert len(meshes.load_hull(path).points) == len(CORNERS)
+    assert len(file.read_bytes()) == len(whole)
+
+
+def test_a_full_disk_leaves_nothing_behind(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What cannot be written whole is removed."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, 'no space left on device')
+
+    (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
+    monkeypatch.setattr('os.fsync', full)
+    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+    assert not list(cache.iterdir())
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,8 @@
 
 STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hull. The points of a
 hull are kept in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small file
-for each content of a mesh file; the folder may be deleted at any time.
+for each content of a mesh file; the folder may be deleted at any time, and nothing that is wrong
+with it ends a program.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from pathlib import Path
 import re
 import tempfile
 from urllib.parse import unquote
-import zipfile
 
 import coal
 import numpy as np
@@ -127,29 +127,51 @@ def load_hull(path: Path) -> Hull:
 
 @lru_cache(maxsize=256)
 def _hull(digest: str, path: Path) -> Hull:
-    cached = cache_folder() / f'{digest}-{FORMAT}.npz'
-    # what is damaged, or was never written, is made again
-    damage = contextlib.suppress(OSError, KeyError, ValueError, zipfile.BadZipFile)
-    with damage, np.load(cached) as stored:
-        return Hull(frozen(stored['points']), float(stored['fullness']))
-    hull = hull_of_file(path)
-    with contextlib.suppress(OSError):  # no home, or a full disk: it is made the next time, too
-        _store(cached, hull)
+    folder = cache_folder()
+    if folder is None:
+        return hull_of_file(path)
+    cached = folder / f'{digest}-{FORMAT}.npz'
+    hull = _stored(cached)
+    if hull is None:
+        hull = hull_of_file(path)
+        with contextlib.suppress(OSError):  # such as a full disk: it is made the next time, too
+            _store(cached, hull)
     return hull
 
 
-def cache_folder() -> Path:
-    """Return the folder of the hulls."""
-    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(home) / 'arm_model' / 'hulls'
+def cache_folder() -> Path | None:
+    """Return the folder of the hulls; None for a user without a home."""
+    cache = os.environ.get('XDG_CACHE_HOME')
+    try:
+        home = Path(cache) if cache else Path.home() / '.cache'
+    except RuntimeError:
+        return None
+    return home / 'arm_model' / 'hulls'
+
+
+def _stored(path: Path) -> Hull | None:
+    """Read a file of the cache; None where it was never written, or is damaged."""
+    # numpy, zipfile and zlib raise what they like for files that are damaged
+    with contextlib.suppress(Exception), np.load(path) as stored:
+        points, fullness = frozen(stored['points']), float(stored['fullness'])
+        if points.ndim == 2 and points.shape[1] == 3 and len(points) and np.isfinite(points).all():
+            return Hull(points, fullness)
+    return None
 
 
 def _store(path: Path, hull: Hull) -> None:
     """Write a file of the cache whole or not at all: several programs start at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
-        np.savez(file, points=hull.points, fullness=hull.fullness)
-    Path(file.name).replace(path)
+        unfinished = Path(file.name)
+        try:
+            np.savez(file, points=hull.points, fullness=hull.fullness)
+            file.flush()
+            os.fsync(file.fileno())
+            unfinished.replace(path)
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
 
 
 def hull_of_file(path: Path) -> Hull:
