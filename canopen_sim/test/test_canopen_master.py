@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 import os
 from pathlib import Path
 import subprocess
@@ -297,6 +297,61 @@ def test_a_second_master_is_refused(
     ):
         second.boot(TIMEOUT)
     assert master.drive('joint1').state is DriveState.OPERATION_ENABLED
+
+
+class Clinging:
+    """A motion source that wants its axis back whenever it loses it."""
+
+    axes = ('joint1',)
+
+    def __init__(self, master: CanopenMaster) -> None:
+        self._attach = master._master.attach
+        self.again: Future[None] | None = None
+
+    def update(
+        self, now: float, period: float, feedback: Sequence[AxisFeedback]
+    ) -> list[float | None]:
+        """Lead nothing."""
+        return [None]
+
+    def released(self, axis: str, refusal: Refusal) -> None:
+        """Attach itself again, from the thread of the cycle."""
+        self.again = self._attach(self)
+
+
+def test_nothing_is_commanded_to_a_drive_while_the_master_ends(
+    drives: object, bus_yml: Path, bus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that stands is not enabled again while another one brakes."""
+    master = CanopenMaster.from_bus_yml(bus_yml, bus)
+
+    def insist() -> None:
+        while True:
+            with suppress(DriveError):
+                master.drive('joint2').enable()
+
+    with ThreadPoolExecutor(1) as pool:
+        with master:
+            master.boot(TIMEOUT)
+            moving, source = master.drive('joint1'), Clinging(master)
+            moving.sdo.write('Quick stop deceleration', 20000)  # brakes for a second
+            moving.init()
+            master.drive('joint2').enable()
+            moving.select_mode(OperationMode.PROFILE_POSITION)
+            moving.set_target(1000.0)
+            deadline = time.monotonic() + TIMEOUT
+            while moving.velocity < 1.9:
+                assert time.monotonic() < deadline
+            master.attach(source)
+            insisting = pool.submit(insist)
+        with pytest.raises(BusError, match='has ended'):
+            insisting.result(TIMEOUT)
+    with independent_client(bus, monkeypatch) as network:
+        assert not is_enabled(statusword(network, 2))
+        assert not is_enabled(statusword(network, 3))
+    assert source.again is not None
+    with pytest.raises(BusError, match='the CANopen master is ending'):
+        source.again.result(TIMEOUT)
 
 
 class Ramp:

@@ -46,6 +46,7 @@ class DriveCommands:
         self._running = ''
         self._delivery = completed()  # of the target or move that was commanded last
         self._task: Task[str] | None = None
+        self._leaving: Promise[str] | None = None  # the shutdown at the end of the master
         self._stream = TargetStream(drive, scheduler, self._steps)
         self._recovery = Recovery(
             drive, scheduler, lambda mode: self.run('recovery', self._enable_in(mode))
@@ -61,17 +62,23 @@ class DriveCommands:
             sequence: The coroutine.
             preempt: End the one that runs instead of being refused; for what stops a drive.
         """
+        if self._leaving is not None:
+            sequence.close()
+            return self._leaving if preempt else _refused(self._ending())
         if preempt:
             self.cancel(f'{self._running} was ended by {name}')
         if self._busy:
             sequence.close()
-            refused: Promise[str] = Promise()
-            refused.reject(DriveError(f'{self.drive.name} is busy: {self._running} is running'))
-            return refused
+            return _refused(DriveError(f'{self.drive.name} is busy: {self._running} is running'))
         self._running = name
         self._stream.end(name)
         self._task = self._scheduler.spawn(sequence)
         return self._task
+
+    def leave(self) -> Promise[str]:
+        """Shut the drive down for good: what stops it has that result, all else is refused."""
+        self._leaving = self.run('shutdown', self.stops.shutdown(), preempt=True)
+        return self._leaving
 
     def cancel(self, reason: str) -> None:
         """End the command that runs, if any."""
@@ -306,6 +313,8 @@ class DriveCommands:
 
     def _require_acceptance(self) -> None:
         drive, steps = self.drive, self._steps
+        if self._leaving is not None:
+            raise self._ending()
         if self._busy:
             raise steps.refused(f'takes no target while {self._running} is running')
         refusal = drive.control.refusal
@@ -316,6 +325,9 @@ class DriveCommands:
         if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.control.mode, NoMode):
             return  # which refuses every target itself
         raise steps.refused(f'takes no target: it {refusal}')
+
+    def _ending(self) -> DriveError:
+        return DriveError(f'{self.drive.name} takes no command any more: the master is ending')
 
     def _resume(self, delivery: Promise[None]) -> None:
         self._delivery = delivery
@@ -342,3 +354,9 @@ class DriveCommands:
             place = f'0x{drive.objects.at(target[0]):04X}' if target is not None else 'its target'
             why = f'{place} is in no RPDO of bus.yml; map it'
         return f'{drive.name} has no mode {number.title}: {why}; it has: {offered}'
+
+
+def _refused(error: DriveError) -> Promise[str]:
+    refused: Promise[str] = Promise()
+    refused.reject(error)
+    return refused

@@ -18,12 +18,12 @@ from ..cia402.motion import MotionSource
 from ..cia402.motion_group import MotionGroup
 from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config.model import BusConfig
-from ..exceptions import CanopenError, DriveError
+from ..exceptions import BusError, CanopenError, DriveError
 from ..master.events import Event, EventKind, Report
 from ..master.network import Network
 from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
-from ..master.runner import NetworkThread
+from ..master.runner import NetworkThread, OWNER
 from ..master.scheduler import Scheduler
 
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
@@ -35,12 +35,15 @@ async def leave_device(
 ) -> None:
     """Stop the axes of a device, then let the master end without a reaction of the device.
 
+    From the first step on, nothing but that is commanded to them.
+
     Raises:
         DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
     """
-    await scheduler.gather(
-        [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
-    )
+    await scheduler.gather([axis.leave() for axis in axes])
+    powered = ', '.join(axis.drive.name for axis in axes if not axis.drive.stop.disabled)
+    if powered:  # again by itself, or by another master
+        raise DriveError(f'{powered} is enabled again; cut its power')
     await device.unwatch()
 
 
@@ -88,6 +91,7 @@ class BusMaster:
         self._group = MotionGroup(drives, self._report)
         self.network.on_cycle = self._group.cycle
         self.started = False
+        self._leaving = False
         self.on_operational: Callable[[], None] = lambda: None
         self._operational: set[str] = set()
 
@@ -128,6 +132,7 @@ class BusMaster:
         scheduler = self.network.scheduler
 
         async def leave() -> None:
+            self._leaving = True
             devices = self.network.nodes.values()
             await scheduler.gather(
                 [
@@ -151,9 +156,15 @@ class BusMaster:
 
         Returns:
             Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
-            cycle has ended.
+            cycle ends or has ended.
         """
-        return self.thread.call(lambda: self._group.attach(source))
+
+        def attach() -> None:
+            if self._leaving:
+                raise BusError(f'{OWNER} is ending')
+            self._group.attach(source)
+
+        return self.thread.call(attach)
 
     def detach(self, source: MotionSource) -> Future[None]:
         """End a motion source, from any thread; drives that it moved are braked.
