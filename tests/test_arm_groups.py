@@ -84,6 +84,8 @@ def robot(isolation: Isolation, tmp_path: Path) -> Iterator[Robot]:
         RosClient(isolation.domain_id) as client,
     ):
         bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
+        assert bringup.output.count('groups left and right are not checked') == 1
+        assert f'collisions are checked with {GRIPPER} at 0, neck at 0' in bringup.output
         yield Robot(client)
         assert bringup.stop(30.0) == 0, bringup.output
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, TYPE_CHECKING
 
-from urdf_reader import KinematicTree, SemanticDescription
+from urdf_reader import find_group, KinematicTree, SemanticDescription
 
 from process_supervisor import parameters_by_node, StartError
 
@@ -66,10 +66,13 @@ def check_motion(
         return [error(robot.semantic.name, str(problem), f'see {SETTINGS} in README')]
     findings = list(_limits(robot, limits, tree))
     text, notes, models = read_semantic(robot), {}, {}
+    arms = {name: find_group(tree, semantic, name).joints for name in groups.arms}
     for group in groups.names:
         tip = robot.tip_link if group == groups.names[0] else ''
+        is_arm = group in arms
+        others = {name: joints for name, joints in arms.items() if is_arm and name != group}
         try:
-            model = RobotModel(urdf, text, limits, group, tip or None)
+            model = RobotModel(urdf, text, limits, group, tip or None, moved_by_others=others)
             check_arm(model)
         except LimitsError as problem:
             findings.append(error(robot.limits.name, str(problem), _limits_remedy(robot)))
@@ -81,7 +84,9 @@ def check_motion(
             continue
         notes.update(dict.fromkeys(model.notes))
         models[group] = model
-        findings += _start(robot, model) if group in groups.arms else []
+        if is_arm:
+            notes.update(dict.fromkeys(filter(None, [model.assumption])))
+            findings += _start(robot, model)
     findings += [warning(*_note(robot, note)) for note in notes]
     return findings + list(_controllers(robot, models))
 
@@ -104,6 +109,8 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
     if 'is not installed' in note:
         remedy = f'or give the folder of the package in {SETTINGS} (packages: {{NAME: FOLDER}})'
         return robot.description.name, note, remedy
+    if 'collisions are checked with' in note or 'collision with each other' in note:
+        return robot.semantic.name, note, 'nothing, where they cannot meet'
     return robot.description.name, note, 'see README of arm_model: what it reads'
 
 

@@ -54,15 +54,12 @@ class Kinematics:
         frames: Number of each link's frame in ``native``, by link.
     """
 
-    def __init__(
-        self, tree: KinematicTree, group: Sequence[str], rest: Mapping[str, float] | None = None
-    ) -> None:
+    def __init__(self, tree: KinematicTree, group: Sequence[str]) -> None:
         """Build.
 
         Args:
             tree: The description.
-            group: Joints that move.
-            rest: Positions of other joints in [rad]; by default 0, or the limit next to it.
+            group: Joints that move; the others stand at 0, or at the limit next to it.
 
         Raises:
             ModelError: The description makes no kinematic tree.
@@ -71,7 +68,7 @@ class Kinematics:
         mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
         moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
         locked = [number for number in range(1, full.njoints) if full.names[number] not in moving]
-        places = _places(full, mimics, rest or {})
+        places = _places(full, mimics)
         self.native: Native = pin.buildReducedModel(full, locked, places)
         self.root = tree.root
         self.frames: Mapping[str, int] = {
@@ -168,12 +165,10 @@ def _full(tree: KinematicTree) -> Native:
     return model
 
 
-def _places(full: Native, mimics: Mapping[str, Mimic], rest: Mapping[str, float]) -> Array:
+def _places(full: Native, mimics: Mapping[str, Mimic]) -> Array:
     """Return where joints stand that do not move, for pinocchio."""
     places: Array = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
     index = {name: full.idx_qs[number] for number, name in enumerate(full.names)}
-    for name, position in rest.items():
-        places[index[name]] = position
     for name, mimic in mimics.items():
         places[index[name]] = mimic.multiplier * places[index[mimic.source]] + mimic.offset
     return places

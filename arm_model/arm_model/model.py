@@ -60,7 +60,7 @@ class RobotModel:
         tip: str | None = None,
         *,
         folder: Path | None = None,
-        moved_by_others: Collection[str] = (),
+        moved_by_others: Mapping[str, Collection[str]] | None = None,
     ) -> None:
         """Build and check the arm.
 
@@ -71,8 +71,8 @@ class RobotModel:
             group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
             folder: Folder of the URDF, where names of mesh files are relative.
-            moved_by_others: Joints of which nothing is known here: links that they move against
-                each other are not checked.
+            moved_by_others: Joints of other groups, by group, of which nothing is known here:
+                links that they move against each other are not checked.
 
         Raises:
             ModelError: The three do not fit together; the message names what to mend.
@@ -104,12 +104,14 @@ class RobotModel:
             PlanningScene(self.kinematics, shapes.by_link, allowed), tree, self.limits, notes
         )
         if moved_by_others:
-            unknown = _moved_by(self._tree, self.scene.link_shapes, moved_by_others)
+            joints = {joint for group in moved_by_others.values() for joint in group}
+            unknown = _moved_by(self._tree, self.scene.link_shapes, joints)
             self.scene = self.scene.with_allowed(self.scene.allowed.with_entries(unknown, True))
-            notes.append(
-                f'group {self.group}: no collision check against links that other groups move, by'
-                f' {", ".join(moved_by_others)}'
-            )
+            notes += [
+                f'groups {" and ".join(sorted((self.group, other)))} are not checked for collision'
+                ' with each other; keep them apart'
+                for other in moved_by_others
+            ]
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
         self.reach = self._reach()
@@ -133,6 +135,31 @@ class RobotModel:
     def pairs(self) -> Sequence[tuple[str, str]]:
         """Links of each pair of shapes that is checked for collision."""
         return self.scene.pairs
+
+    @property
+    def assumption(self) -> str:
+        """Where joints beside the group are taken to be between links that are checked, in words.
+
+        Empty where no such joint is between them: distances are those of the robot as it stands.
+        """
+        checked = set(map(frozenset, self.pairs))
+        moved: dict[str, list[str]] = {}  # what moves with each joint beside the group
+        for joint in self._tree.movable():
+            source = joint.name if joint.mimic is None else joint.mimic.source
+            if source not in self.joints:
+                moved.setdefault(source, []).append(joint.name)
+        ranges = self._tree.ranges()
+        assumed = [
+            f'{name} at {min(max(ranges[name].lower, 0.0), ranges[name].upper):g}'
+            for name, joints in moved.items()
+            if not checked.isdisjoint(_moved_by(self._tree, self.scene.link_shapes, joints))
+        ]
+        if not assumed:
+            return ''
+        return (
+            f'group {self.group}: collisions are checked with {", ".join(assumed)}, wherever that'
+            ' really is; keep it there, or leave room'
+        )
 
     @property
     def frames(self) -> Sequence[str]:
@@ -246,20 +273,6 @@ class RobotModel:
             joints = ', '.join(clearances.scene.kinematics.joints)
             raise SceneError(f'the scene is not that of {self.group}: its joints are {joints}')
         self.scene, self._clearances = clearances.scene, clearances
-
-    def kinematics_at(self, others: Mapping[str, float]) -> Kinematics:
-        """Return the kinematics with joints beside the group at other places, for a scene.
-
-        Args:
-            others: Positions of joints beside the group in [rad]; of the group's have no effect.
-
-        Raises:
-            CommandError: There is no such joint.
-        """
-        known = [joint.name for joint in self._tree.joints if joint.independent]
-        if unknown := sorted(set(others) - set(known)):
-            raise CommandError(f'no joint {unknown[0]!r} in {self.name}; joints: {known}')
-        return Kinematics(self._tree, self.joints, others)
 
     def check_link(self, link: str | None) -> None:
         """Make sure that a link can be asked for.

@@ -101,6 +101,11 @@ def two_arms(group: str = 'both', tip: str | None = None) -> RobotModel:
         group: both (with the torso), left or right.
         tip: The tip; by default that of the last arm of the group.
     """
+    return RobotModel(*two_arms_texts(), group, tip)
+
+
+def two_arms_texts() -> tuple[str, str, dict[str, dict[str, float]]]:
+    """Return URDF, SRDF and limits of :func:`two_arms`."""
     sphere = '<collision><geometry><sphere radius="0.04"/></geometry></collision>'
     parts = [
         f'<robot name="two_arms"><link name="base">{sphere}</link>',
@@ -125,7 +130,7 @@ def two_arms(group: str = 'both', tip: str | None = None) -> RobotModel:
     limits = {
         name: {'max_velocity': 2.0, 'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names
     }
-    return RobotModel(''.join([*parts, '</robot>']), srdf, limits, group, tip)
+    return ''.join([*parts, '</robot>']), srdf, limits
 
 
 def _joint(name: str, kind: str, parent: str, xyz: str) -> str:

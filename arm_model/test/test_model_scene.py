@@ -10,7 +10,7 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from model_robots import chain, gripper, two_arms
+from model_robots import chain, gripper, two_arms, two_arms_texts
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -30,6 +30,7 @@ from arm_model import (
     Plane,
     PlanningScene,
     Pose,
+    RobotModel,
     SceneError,
     Shape,
     Sphere,
@@ -295,16 +296,28 @@ def test_an_object_of_several_shapes_is_one_thing() -> None:
     assert far - near > 2.0
 
 
-def test_an_arm_beside_the_group_is_an_obstacle_where_it_is() -> None:
-    """The other arm of two counts, at the position that it is given."""
+def test_joints_beside_the_group_that_count_where_they_are_not_are_named() -> None:
+    """Those between links that are checked, at 0 or at the limit next to it."""
     left = two_arms('left')
-    pairs = [pair for pair in left.pairs if 'right_2_link' in pair]
-    assert pairs
-    at = np.zeros(len(left))
-    turned = left.scene.with_kinematics(left.kinematics_at({'right_1': 1.0}))
-    assert turned.pairs == left.pairs
-    pair = ('left_3_link', 'right_2_link', 0)
-    assert distances(turned, at)[pair] != pytest.approx(distances(left.scene, at)[pair], abs=1e-3)
+    assert any('right_2_link' in pair for pair in left.pairs)
+    assert 'torso at 0, right_1 at 0, right_2 at 0,' in left.assumption
+    assert two_arms('both').assumption == ''
+    urdf, srdf, limits = two_arms_texts()
+    raised = RobotModel(urdf.replace('lower="-1.5"', 'lower="0.2"'), srdf, limits, 'left')
+    assert 'torso at 0.2,' in raised.assumption
+
+
+def test_arms_that_move_by_themselves_are_both_named() -> None:
+    """In the same words by either, so that they are said once; no position is assumed then."""
+    found = []
+    for group, other in (('left', 'right'), ('right', 'left')):
+        others = {other: two_arms(other).joints}
+        model = RobotModel(*two_arms_texts(), group, moved_by_others=others)
+        assert not any(f'{other}_1_link' in pair for pair in model.pairs)
+        assert f'{other}_1' not in model.assumption
+        found.append(model.notes[-1])
+    assert found[0] == found[1]
+    assert 'groups left and right are not checked' in found[0]
 
 
 def test_a_model_measures_in_the_scene_that_it_is_given() -> None:

@@ -70,7 +70,7 @@ def declare_groups(node: Node) -> GroupModels:
     arms = [name for name in joints if name == group or name not in semantic.tools]
 
     def arm(name: str) -> RobotModel:
-        others = [joint for other in arms if other != name for joint in joints[other]]
+        others = {other: joints[other] for other in arms if other != name}
         tip_link = tip if name == group else ''
         return RobotModel(urdf, srdf, table, name, tip_link or None, moved_by_others=others)
 

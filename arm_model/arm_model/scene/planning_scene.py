@@ -233,23 +233,14 @@ class PlanningScene:
         pairs = [frozenset((one, other)) for one in ones for other in others if one != other]
         return self.with_allowed(self.allowed.with_entries(pairs, allowed))
 
-    def with_kinematics(self, kinematics: Kinematics) -> PlanningScene:
-        """Return the scene with the joints beside the group at other places.
-
-        Args:
-            kinematics: The same links and group, see :meth:`RobotModel.kinematics_at`.
-        """
-        return self._with(kinematics=kinematics)
-
     def _with(
         self,
         objects: Mapping[str, CollisionObject] | None = None,
         attached: Mapping[str, AttachedBody] | None = None,
         allowed: AllowedCollisionMatrix | None = None,
-        kinematics: Kinematics | None = None,
     ) -> PlanningScene:
         return PlanningScene(
-            self.kinematics if kinematics is None else kinematics,
+            self.kinematics,
             self.link_shapes,
             self.allowed if allowed is None else allowed,
             (self.objects if objects is None else objects).values(),

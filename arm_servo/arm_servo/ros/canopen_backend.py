@@ -162,8 +162,9 @@ class CanopenMotion:
         self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
         for node in self.nodes:
             check_names(node)
-        notes = (note for model in (*models.arms, *models.tools) for note in model.notes)
-        for note in dict.fromkeys(notes):
+        notes = [note for model in (*models.arms, *models.tools) for note in model.notes]
+        notes += [model.assumption for model in models.arms]  # links of tools may touch
+        for note in filter(None, dict.fromkeys(notes)):
             manager.get_logger().warning(note)
 
     def _attach_first(self) -> None:

@@ -188,7 +188,7 @@ class TopicDrives:
             model: The arm.
             settings: How the core behaves.
         """
-        for note in model.notes:
+        for note in filter(None, (*model.notes, model.assumption)):
             node.get_logger().warning(note)
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
