@@ -47,6 +47,7 @@ class Drive:
         failure: Why the master stopped it, until it is enabled again; else empty.
         resetting: Send fault resets while the drive is faulted.
         period: Length of the last cycle in [s].
+        motions: How many motions were begun: by targets, moves and motion sources.
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
         feed_forward: The offsets of a motion source.
         stop: Takes it out of operation; while that runs, nothing else leads it.
@@ -74,6 +75,7 @@ class Drive:
         self.released: Callable[[Refusal], None] = lambda refusal: None
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
+        self.motions = 0
         self.period = 0.0
         self.interrupted: OperationMode | None = None
         self.feed_forward = FeedForward(self.objects, self.view.units)
@@ -227,6 +229,7 @@ class Drive:
             self.feed_forward.follow(setpoint)
         mode.stream(setpoint.position)
         self.control.halt.release()
+        self.motions += not self._led
         self._streamed = True
 
     def _take_over(self) -> None:

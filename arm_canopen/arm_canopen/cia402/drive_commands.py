@@ -111,7 +111,7 @@ class DriveCommands:
     async def _delivered(self, command: Callable[[], str]) -> str:
         control = self.drive.control
         mode, answer = control.mode, command()
-        delivery = self._delivery
+        delivery, motion = self._delivery, self.drive.motions
         try:
             await self._taken(mode, delivery)
         except DriveError as error:  # a target that was reported as failed must not move it later
@@ -119,7 +119,7 @@ class DriveCommands:
                 raise
             if mode.withdraw(delivery, error):
                 raise DriveError(f'{error}; it is withdrawn') from error
-            if control.accepts_targets:
+            if control.accepts_targets and self.drive.motions == motion:
                 control.hold()
             raise
         return answer
@@ -145,21 +145,26 @@ class DriveCommands:
         if stopped():
             raise steps.refused('was stopped before it had taken the target')
 
-    async def arrive(self, timeout: float) -> str:
-        """Wait until the drive stands where the last target is; one that is late is halted.
+    async def arrive(self, command: Callable[[], str], timeout: float) -> str:
+        """Command a target or a move, and wait until the drive stands there.
+
+        One that is late is halted.
 
         Args:
-            timeout: How long that may take in [s].
+            command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
+            timeout: How long the motion may take in [s].
 
         Raises:
             DriveError: It is late, was stopped before, or got another target or mode.
         """
-        drive, delivery, steps = self.drive, self._delivery, self._steps
-        control, mode = drive.control, drive.control.mode
+        drive, steps = self.drive, self._steps
+        delivered = self.deliver(command)
+        control, mode, motion = drive.control, drive.control.mode, drive.motions
+        await delivered
 
         def lost() -> bool:
             halted = control.halted and not control.halt.leaving
-            replaced = self._delivery is not delivery or control.mode is not mode
+            replaced = drive.motions != motion or control.mode is not mode
             return halted or replaced or not control.acts or not drive.view.fresh
 
         def arrived() -> bool:
@@ -168,8 +173,10 @@ class DriveCommands:
         try:
             await self._scheduler.until(lambda: lost() or arrived(), timeout)
         except TimeoutError:
-            control.hold()
-            raise steps.refused(f'has not arrived within {timeout:g} s and is halted') from None
+            if not lost():  # else the motion is that of somebody else
+                control.hold()
+                late = f'has not arrived within {timeout:g} s and is halted'
+                raise steps.refused(late) from None
         if lost():
             raise steps.refused('was stopped, or got another target, before it arrived')
         return drive.describe()
@@ -331,6 +338,7 @@ class DriveCommands:
 
     def _resume(self, delivery: Promise[None]) -> None:
         self._delivery = delivery
+        self.drive.motions += 1
         self.drive.control.halt.leave(self._scheduler.now, delivery)  # so that no old one revives
         self.drive.released(Refusal(RefusalCause.SINGLE_TARGET))
 

@@ -140,7 +140,7 @@ class CanopenDrive:
         """Go to a position and wait until the drive stands there.
 
         In another mode than 1, 7 and 8 mode 1 (profile position) is selected first. A drive that
-        is late is halted.
+        is late is halted, unless somebody else has begun another motion, which is an error here.
 
         Args:
             position: In user units.
@@ -156,8 +156,7 @@ class CanopenDrive:
                 return commands.move(Move(position, relative=relative))
             return commands.set_target(control.setpoint + position if relative else position)
 
-        self._deliver(give)
-        return self._thread.run_coroutine(partial(commands.arrive, timeout)).result()
+        return self._thread.run_coroutine(partial(commands.arrive, give, timeout)).result()
 
     def _run(self, name: str, sequence: Sequence, *, preempt: bool = False) -> str:
         commands = self._commands
