@@ -149,16 +149,12 @@ def test_a_good_pose_of_the_srdf_is_taken_before_any_that_is_found() -> None:
     assert pose_quality(straight, start_pose(straight)) > 0.01
 
 
-def test_an_arm_that_always_collides_has_no_pose_to_start_from(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_arm_that_always_collides_has_no_pose_to_start_from() -> None:
     """It is refused with what to do."""
     urdf, srdf, limits = chain_texts('zyy')
     urdf = urdf.replace('<sphere radius="0.03"/>', '<sphere radius="0.3"/>')
     enabled = '<enable_collisions link1="link_1" link2="link_2"/></robot>'
     model = RobotModel(urdf, srdf.replace('</robot>', enabled), limits)
-    assert 'touch wherever' in model.notes[-1]
-    checked = model.scene.allowing('link_1', 'link_2', False)
-    monkeypatch.setattr(model, '_clearances', model.clearances(checked))
+    assert any('touch wherever' in note for note in model.notes)
     with pytest.raises(ModelError, match='give the SRDF a group_state'):
         start_pose(model)

@@ -334,6 +334,28 @@ def test_links_that_always_touch_are_not_checked_and_named() -> None:
     assert 'disable_collisions' in large.notes[0]
 
 
+def test_links_that_always_touch_are_checked_where_the_srdf_says_so() -> None:
+    """An enable_collisions is explicit; what it brings about is said."""
+    word = '<enable_collisions link1="link_1" link2="link_2"/>'
+    model = arm('<sphere radius="0.15"/>', srdf=word)
+    assert ('link_1', 'link_2') in model.pairs
+    assert ('link_2', 'link_3') not in model.pairs
+    dropped, kept = (note for note in model.notes if 'touch wherever' in note)
+    assert 'link_1 and link_2' not in dropped
+    assert 'link_1 and link_2' in kept
+    assert 'enable_collisions' in kept
+
+
+def test_adjacent_links_that_one_disabled_pair_leaves_checked_are_named() -> None:
+    """A matrix with any word has the last one, as in MoveIt: the rest of it may be forgotten."""
+    model = arm(
+        '<sphere radius="0.03"/>', srdf='<disable_collisions link1="link_1" link2="link_2"/>'
+    )
+    (note,) = (note for note in model.notes if note.startswith('adjacent links'))
+    assert 'link_2 and link_3, link_3 and link_4' in note
+    assert 'link_1 and link_2' not in note
+
+
 def test_an_elbow_that_folds_the_arm_onto_itself_is_in_contact(tmp_path: Path) -> None:
     """As the public UR5e does at shoulder_lift=-1.57, elbow=3.1: with meshes, nothing was said."""
     (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')

@@ -10,6 +10,7 @@ all the same: a sample is no proof, and distances that are great cost nothing.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 from urdf_reader import KinematicTree, Pair
@@ -38,8 +39,8 @@ def with_default_collisions(
 ) -> PlanningScene:
     """Return the scene in which links may touch that cannot help it.
 
-    Adjacent links count only where nobody said a word about any pair: who made a matrix, left
-    them in it with a purpose.
+    Adjacent links count only where the SRDF names no pair and no link: who made a matrix, left
+    them in it with a purpose. What ``enable_collisions`` names is checked in any case.
 
     Args:
         scene: The scene.
@@ -48,22 +49,33 @@ def with_default_collisions(
         notes: Where pairs are named that were not in the SRDF.
     """
     allowed = scene.allowed
-    if not allowed.entries and not allowed.defaults:
-        checked = set(map(frozenset, scene.pairs))
-        adjacent = sorted(sorted(pair) for pair in adjacent_links(tree, scene) & checked)
+    checked = set(map(frozenset, scene.pairs))
+    adjacent = _sorted(adjacent_links(tree, scene) & checked)
+    has_matrix = bool(allowed.entries or allowed.defaults)
+    if adjacent and not has_matrix:
         scene = scene.with_allowed(allowed.with_entries(map(frozenset, adjacent), True))
-        if adjacent:
-            notes.append(
-                'the SRDF has no disable_collisions: adjacent links are not checked for collision'
-                f' with each other ({_words(adjacent)})'
-            )
-    always = sorted(sorted(pair) for pair in always_in_contact(scene, limits))
-    if always:
+        notes.append(
+            'the SRDF has no disable_collisions: adjacent links are not checked for collision'
+            f' with each other ({_named(adjacent)})'
+        )
+    touching = always_in_contact(scene, limits)
+    enabled = {pair for pair in touching if allowed.entries.get(pair) is False}
+    if always := _sorted(touching - enabled):
         notes.append(
             f'links that touch wherever the arm is are not checked with each other:'
-            f' {_words(always)}; give the SRDF a disable_collisions for each, or smaller shapes'
+            f' {_named(always)}; give the SRDF a disable_collisions for each, or smaller shapes'
         )
         scene = scene.with_allowed(scene.allowed.with_entries(map(frozenset, always), True))
+    if enabled:
+        notes.append(
+            f'links that touch wherever the arm is are checked, as enable_collisions of the SRDF'
+            f' says: {_named(_sorted(enabled))}; the arm hardly moves so: give them smaller shapes'
+        )
+    if has_matrix and (left := [pair for pair in adjacent if frozenset(pair) not in touching]):
+        notes.append(
+            f'adjacent links that the SRDF has no disable_collisions for are checked with each'
+            f' other: {_named(left)}; add it where they touch by design'
+        )
     return scene
 
 
@@ -106,7 +118,11 @@ def always_in_contact(scene: PlanningScene, limits: JointLimits) -> frozenset[Pa
     return frozenset(candidates)
 
 
-def _words(pairs: list[list[str]]) -> str:
+def _sorted(pairs: Iterable[Pair]) -> list[list[str]]:
+    return sorted(sorted(pair) for pair in pairs)
+
+
+def _named(pairs: list[list[str]]) -> str:
     shown = ', '.join(f'{first} and {second}' for first, second in pairs[:MAX_NAMED])
     more = len(pairs) - MAX_NAMED
     return f'{shown} and {more} pairs more' if more > 0 else shown
