@@ -71,18 +71,23 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
 def test_all_are_operational_after_the_last_of_them(
     node: Node, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """The log has the line of each device before the one of all."""
+    """The log has the line of each device before the one of all; warnings count for none."""
     config = load_text(tmp_path, added('joint1', ''))
     bus = VirtualBus('here', VirtualWire())
     process = MasterProcess(node, config, bus, diagnostics_period=60.0)
     for device in config.nodes:
+        process._master._report(Event(EventKind.BOOT, Severity.WARNING, device.name, 'watches'))
+    for device in config.nodes:
+        process._network.nodes[device.name].online = True
         process._master._report(Event(EventKind.BOOT, Severity.INFO, device.name, 'operational'))
+    process._master._report(Event(EventKind.BOOT, Severity.WARNING, device.name, 'operational'))
     process._output.start()
     process._output.stop()
     lines = capfd.readouterr().err.splitlines()
     count = len(config.nodes)
-    assert ['operational' in line for line in lines[-count - 1 :]] == [True] * (count + 1)
-    assert f'all {count} devices operational' in lines[-1]
+    assert ['operational' in line for line in lines[-count - 2 :]] == [True] * (count + 2)
+    assert f'all {count} devices operational' in lines[-2]
+    assert 'devices operational' not in ''.join(lines[:-2])
     bus.close()
 
 

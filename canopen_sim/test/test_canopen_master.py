@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 import os
 from pathlib import Path
 import subprocess
@@ -24,8 +25,11 @@ from arm_canopen import (
     DriveState,
     Event,
     EventKind,
+    load_bus,
+    open_bus,
     OperationMode,
     Refusal,
+    Severity,
 )
 from arm_canopen.can.plugin import ArmCanopenBus
 from arm_canopen.exceptions import (
@@ -38,6 +42,8 @@ from arm_canopen.exceptions import (
     SdoAbortError,
 )
 from arm_canopen.master import other_master
+from arm_canopen.standard.dictionary import ObjectDictionary
+from canopen_sim.runner import DeviceRunner
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 TIMEOUT = 30.0  # [s]
@@ -283,6 +289,32 @@ def test_missing_devices_are_named(bus_yml: Path, bus: str) -> None:
         with program('-m', 'canopen_sim.fake_slaves_command', bus_yml, '--can', bus):
             master.boot(TIMEOUT)
             master.drive('joint1').enable()
+
+
+def test_a_warning_on_the_way_does_not_end_a_boot(bus_yml: Path, bus: str) -> None:
+    """Of a device that watches others in all entries of 0x1016; it boots all the same."""
+    config = load_bus(bus_yml)
+    last = config.nodes[-1]
+    others = [
+        replace(entry, default=0x0055_0064) if entry.index == 0x1016 and entry.subindex else entry
+        for entry in last.dictionary
+    ]
+    booting: list[Event] = []
+
+    with open_bus(bus) as can:
+        devices = DeviceRunner(can)
+        devices.host.add(config.nodes[0].node_id, config.nodes[0].dictionary)
+        devices.host.add(last.node_id, ObjectDictionary(others))
+        devices.start()
+        try:
+            with CanopenMaster.from_bus_yml(bus_yml, bus, on_event=booting.append) as master:
+                master.boot(TIMEOUT)
+                online = [each.status().online for each in master.devices.values()]
+        finally:
+            devices.stop()
+    assert online == [True, True]
+    severities = {event.severity for event in booting if event.kind is EventKind.BOOT}
+    assert severities == {Severity.WARNING, Severity.INFO}
 
 
 def test_a_second_master_is_refused(

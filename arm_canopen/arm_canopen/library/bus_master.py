@@ -182,7 +182,9 @@ class BusMaster:
         self._report_event(event)
         if event.kind is EventKind.HEARTBEAT_LOST:
             self._operational.discard(event.node)
-        elif event.kind is EventKind.BOOT:
+        elif event.kind is EventKind.BOOT and event.node not in self._operational:
+            if not self.network.nodes[event.node].online:
+                return  # a warning on the way
             self._operational.add(event.node)
             if len(self._operational) == len(self.config.nodes):
                 self.on_operational()
