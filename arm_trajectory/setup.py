@@ -10,14 +10,20 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 
 def sibling(folder: str) -> str:
-    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI.
+
+    A wheel is for the machine that built it: it names the folder. An sdist has no neighbours.
+    """
     path = CHECKOUT / folder
-    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+    if not path.is_dir():
+        raise SystemExit(f'{path} is missing: install from a checkout of the whole repository')
+    return f'{path.name} @ {path.as_uri()}'
 
 
 setup(
     name='arm_trajectory',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['arm_trajectory', 'arm_trajectory.*']),
     package_data={'arm_trajectory': ['py.typed']},
     data_files=[

@@ -7,7 +7,7 @@ import sys
 
 from setuptools import find_packages, setup
 
-# colcon runs one of these commands; pip builds a wheel, and what needs `ros2 run` is not in it
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
@@ -23,14 +23,20 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 
 
 def sibling(folder: str) -> str:
-    """Require a package of this checkout as it stands here, and never one of that name on PyPI."""
+    """Require a package of this checkout as it stands here, and never one of that name on PyPI.
+
+    A wheel is for the machine that built it: it names the folder. An sdist has no neighbours.
+    """
     path = CHECKOUT / folder
-    return f'{path.name} @ {path.as_uri()}' if path.is_dir() else path.name
+    if not path.is_dir():
+        raise SystemExit(f'{path} is missing: install from a checkout of the whole repository')
+    return f'{path.name} @ {path.as_uri()}'
 
 
 setup(
     name='canopen_tools',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['canopen_tools', 'canopen_tools.*']),
     package_data={'canopen_tools': ['py.typed']},
     data_files=[

@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 setup(
     name='dds_network',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['dds_network', 'dds_network.*']),
     package_data={'dds_network': ['py.typed', '*.xml']},
     data_files=[

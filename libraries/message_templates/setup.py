@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 setup(
     name='message_templates',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['message_templates', 'message_templates.*']),
     package_data={'message_templates': ['py.typed']},
     data_files=[

@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 setup(
     name='realtime_loop',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['realtime_loop', 'realtime_loop.*']),
     package_data={'realtime_loop': ['py.typed']},
     data_files=[

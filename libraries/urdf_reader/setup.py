@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 setup(
     name='urdf_reader',
     version='0.1.0',
+    python_requires='>=3.10',
     packages=find_packages(include=['urdf_reader', 'urdf_reader.*']),
     package_data={'urdf_reader': ['py.typed']},
     data_files=[

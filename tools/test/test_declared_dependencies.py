@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 import runpy
+import shutil
 import sys
 from typing import Any
 
@@ -48,13 +49,19 @@ OPTIONAL = {'arm_bringup': {'arm_model', 'arm_servo', 'arm_trajectory', 'python3
 PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
 
-def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
-    """Return the requirements of a package, extras included: name and versions."""
+def described(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return what the setup.py of a folder says for a wheel."""
     keywords: dict[str, Any] = {}
     monkeypatch.setattr('setuptools.setup', keywords.update)
-    monkeypatch.chdir(PACKAGES[name].folder)
+    monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, 'argv', ['setup.py', 'bdist_wheel'])
     runpy.run_path('setup.py')
+    return keywords
+
+
+def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Return the requirements of a package, extras included: name and versions."""
+    keywords = described(PACKAGES[name].folder, monkeypatch)
     extras = keywords.get('extras_require', {}).values()
     lines = [*keywords.get('install_requires', []), *(line for lines in extras for line in lines)]
     split = (re.match(r'([\w-]+)\s*(.*)', line) for line in lines)
@@ -118,9 +125,43 @@ def test_what_is_pinned_is_new_enough(name: str, monkeypatch: pytest.MonkeyPatch
             continue
         pinned = re.findall(rf'^{other}==([\d.]+)', text, re.MULTILINE | re.IGNORECASE)
         assert pinned, f'{other} is in no file of tools/requirements'
-        oldest = re.match(r'>=([\d.]+)$', versions)
+        oldest = re.match(r'>=([\d.]+)(;|$)', versions)
         if oldest is not None:
             assert all(number(version) >= number(oldest[1]) for version in pinned)
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_what_runs_on_older_python_than_the_code_is_refused(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The code is checked for the Python that setup.py asks for."""
+    checked = re.search("\npython_version = '(.*)'", (LAYOUT.root / 'pyproject.toml').read_text())
+    assert checked is not None
+    keywords = described(PACKAGES[name].folder, monkeypatch)
+    assert keywords['python_requires'] == f'>={checked[1]}'
+
+
+def test_what_only_linux_has_is_required_there_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rest of operator_input works elsewhere, and evdev cannot be built there."""
+    assert declared('operator_input', monkeypatch)['evdev'].endswith('; sys_platform == "linux"')
+
+
+def test_without_its_neighbours_a_package_is_not_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of that name on PyPI would be anybody's."""
+    shutil.copy(PACKAGES['arm_trajectory'].folder / 'setup.py', tmp_path)
+    with pytest.raises(SystemExit, match='arm_model is missing: install from a checkout'):
+        described(tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize('copied', [r'def sibling\((?:.|\n)*?\n\n\n', r'.*\n\n?FOR_ROS = .*'])
+def test_what_every_setup_py_has_to_repeat_is_the_same_everywhere(copied: str) -> None:
+    """Nothing of ours can be imported where pip builds a package."""
+    texts = [(package.folder / 'setup.py').read_text() for package in PACKAGES.values()]
+    copies = [copy for text in texts for copy in re.findall(copied, text)]
+    assert len(copies) > 10
+    assert len(set(copies)) == 1
 
 
 def number(version: str) -> tuple[int, ...]:
