@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 import os
 from pathlib import Path
 import subprocess
@@ -277,6 +278,22 @@ def test_a_program_that_forgets_to_close_leaves_no_drive_enabled(
         assert process.wait(TIMEOUT) == 0
     with independent_client(bus, monkeypatch) as network:
         assert not is_enabled(statusword(network, 2))
+
+
+def test_calls_before_the_boot_are_refused(bus_yml: Path, bus: str) -> None:
+    """They would wait for ever, also after the end of a master that was not booted."""
+    master = CanopenMaster.from_bus_yml(bus_yml, bus)
+    drive, device = master.drive('joint1'), master.device('joint1')
+    calls = (drive.enable, drive.status, device.status, partial(drive.sdo.read, 0x6041))
+
+    def refuses(reason: str) -> None:
+        for call in calls:
+            with pytest.raises(BusError, match=reason):
+                call()
+
+    refuses(r'does not run; call boot\(\) first')
+    master.close()
+    refuses('has ended')
 
 
 def test_missing_devices_are_named(bus_yml: Path, bus: str) -> None:

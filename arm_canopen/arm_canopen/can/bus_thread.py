@@ -47,10 +47,20 @@ class BusThread:
         self._owner = owner
         self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._open: set[Future[Any]] = set()
+        self._too_early = ''
+        self._started = False
         self._ended = False
         self._failed = False
         self._begin: Callable[[], None] = lambda: None
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def refuse_before_start(self, reason: str) -> None:
+        """Refuse what is handed over before the start, which otherwise waits for it.
+
+        Args:
+            reason: Text of the BusError.
+        """
+        self._too_early = reason
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Start the thread.
@@ -59,14 +69,17 @@ class BusThread:
             begin: Called first in the thread, which may want a priority.
         """
         self._begin = begin
+        self._started = True
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread after the step that runs, and wait for it."""
+        """End the thread after the step that runs, and wait for it; it may not have begun."""
         self.stopping = True
+        if not self._started:
+            self._end()
+            return
         self._bus.wake()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._thread.join()
 
     def call(self, function: Callable[[], T]) -> Future[T]:
         """Run a function in the thread; it must not wait.
@@ -125,6 +138,9 @@ class BusThread:
                     future.set_exception(error)
 
     def _hand_over(self, future: Future[Any], work: Callable[[], None]) -> None:
+        if self._too_early and not (self._started or self._ended):
+            future.set_exception(BusError(self._too_early))
+            return
         self._work.append((future, work))
         if self._ended:
             self._refuse_work()
@@ -145,7 +161,10 @@ class BusThread:
         except Exception:
             logger.exception('%s has ended by a defect', self._owner)
         finally:
-            self._ended = True
-            self._refuse_work()
-            for future in list(self._open):
-                future.set_exception(BusError(f'{self._owner} has ended'))
+            self._end()
+
+    def _end(self) -> None:
+        self._ended = True
+        self._refuse_work()
+        for future in list(self._open):
+            future.set_exception(BusError(f'{self._owner} has ended'))

@@ -51,7 +51,8 @@ class CanopenMaster:
     """Master of one bus: boots its devices, runs the SYNC cycle, and stops the drives at the end.
 
     The cycle is that of the ROS node. It runs in a thread that belongs to this object; the calls
-    come from any other thread, and each waits for its result. Leaving the ``with`` statement, or
+    come from any other thread, and each waits for its result; before :meth:`boot` and after
+    :meth:`close` they raise a BusError. Leaving the ``with`` statement, or
     :meth:`close`, brings every drive to quick stop and disables it. So does the end of a program
     that forgot it; drives of one that was killed stop by the heartbeat of the master (0x1016).
 
@@ -88,6 +89,7 @@ class CanopenMaster:
         self._closed = False
         self._exit = ExitStack()
         thread = self._master.thread
+        thread.refuse_before_start(f'{OWNER} does not run; call boot() first')
         self.drives: Mapping[str, CanopenDrive] = MappingProxyType(
             {name: CanopenDrive(each, thread) for name, each in self._master.commands.items()}
         )
@@ -230,11 +232,11 @@ class CanopenMaster:
         self._closed = True
         atexit.unregister(self.close)
         with self._exit:
-            if self._master.started:
-                try:
+            try:
+                if self._master.started:
                     self._master.stop_drives()
-                finally:
-                    self._master.thread.stop()
+            finally:
+                self._master.thread.stop()
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""

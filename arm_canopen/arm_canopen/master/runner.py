@@ -53,6 +53,10 @@ class NetworkThread:
         self._cycle_time = 0.0
         self._thread = BusThread(bus, 'canopen', self._serve, OWNER)
 
+    def refuse_before_start(self, reason: str) -> None:
+        """Refuse what is handed over before the start, with a BusError of this text."""
+        self._thread.refuse_before_start(reason)
+
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Start the network and its cycle.
 
