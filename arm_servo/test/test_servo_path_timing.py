@@ -194,7 +194,7 @@ def refusal(core: MotionCore, goal: TrajectoryGoal) -> str:
     return ''
 
 
-def test_a_little_haste_is_late_and_says_so() -> None:
+def test_what_takes_a_little_longer_is_late_and_says_so() -> None:
     """What takes a little longer than asked is followed, and the end says how late and why."""
     core, begin = core_of('panda'), ready('panda')
     end = begin + np.eye(7)[0] * 0.3

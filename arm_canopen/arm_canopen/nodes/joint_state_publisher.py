@@ -58,7 +58,7 @@ class JointStatePublisher(Node):
         self._missing: list[str] = []
         for joint in joints:
             self._listen_to(joint.name)
-        self.create_timer(WATCH_PERIOD, self._look)
+        self.create_timer(WATCH_PERIOD, self._report_silence)
         names = ', '.join(joint.name for joint in joints)
         self.get_logger().info(f'publishing {len(joints)} joints: {names}')
         notify_ready()
@@ -87,7 +87,7 @@ class JointStatePublisher(Node):
         self._watch.note(joint)
         self._robot.update(joint, stamp, sample)
 
-    def _look(self) -> None:
+    def _report_silence(self) -> None:
         now = time.monotonic()
         silent = self._robot.aggregator.silent(now)
         published = [name for name in silent if self.count_publishers(f'{name}/joint_states')]

@@ -68,8 +68,8 @@ class GoalPath:
 
 
 @dataclass(frozen=True, slots=True)
-class _Haste:
-    """What needs more time, in a sentence and in short, when, and how many times the time."""
+class _TimeDeficit:
+    """Too little time: why, in a sentence and in short, when, and how many times it is enough."""
 
     reason: str
     cause: str
@@ -105,7 +105,7 @@ def build_path(
     raise refuse(f'{answer.reason}; give the trajectory {factor:.2f} times the time')
 
 
-def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
     """Return the path through points, or why there is too little time for it."""
     if state.moving:
         return _from_motion(points, limits, state)
@@ -126,7 +126,7 @@ def _tried(points: Points, limits: JointLimits, state: RobotState) -> GoalPath |
     return answer
 
 
-def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
     """Return the path through points from a state of rest, or why there is too little time."""
     segments = [*_first(points, state), *_between(points, limits)]
     if not segments:  # one point, at once, where the arm is
@@ -138,42 +138,44 @@ def _from_rest(points: Points, limits: JointLimits, state: RobotState) -> GoalPa
             raise beyond
         straight = linear(0.0, segments[0].duration, state.position, points.positions[0])
         path = Path([straight, *segments[1:]])
-    scaled, haste = _time_scaled(path, limits)
-    return haste if scaled is None else _in_time(scaled, points, haste)
+    scaled, deficit = _time_scaled(path, limits)
+    return deficit if scaled is None else _in_time(scaled, points, deficit)
 
 
-def _from_motion(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+def _from_motion(
+    points: Points, limits: JointLimits, state: RobotState
+) -> GoalPath | _TimeDeficit:
     """Return the path through points of an arm in motion, or why there is too little time.
 
     From the first point on it is the same wherever the arm comes from.
     """
     lead, begin = float(points.times[0]), points.at(0)
-    shifted, haste = points.delayed(-lead), _Haste('', '', lead)
+    shifted, deficit = points.delayed(-lead), _TimeDeficit('', '', lead)
     segments = _between(shifted, limits)
     onward: Sequence[Segment] = [*segments, *_run_out(shifted, segments, limits)]
     if onward:
         path = Path(onward)
         if (beyond := _beyond(path, limits, state)) is not None:
             raise beyond
-        scaled, haste = _time_scaled(path, limits, from_rest=False)
-        haste = replace(haste, time=lead + haste.time)
+        scaled, deficit = _time_scaled(path, limits, from_rest=False)
+        deficit = replace(deficit, time=lead + deficit.time)
         if scaled is None:
-            return haste
+            return deficit
         begin, onward = scaled.at(0.0), scaled.segments
     approach = approach_path(state, begin, lead, limits)
     if approach is None:
         return _after_stop(points, limits, state)
     if approach.duration > lead + NEGLIGIBLE_DELAY or not onward:
-        haste = _Haste(
+        deficit = _TimeDeficit(
             f'from its motion the arm needs {approach.duration:.3f} s to the first point, which'
             f' is at {lead:.3f} s',
             'way from the motion to the first point',
             lead,
         )
-    return _in_time(approach.followed_by(onward), points, haste)
+    return _in_time(approach.followed_by(onward), points, deficit)
 
 
-def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _Haste:
+def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalPath | _TimeDeficit:
     """Return the path through points of an arm that comes to rest first.
 
     For a first point to which no way leads from the motion within the limits of position.
@@ -184,37 +186,37 @@ def _after_stop(points: Points, limits: JointLimits, state: RobotState) -> GoalP
     saved = stop.duration if points.times[0] > 2.0 * stop.duration else 0.0
     rest = RobotState.at_rest(stop.end.position)
     answer = _tried(points.delayed(-saved), limits, rest)
-    if isinstance(answer, _Haste):
+    if isinstance(answer, _TimeDeficit):
         return replace(answer, time=answer.time + saved)
-    haste = _Haste(
+    deficit = _TimeDeficit(
         f'the arm needs {stop.duration:.3f} s to come to rest first',
         'stop in front of it',
         stop.duration,
     )
-    return _in_time(stop.followed_by(answer.path.segments), points, haste)
+    return _in_time(stop.followed_by(answer.path.segments), points, deficit)
 
 
 def _time_scaled(
     path: Path, limits: JointLimits, *, from_rest: bool = True
-) -> tuple[Path | None, _Haste]:
+) -> tuple[Path | None, _TimeDeficit]:
     """Return a path with its corners rounded, as quick as can be, and what asks most of it."""
     demand = Timing(path, limits).fastest
     if demand.time_factor > MAX_SPEED_EXCESS:
-        return None, _haste(demand, limits, demand.time_factor)
+        return None, _time_deficit(demand, limits, demand.time_factor)
     timing = Timing(rounded(path, limits, from_rest=from_rest), limits)
-    return timing.time_scaled(), _haste(timing.plainest, limits, timing.demand.time_factor)
+    return timing.time_scaled(), _time_deficit(timing.plainest, limits, timing.demand.time_factor)
 
 
-def _in_time(path: Path, points: Points, haste: _Haste) -> GoalPath | _Haste:
+def _in_time(path: Path, points: Points, deficit: _TimeDeficit) -> GoalPath | _TimeDeficit:
     """Return a path that does not take much longer than asked, or why it does."""
     most = MAX_DELAY[0] * points.requested_duration + MAX_DELAY[1]
     if path.duration > most:
         enough = (path.duration - MAX_DELAY[1]) / MAX_DELAY[0]
-        return replace(haste, factor=enough / max(points.requested_duration, 1e-9))
+        return replace(deficit, factor=enough / max(points.requested_duration, 1e-9))
     late = path.duration - points.requested_duration
     if late < NEGLIGIBLE_DELAY:
         return GoalPath(path, '')
-    return GoalPath(path, f'{late:.2f} s later than requested, for the {haste.cause}')
+    return GoalPath(path, f'{late:.2f} s later than requested, for the {deficit.cause}')
 
 
 def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: float) -> float:
@@ -235,11 +237,11 @@ def _hundredths(factor: float) -> float:
     return math.ceil(factor * 100.0) / 100.0
 
 
-def _haste(demand: Demand, limits: JointLimits, factor: float) -> _Haste:
+def _time_deficit(demand: Demand, limits: JointLimits, factor: float) -> _TimeDeficit:
     unit, quantity = QUANTITIES[demand.quantity]
     limit = (limits.velocity, limits.acceleration, limits.jerk)[demand.quantity][demand.joint]
     name = limits.names[demand.joint]
-    return _Haste(
+    return _TimeDeficit(
         f'{name} would need {demand.value:.3f} {unit} at {demand.time:.3f} s, its limit of'
         f' {quantity} is {limit:.3f}',
         f'{quantity} of {name}',
