@@ -148,9 +148,12 @@ class BusThread:
             self._bus.wake()
 
     def _refuse_work(self) -> None:
-        """Leave nobody waiting for what will not be done any more."""
-        while self._work:
-            future, _ = self._work.popleft()
+        """Leave nobody waiting for what will not be done any more; several threads may do so."""
+        while True:
+            try:
+                future, _ = self._work.popleft()
+            except IndexError:
+                return
             if future.set_running_or_notify_cancel():
                 future.set_exception(BusError(f'{self._owner} has ended'))
 
@@ -165,6 +168,6 @@ class BusThread:
 
     def _end(self) -> None:
         self._ended = True
-        self._refuse_work()
         for future in list(self._open):
             future.set_exception(BusError(f'{self._owner} has ended'))
+        self._refuse_work()

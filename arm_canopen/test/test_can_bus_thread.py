@@ -1,0 +1,52 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a thread that owns a bus, while others hand work over."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+import sys
+import threading
+
+import pytest
+
+from arm_canopen.can.bus_thread import BusThread
+from arm_canopen.can.virtual import VirtualBus, VirtualWire
+from arm_canopen.exceptions import BusError
+
+TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
+CALLERS, CALLS = 3, 2000
+
+
+@pytest.mark.parametrize('attempt', range(5))  # what may go wrong does not do so each time
+def test_all_that_is_handed_over_around_the_end_is_answered(
+    attempt: int, request: pytest.FixtureRequest
+) -> None:
+    """Several threads refuse the work that is left, each of them what the others have not."""
+    request.addfinalizer(partial(sys.setswitchinterval, sys.getswitchinterval()))
+    sys.setswitchinterval(1e-6)
+    begun, ending = threading.Event(), threading.Event()
+
+    def serve() -> None:
+        begun.wait(TIMEOUT)
+        thread.do_work()
+        ending.wait(TIMEOUT)
+
+    def hand_over() -> list[Future[None]]:
+        return [thread.call(lambda: None) for _ in range(CALLS)]
+
+    thread = BusThread(VirtualBus('here', VirtualWire()), 'owner', serve, 'the owner')
+    running: Future[None] = thread.run(lambda future: begun.set())
+    thread.start()
+    begun.set()
+    with ThreadPoolExecutor(CALLERS) as pool:
+        waiting = [future for _ in range(CALLERS) for future in hand_over()]
+        callers = [pool.submit(hand_over) for _ in range(CALLERS)]
+        ending.set()
+        late = [future for caller in callers for future in caller.result()]
+    thread.stop()
+    for future in (running, *waiting, *late):
+        assert future.exception(TIMEOUT) is None or isinstance(future.exception(), BusError)
+    with pytest.raises(BusError, match='the owner has ended'):
+        running.result(TIMEOUT)
