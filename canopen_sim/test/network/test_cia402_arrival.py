@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that is waited for: it arrives, or its caller hears that another one replaced it."""
+"""A motion that is waited for: it arrives, or its caller gets an error that it was replaced."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_a_motion_ends_where_its_target_is(mode: OperationMode) -> None:
 
 @MODES
 def test_a_motion_that_is_replaced_fails_and_the_other_one_arrives(mode: OperationMode) -> None:
-    """Its caller is told at once, and not that it has arrived somewhere."""
+    """Its caller learns it at once, and not that it has arrived somewhere."""
     client = Client(mode)
     first = client.move_to(1.5)
     client.net.run(0.3)
