@@ -19,8 +19,10 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
-from arm_canopen.exceptions import BusError
+from arm_canopen.exceptions import BusError, CanopenError, DriveError
+from arm_canopen.library.canopen_master import CanopenMaster
 from arm_canopen.master.events import Event, EventKind, Severity
+from arm_canopen.nodes import master
 from arm_canopen.nodes.master_process import MasterProcess
 
 DEADLINE = 10.0  # [s] for what takes milliseconds
@@ -65,6 +67,33 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
         process.attach(NoSource()).result(DEADLINE)
     process.stop()
     assert not any(thread.is_alive() for thread in started)
+    bus.close()
+
+
+def test_a_defect_that_ends_the_cycle_ends_the_program_with_its_reason(node: Node) -> None:
+    """No process is left that answers and leads no drive."""
+    bus = BreakingBus('here', VirtualWire())
+    process = MasterProcess(node, CONFIG, bus, diagnostics_period=60.0)
+
+    def extend(_: object) -> list[Node]:
+        node.create_timer(0.01, lambda: setattr(bus, 'broken', True))  # when it runs
+        return []
+
+    with pytest.raises(CanopenError, match='has ended by a defect: ZeroDivisionError: injected'):
+        master._serve([process], threading.Event(), extend)
+    bus.close()
+
+
+def test_a_defect_that_ends_the_cycle_ends_a_boot(tmp_path: Path) -> None:
+    """Its caller hears why, and waits no longer; the drives could not be stopped."""
+    bus = BreakingBus('here', VirtualWire())
+    made = CanopenMaster(load_text(tmp_path, added('joint1', '')), bus)
+
+    made._master.network.on_cycle = lambda now, period: setattr(bus, 'broken', True)
+    with pytest.raises(BusError, match='has ended by a defect: ZeroDivisionError: injected'):
+        made.boot(DEADLINE)
+    with pytest.raises(DriveError, match='could not be stopped'):
+        made.close()
     bus.close()
 
 

@@ -30,6 +30,7 @@ class BusThread:
 
     Attributes:
         stopping: The end is wanted.
+        on_failure: Called in the thread, at its end, with the defect that has ended it.
     """
 
     def __init__(self, bus: Bus, name: str, serve: Callable[[], None], owner: str) -> None:
@@ -42,6 +43,7 @@ class BusThread:
             owner: Who that is, for messages.
         """
         self.stopping = False
+        self.on_failure: Callable[[Exception], None] = lambda error: None
         self._bus = bus
         self._serve = serve
         self._owner = owner
@@ -158,13 +160,17 @@ class BusThread:
                 future.set_exception(BusError(f'{self._owner} has ended'))
 
     def _run(self) -> None:
+        failure: Exception | None = None
         try:
             self._begin()
             self._serve()
-        except Exception:
+        except Exception as error:
             logger.exception('%s has ended by a defect', self._owner)
+            failure = error
         finally:
             self._end()
+        if failure is not None:
+            self.on_failure(failure)
 
     def _end(self) -> None:
         self._ended = True

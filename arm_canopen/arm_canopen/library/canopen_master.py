@@ -89,6 +89,7 @@ class CanopenMaster:
         self._closed = False
         self._exit = ExitStack()
         thread = self._master.thread
+        thread.on_failure = self._booted.set  # who waits there sees the failure
         thread.refuse_before_start(f'{OWNER} does not run; call boot() first')
         self.drives: Mapping[str, CanopenDrive] = MappingProxyType(
             {name: CanopenDrive(each, thread) for name, each in self._master.commands.items()}
@@ -151,7 +152,7 @@ class CanopenMaster:
         Raises:
             OtherMasterError: Another master leads this bus.
             BootError: Devices are missing; the message has the phase of each.
-            BusError: The master has ended.
+            BusError: The master has ended, or ends by a defect meanwhile.
         """
         if self._closed:
             raise BusError(f'{OWNER} has ended')
@@ -163,7 +164,10 @@ class CanopenMaster:
         if timeout is None:
             longest = max((each.boot_timeout for each in self.bus.nodes), default=0.0)
             timeout = BOOT_ATTEMPTS * longest
-        if self.bus.nodes and not self._booted.wait(timeout):
+        booted = not self.bus.nodes or self._booted.wait(timeout)
+        if self._master.thread.failure is not None:
+            raise self._master.thread.failure
+        if not booted:
             statuses = [each.status() for each in self.devices.values()]
             missing = '; '.join(
                 f'{each.name} (node {each.node_id}) {each.phase.value}: {each.phase_detail}'

@@ -17,6 +17,7 @@ from realtime_loop import Cycle, CycleTimer
 from ..can.bus import Bus
 from ..can.bus_thread import BusThread
 from ..can.frame import Frame
+from ..exceptions import BusError
 from .network import Network
 from .scheduler import Promise
 from .statistics import CycleFigures, CycleStatistics
@@ -38,6 +39,8 @@ class NetworkThread:
     Attributes:
         network: The network that it runs.
         period: Length of the cycle in [s].
+        failure: Defect that has ended it; None while it runs, and after a wanted end.
+        on_failure: Called in the thread when there is one.
     """
 
     def __init__(self, bus: Bus, network: Network) -> None:
@@ -49,9 +52,12 @@ class NetworkThread:
         """
         self.network = network
         self.period = network.config.master.cycle_period
+        self.failure: BusError | None = None
+        self.on_failure: Callable[[], None] = lambda: None
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
         self._thread = BusThread(bus, 'canopen', self._serve, OWNER)
+        self._thread.on_failure = self._fail
 
     def refuse_before_start(self, reason: str) -> None:
         """Refuse what is handed over before the start, with a BusError of this text."""
@@ -100,6 +106,11 @@ class NetworkThread:
     def figures(self) -> CycleFigures:
         """Return the figures of the cycle; call it in the thread of the cycle."""
         return self._statistics.figures()
+
+    def _fail(self, error: Exception) -> None:
+        text = f'{OWNER} has ended by a defect: {type(error).__name__}: {error}'
+        self.failure = BusError(text)
+        self.on_failure()
 
     def _serve(self) -> None:
         self.network.start(time.monotonic())

@@ -76,7 +76,8 @@ def run_master(
         errors: What it may raise then, to be logged in one line.
 
     Returns:
-        Exit code: 0, or 1 when the bus could not be configured or opened, or has a master.
+        Exit code: 0, or 1 when the bus could not be configured or opened, has a master, or its
+        cycle has ended by a defect.
     """
     sys.setswitchinterval(SWITCH_INTERVAL)
     return run_program(
@@ -125,7 +126,8 @@ def serve_buses(stop: threading.Event, extend: Extend | None = None) -> None:
         extend: As of :func:`run_master`.
 
     Raises:
-        CanopenError: A bus could not be configured or opened, or has a master.
+        CanopenError: A bus could not be configured or opened, has a master, or its cycle has
+            ended by a defect.
     """
     first = Node('master')
     try:
@@ -182,10 +184,14 @@ def _serve(
             with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
                 list(pool.map(MasterProcess.listen, processes))
             for process in processes:
+                process.end_on_failure(stop)
                 process.start()
             spin([*nodes, *others], stop)
         finally:
             _stop(processes, others)
+        for process in processes:
+            if process.failure is not None:
+                raise process.failure
 
 
 def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:

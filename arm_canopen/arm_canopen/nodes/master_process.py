@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future, wait
 from functools import partial
+import threading
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -109,6 +110,19 @@ class MasterProcess:
         self._output.start()
         what, priority = 'the CANopen cycle', self._thread_priority
         self._master.start(lambda: raise_thread_priority(self._node, priority, what))
+
+    def end_on_failure(self, stop: threading.Event) -> None:
+        """Have the program end when a defect has ended the cycle; call it before :meth:`start`.
+
+        Args:
+            stop: Ends the program.
+        """
+        self._thread.on_failure = stop.set
+
+    @property
+    def failure(self) -> CanopenError | None:
+        """The defect that has ended the cycle, if any."""
+        return self._thread.failure
 
     def stop(self) -> None:
         """Bring every drive to quick stop and disable it, then end the cycle."""
