@@ -15,7 +15,7 @@ from ..jog.jogging import Jogging
 from ..jog.servo_source import Command
 from ..report import MotionReport
 from .execution import Execution
-from .outcome import Outcome
+from .outcome import CONTINUED, Outcome
 from .set_point import Source
 from .settings import CoreSettings
 from .single_target import SingleTarget
@@ -103,7 +103,7 @@ class CommandArbiter:
             target: The target.
         """
         if self.active is Source.TARGET:  # displacements add up: what was asked before is in it
-            self.end(Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it'))
+            self.end(CONTINUED)
         self.release('a single target took over')
         self.active, self.target = Source.TARGET, target
 

@@ -25,6 +25,10 @@ class Outcome:
     canceled: bool = False
 
 
+CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
+"""A single target that was not reached, as another one took its place."""
+
+
 def refused(error: BaseException) -> Outcome:
     """Return the outcome of a motion that does not begin.
 

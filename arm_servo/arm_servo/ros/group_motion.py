@@ -14,6 +14,8 @@ from arm_model import RobotModel
 from node_runner import ParameterReader
 
 from ..core.gateway import CommandGateway
+from ..core.requests import StopRequest
+from ..core.set_point import Source
 from ..core.settings import CoreSettings
 from .controller_manager import Controller, trajectory_entry
 from .gripper.controller import GripperController
@@ -101,7 +103,7 @@ class ArmMotion(Generic[AnyDrives]):
         """
         if self._controller is None:
             return []
-        return [_entry(self.nodes[0], self.drives, period, self._controller)]
+        return [_entry(self.nodes[0], self.drives, period, self._controller.set_active)]
 
 
 def _check_of_servo(servo: Node | None) -> bool:
@@ -156,7 +158,7 @@ class ToolMotion(Generic[AnyDrives]):
         self._controller = TrajectoryController(
             controller, drives.gateway, trajectory, drives.prepare
         )
-        self._gripper = GripperController(controller, drives.gateway, gripper, drives.prepare)
+        self._gripper = GripperController(controller, drives.gateway, gripper, self._get_ready)
 
     def entries(self, period: float) -> list[Controller]:
         """Return the controller as the manager shows it.
@@ -164,11 +166,22 @@ class ToolMotion(Generic[AnyDrives]):
         Args:
             period: Period of the cycle in [s].
         """
-        return [_entry(self.nodes[0], self.drives, period, self._controller)]
+        return [_entry(self.nodes[0], self.drives, period, self._set_active)]
+
+    def _get_ready(self) -> None:
+        """Get the drives back for the gripper, which shares the controller's node and state."""
+        self._controller.check_active()
+        self.drives.prepare()
+
+    def _set_active(self, active: bool) -> None:  # a callback of the manager
+        self._controller.set_active(active)
+        if not active:
+            stop = StopRequest('the controller was deactivated', (Source.TARGET,))
+            self.drives.gateway.command(stop)
 
 
 def _entry(
-    node: Node, drives: Drives, period: float, controller: TrajectoryController
+    node: Node, drives: Drives, period: float, set_active: Callable[[bool], None]
 ) -> Controller:
     joints = drives.gateway.model.joints
-    return trajectory_entry(node.get_name(), joints, period, controller.set_active)
+    return trajectory_entry(node.get_name(), joints, period, set_active)

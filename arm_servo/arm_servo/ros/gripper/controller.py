@@ -20,6 +20,7 @@ from arm_trajectory import GoalCode
 from node_runner.action_goals import serve_goals
 
 from ...core.gateway import CommandGateway, MotionCommand
+from ...core.outcome import CONTINUED
 from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
 from .parameters import GripperParameters
 
@@ -63,7 +64,8 @@ class GripperController:
             node: The controller's node.
             gateway: Commands to the core.
             parameters: How it behaves.
-            prepare: Called before a motion, to get the drives back.
+            prepare: Called before a motion, to get the drives back; raises an ArmError where
+                no motion may begin.
         """
         self._node, self._gateway = node, gateway
         self._parameters, self._prepare = parameters, prepare
@@ -114,6 +116,8 @@ class GripperController:
             state = goal.state
             if goal.problem or (state is not None and (state.reached or state.stalled)):
                 goal.is_concluded = True
+                if goal.command is not None and not self._parameters.allow_stalling:
+                    self._gateway.cancel(goal.command, 'stalled')  # nothing moves after the end
                 server = self._servers[goal.interface.name]
                 server.notify_execute(goal.handle, None)  # leads to _conclude
             elif state is not None:
@@ -123,7 +127,7 @@ class GripperController:
         """Return where the gripper is, and whether it stalls or is there."""
         now, command = time.monotonic(), goal.command
         moves = bool((np.abs(measured.velocity) > self._parameters.stall_velocity).any())
-        if moves or command is None or command.motion is None:
+        if moves or not self._is_pushed(command):
             goal.last_motion = now
         reached = False
         if command is not None and command.ended.done():
@@ -132,6 +136,16 @@ class GripperController:
             )
         stalled = not reached and now - goal.last_motion > self._parameters.stall_timeout
         return GripperState(self._joints, measured, stalled, reached)
+
+    def _is_pushed(self, command: MotionCommand | None) -> bool:
+        """Whether set-points move the gripper, or have done so: not before it, or in a pause."""
+        if command is None or command.motion is None:
+            return False
+        point = self._gateway.snapshot.set_point
+        return command.ended.done() or (
+            point is not None
+            and bool((np.abs(point.state.velocity) > self._parameters.stall_velocity).any())
+        )
 
     def _there(self, command: MotionCommand, measured: RobotState) -> bool:
         """Whether all joints of a goal are within its tolerance."""
@@ -147,8 +161,11 @@ class GripperController:
             return 'it was refused'
         if command.ended.done():
             outcome = command.ended.result()
-            went_well = outcome.code is GoalCode.SUCCESSFUL and not outcome.canceled
-            return '' if went_well else outcome.reason
+            if outcome is CONTINUED:
+                return 'a newer goal took over'
+            if outcome.code is not GoalCode.SUCCESSFUL or outcome.canceled:
+                return outcome.reason
+            return 'canceled' if goal.handle.is_cancel_requested else ''
         if command.motion is None and time.monotonic() - goal.begin > START_TIMEOUT:
             self._gateway.cancel(command, 'the cycle does not run')
             return 'the cycle does not run; is the bus up?'

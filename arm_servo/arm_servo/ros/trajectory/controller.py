@@ -95,13 +95,18 @@ class TrajectoryController:
         return goal_of_action(request, self._now, self._parameters)
 
     def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
-        self._check_active()
+        self.check_active()
         self._prepare()
         command = self._gateway.request(goal)
         command.future.add_done_callback(self._remember)
         return command
 
-    def _check_active(self) -> None:
+    def check_active(self) -> None:
+        """Make sure that it is active.
+
+        Raises:
+            NotReadyError: It was deactivated.
+        """
         if not self.active:
             name = self._node.get_name()
             raise NotReadyError(f'{name} is inactive; activate it with switch_controller')

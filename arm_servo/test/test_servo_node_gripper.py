@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Goals of a gripper: a pause is no stall, an end is an end, and the newest goal counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_servo.core.requests import PauseRequest, SpeedRequest, TargetRequest
+from arm_servo.exceptions import NotReadyError
+from arm_servo.ros.gripper import controller
+from arm_servo.ros.gripper.controller import GripperController
+from arm_servo.ros.gripper.parameters import GripperParameters
+from arm_servo.ros.group_motion import ToolMotion
+from arm_servo.ros.trajectory.controller import TrajectoryController
+
+JOINT = 'panda_joint1'
+
+
+class Gripper:
+    """The controller without ROS, of drives that stand still where they are blocked.
+
+    Attributes:
+        drives: The drives.
+        ended: How the goals ended, by their names.
+    """
+
+    def __init__(self, clock: Any, *, allow_stalling: bool = False) -> None:
+        """Let the drives be ready."""
+        self.drives = Drives()
+        self.drives.attach()
+        self.drives.run(2)
+        clock.monotonic = lambda: self.drives.now
+        self.ended: dict[str, str] = {}
+        self._made: Any = object.__new__(GripperController)
+        node: Any = SimpleNamespace(get_logger=lambda: SimpleNamespace(warning=lambda _: None))
+        self._made._node = node
+        self._made._gateway = self.drives.gateway
+        self._made._parameters = GripperParameters(0.002, 0.001, 1.0, allow_stalling)
+        self._made._joints = self.drives.gateway.model.joints
+        self._made._goals = {}
+        self._made._prepare = lambda: None
+        conclude: Any = SimpleNamespace(
+            notify_execute=lambda handle, _: self._made._conclude(handle)
+        )
+        self._made._servers = {'': conclude}
+
+    @property
+    def position(self) -> float:
+        """Where the joint is commanded to be in [rad]."""
+        return float(self.drives.path[-1][0])
+
+    def send(self, name: str, position: float) -> Any:
+        """Send a goal; return its handle."""
+        interface: Any = SimpleNamespace(
+            name='',
+            request=lambda *_: TargetRequest({JOINT: position}, 0.1),
+            feedback=lambda state: state,
+            result=lambda state: state,
+        )
+
+        def end(how: str) -> None:
+            self.ended[name] = how
+
+        handle = SimpleNamespace(
+            goal_id=SimpleNamespace(uuid=name.ljust(16).encode()),
+            request=None,
+            is_cancel_requested=False,
+            publish_feedback=lambda _: None,
+            abort=lambda: end('aborted'),
+            succeed=lambda: end('succeeded'),
+            canceled=lambda: end('canceled'),
+        )
+        self._made._start(interface, handle)
+        return handle
+
+    def cancel(self, handle: Any) -> None:
+        """Ask for the end of a goal."""
+        handle.is_cancel_requested = True
+        self._made._cancel(handle)
+
+    def run(self, duration: float, *, blocked: bool = False) -> None:
+        """Let time pass in [s]."""
+        before = self.drives.axes
+        for _ in range(round(duration / PERIOD)):
+            self.drives.run()
+            if blocked:
+                self.drives.axes = [
+                    replace(now, position=was.position, velocity=0.0)
+                    for now, was in zip(self.drives.axes, before, strict=True)
+                ]
+            self._made._watch()
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Let the controller have the time of the drives."""
+    made = SimpleNamespace(monotonic=lambda: 0.0)
+    monkeypatch.setattr(controller, 'time', made)
+    return made
+
+
+@pytest.mark.parametrize('allow_stalling', [False, True])
+def test_a_goal_that_is_held_does_not_stall(clock: Any, allow_stalling: bool) -> None:
+    """By a pause or by the speed override: it goes on afterwards, and is reached."""
+    gripper = Gripper(clock, allow_stalling=allow_stalling)
+    gateway = gripper.drives.gateway
+    gripper.send('goal', 0.2)
+    gripper.run(0.5)
+    for hold, go_on in (
+        (PauseRequest(), PauseRequest(is_paused=False)),
+        (SpeedRequest(0.0), SpeedRequest(1.0)),
+    ):
+        gateway.command(hold)
+        gripper.run(3.0)
+        assert not gripper.ended
+        gateway.command(go_on)
+        gripper.run(0.3)
+    gripper.run(3.0)
+    assert gripper.ended == {'goal': 'succeeded'}
+    assert gripper.position == pytest.approx(0.2)
+
+
+def test_an_aborted_goal_moves_nothing_any_more(clock: Any) -> None:
+    """Of a gripper that is blocked while its set-points are under way."""
+    gripper = Gripper(clock)
+    gripper.send('goal', 1.0)  # takes 10 s
+    gripper.run(2.0, blocked=True)
+    assert gripper.ended == {'goal': 'aborted'}
+    gripper.run(1.0, blocked=True)
+    stopped = gripper.position
+    gripper.run(1.0, blocked=True)
+    assert gripper.position == stopped < 0.5
+
+
+@pytest.mark.parametrize('allow_stalling', [False, True])
+def test_a_newer_goal_ends_the_one_before(clock: Any, allow_stalling: bool) -> None:
+    """As aborted and at once, also where the gripper passes its place or stalls later."""
+    gripper = Gripper(clock, allow_stalling=allow_stalling)
+    gripper.send('old', 0.2)
+    gripper.run(0.5)
+    gripper.send('new', 0.3)
+    gripper.run(0.2)
+    assert gripper.ended == {'old': 'aborted'}
+    gripper.run(5.0)
+    assert gripper.ended == {'old': 'aborted', 'new': 'succeeded'}
+
+
+def test_a_cancel_in_front_of_the_goal_counts_as_one(clock: Any) -> None:
+    """Also when the set-points are there already."""
+    gripper = Gripper(clock)
+    handle = gripper.send('goal', 0.03)
+    gripper.run(0.9, blocked=True)
+    gripper.cancel(handle)
+    gripper.run(0.1, blocked=True)
+    assert gripper.ended == {'goal': 'canceled'}
+
+
+def test_a_deactivated_controller_moves_no_gripper() -> None:
+    """What is under way comes to rest, and what comes next is refused."""
+    drives = Drives()
+    drives.attach()
+    drives.run(2)
+    node = SimpleNamespace(get_name=lambda: 'hand_controller')
+    tool: Any = object.__new__(ToolMotion)
+    tool.drives = SimpleNamespace(gateway=drives.gateway, prepare=lambda: None)
+    tool._controller = object.__new__(TrajectoryController)
+    vars(tool._controller).update(_node=node, _gateway=drives.gateway, active=True)
+    tool._get_ready()
+    command = drives.gateway.request(TargetRequest({JOINT: 1.0}, 0.1))
+    drives.run(20)
+    assert not command.ended.done()
+    tool._set_active(False)
+    drives.run(20)
+    assert command.ended.result().canceled
+    with pytest.raises(NotReadyError, match='hand_controller is inactive'):
+        tool._get_ready()
