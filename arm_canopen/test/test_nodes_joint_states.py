@@ -130,6 +130,30 @@ def test_the_urdf_gives_the_order_and_joints_that_mimic(scene: Scene) -> None:
     assert [*scene.received['/joint_states'].position] == [0.4, 0.1, 0.8]
 
 
+@pytest.mark.parametrize(
+    ('first', 'published'),
+    [('lid', ['lid', 'tool', 'left', 'right']), ('elbow', ['elbow', 'finger'])],
+)
+def test_drives_that_the_urdf_lacks_are_named_once(
+    first: str, published: list[str], scene: Scene, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """They keep their own topics; where it lacks all of them, that of the robot, too."""
+    names = [(first, 'tool'), ('left', 'right')]
+    drives = [
+        DriveJointStates(scene.node, cast('list[DriveView]', [Axis(axis, 0.7) for axis in axes]))
+        for axes in names
+    ]
+    scene.bus = BusJointStates(scene.node, drives, scene.output)
+    scene.bus.publish_robot(URDF)
+    topics = ['/joint_states', *(f'/{axis}/joint_states' for axes in names for axis in axes)]
+    for topic in topics:
+        scene.listen(topic)
+    scene.cycle(lambda: len(scene.received) == len(topics))
+    assert [*scene.received['/joint_states'].name] == published
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if 'tool' in line]
+    assert ('elbow, shoulder, finger' in line) == (first == 'lid')
+
+
 def test_a_drive_that_is_not_fresh_is_left_out_after_a_while(scene: Scene) -> None:
     """What is not known is not invented; the drive comes back with its TPDOs."""
     other = Axis('wrist', 0.7)

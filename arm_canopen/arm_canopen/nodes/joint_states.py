@@ -100,7 +100,8 @@ class RobotJointStates:
     def update(self, joint: str, stamp: int, sample: JointSample) -> None:
         """Take the state of a joint at a time in [ns], and publish what is complete."""
         for ready in self.aggregator.update(joint, stamp, sample, time.monotonic()):
-            self._publish(ready)
+            if ready.samples:
+                self._publish(ready)
 
     def _publish(self, ready: JointSet) -> None:
         positions, velocities, efforts = zip(*ready.samples, strict=True)
@@ -137,7 +138,8 @@ class BusJointStates:
 
         Args:
             description: URDF as XML text; without it, the topic ``robot_description`` is used.
-                Until it comes, the joints are those of bus.yml in its order.
+                Until it comes, the joints are those of bus.yml in its order; so they stay where it
+                has none of them.
 
         Raises:
             CanopenError: The text is no URDF.
@@ -151,6 +153,20 @@ class BusJointStates:
                 for joint in joints
                 if joint.name in own or (joint.mimic is not None and joint.mimic.source in own)
             ]
+            names = [joint.name for joint in joints]
+            absent = [name for name in own if name not in names]
+            if not here:
+                self._node.get_logger().error(
+                    f'joint_states: no drive of bus.yml is a joint of the URDF; bus.yml has '
+                    f'{", ".join(own)}, the URDF has {", ".join(names)}; those of bus.yml are '
+                    'published'
+                )
+                return
+            if absent:
+                self._node.get_logger().warning(
+                    f'joint_states: {", ".join(absent)} of bus.yml are no joints of the URDF, and '
+                    'are left out'
+                )
             self._output.post(lambda: robot.set_joints(here))
 
         on_description(self._node, description, begin)
@@ -186,7 +202,8 @@ class BusJointStates:
         for drive, sample in samples:
             if drive.listened:
                 drive.publish(stamp, sample)
-            if self._robot is not None:
+        if self._robot is not None:
+            for drive, sample in samples:
                 for axis, joint in zip(drive.axes, sample, strict=True):
                     self._robot.update(axis.name, stamp.nanoseconds, joint)
 
