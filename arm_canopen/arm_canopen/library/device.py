@@ -11,10 +11,9 @@ from ..config.model import NodeConfig
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
-from ..standard.datatypes import DataType, decode, encode, Value
+from ..standard.datatypes import decode, encode, Value
 from ..standard.dictionary import ObjectEntry
 from ..standard.nmt import NmtCommand
-from ..standard.object_path import find_object
 
 
 class DeviceSdo:
@@ -46,11 +45,9 @@ class DeviceSdo:
             SdoError: The device refused, or did not answer within the SDO time-out of bus.yml.
             BusError: The master has ended.
         """
-        entry, device = self._entry(target, subindex), self._device
-        block = entry.data_type is DataType.DOMAIN
-        timeout = device.config.sdo_timeout
-        read = partial(device.sdo.read, *entry.address, timeout, block=block)
-        return decode(entry.data_type, self._thread.run(read).result())
+        upload = partial(self._device.objects.upload, _path(target, subindex))
+        entry, data = self._thread.run_coroutine(upload).result()
+        return decode(entry.data_type, data)
 
     def write(self, target: int | str, value: Value, subindex: int = 0) -> None:
         """Write an object; return when the device has it.
@@ -67,15 +64,12 @@ class DeviceSdo:
             SdoError: The device refused, or did not answer within the SDO time-out of bus.yml.
             BusError: The master has ended.
         """
-        entry, device = self._entry(target, subindex), self._device
-        device.objects.check_owner(entry.index)
-        data = encode(entry.data_type, value)
-        timeout = device.config.sdo_timeout
-        self._thread.run(partial(device.sdo.write, *entry.address, data, timeout)).result()
 
-    def _entry(self, target: int | str, subindex: int) -> ObjectEntry:
-        path = target if isinstance(target, str) else f'0x{target:04X}:{subindex:02X}'
-        return find_object(self._device.config.dictionary, path)
+        def to_bytes(entry: ObjectEntry) -> bytes:
+            return encode(entry.data_type, value)
+
+        download = partial(self._device.objects.download, _path(target, subindex), to_bytes)
+        self._thread.run_coroutine(download).result()
 
 
 class CanopenDevice:
@@ -119,3 +113,7 @@ class CanopenDevice:
         """
         network, node_id = self._thread.network, self._device.config.node_id
         self._thread.run(lambda: network.send_nmt(command, node_id)).result()
+
+
+def _path(target: int | str, subindex: int) -> str:
+    return target if isinstance(target, str) else f'0x{target:04X}:{subindex:02X}'

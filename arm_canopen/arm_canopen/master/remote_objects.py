@@ -12,8 +12,9 @@ from ..can.frame import Frame
 from ..config.model import NodeConfig
 from ..config.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
 from ..exceptions import CodecError, DriveError, SdoError
-from ..standard.datatypes import decode, encode, Value
+from ..standard.datatypes import DataType, decode, encode, Value
 from ..standard.dictionary import ObjectEntry
+from ..standard.object_path import find_object
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, SdoWriter
 from .events import EventKind, Severity
@@ -205,6 +206,41 @@ class RemoteObjects:
                 self.image.store(index, subindex, before)
 
         end.when_done(set_back)
+
+    async def upload(self, path: str) -> tuple[ObjectEntry, bytes]:
+        """Read an object by what a person calls it.
+
+        Args:
+            path: Its name or number, see :func:`.find_object`.
+
+        Raises:
+            ObjectError: The EDS has no such object.
+            SdoError: The device refused or did not answer.
+        """
+        entry = find_object(self.config.dictionary, path)
+        block = entry.data_type is DataType.DOMAIN
+        return entry, await self.sdo.read(*entry.address, self.config.sdo_timeout, block=block)
+
+    async def download(
+        self, path: str, to_bytes: Callable[[ObjectEntry], bytes]
+    ) -> tuple[ObjectEntry, bytes]:
+        """Write an object by what a person calls it.
+
+        Args:
+            path: Its name or number, see :func:`.find_object`.
+            to_bytes: Gives the value as the object wants it.
+
+        Raises:
+            ObjectError: The EDS has no such object.
+            CodecError: The value does not fit the type.
+            DriveError: The master writes the object itself in each cycle.
+            SdoError: The device refused or did not answer.
+        """
+        entry = find_object(self.config.dictionary, path)
+        self.check_owner(entry.index)
+        data = to_bytes(entry)
+        await self.sdo.write(*entry.address, data, self.config.sdo_timeout)
+        return entry, data
 
     def forget(self, reason: str) -> None:
         """The device went away, or restarted: values that were sent or received are outdated."""

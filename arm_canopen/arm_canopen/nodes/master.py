@@ -178,10 +178,10 @@ def _serve(
             for node in (node for process in processes for node in extend(process)):
                 stack.callback(node.destroy_node)
                 others.append(node)
-        # it takes long: between listening and the first word another master could come
+        # it takes long: between listening and the first frame another master could come
         settle_process_memory(nodes[0])
         try:
-            with ThreadPoolExecutor() as pool:  # all buses before the first word on any of them
+            with ThreadPoolExecutor() as pool:  # all buses before the first frame on any of them
                 list(pool.map(MasterProcess.listen, processes))
             for process in processes:
                 process.end_on_failure(stop)

@@ -31,7 +31,7 @@ from .master_node import MasterServices
 from .output_thread import OutputThread
 
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
-LAST_WORD_TIMEOUT = 0.5  # [s] for the last /diagnostics
+LAST_DIAGNOSTICS_TIMEOUT = 0.5  # [s] for the last /diagnostics
 
 
 class MasterProcess:
@@ -95,7 +95,7 @@ class MasterProcess:
             self.nodes.append(managed.manager)
 
     def listen(self) -> None:
-        """Listen for another master before the first word; call it right before :meth:`start`.
+        """Listen for another master before the first frame; call it right before :meth:`start`.
 
         Raises:
             OtherMasterError: There is one, and beside_master is not set.
@@ -134,7 +134,7 @@ class MasterProcess:
             self._node.get_logger().error(str(error))
         finally:
             last = self._request_diagnostics()  # in which states the drives are left
-            wait([last], LAST_WORD_TIMEOUT)
+            wait([last], LAST_DIAGNOSTICS_TIMEOUT)
             self._thread.stop()
             self._output.stop()
 

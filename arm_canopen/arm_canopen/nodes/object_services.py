@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any, Protocol
 
 from arm_msgs.srv import ReadObject, WriteObject
@@ -14,9 +15,8 @@ from ..config.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from ..standard.datatypes import DataType
 from ..standard.dictionary import ObjectEntry
-from ..standard.object_path import find_object, object_path
+from ..standard.object_path import object_path
 
 Transfer = tuple[ObjectEntry, bytes]
 
@@ -51,21 +51,13 @@ class ObjectServices:
             thread: The thread of its network.
         """
         self._node = node
-        self._device = node.device
+        self._objects = node.device.objects
         self._thread = thread
         node.offer(ReadObject, '~/read_object', self._read, self._answer_read)
         node.offer(WriteObject, '~/write_object', self._write, self._answer_write)
 
     def _read(self, request: ReadObject.Request) -> Future[Transfer]:
-        device, path = self._device, request.object
-
-        async def read() -> Transfer:
-            entry = find_object(device.config.dictionary, path)
-            long = entry.data_type is DataType.DOMAIN
-            timeout = device.config.sdo_timeout
-            return entry, await device.sdo.read(*entry.address, timeout, block=long)
-
-        return self._thread.run_coroutine(read)
+        return self._thread.run_coroutine(partial(self._objects.upload, request.object))
 
     def _answer_read(self, response: ReadObject.Response, future: Future[Transfer]) -> None:
         try:
@@ -79,17 +71,14 @@ class ObjectServices:
             response.success = True
 
     def _write(self, request: WriteObject.Request) -> Future[Transfer]:
-        device, path = self._device, request.object
-
-        async def write() -> Transfer:
-            entry = find_object(device.config.dictionary, path)
-            device.objects.check_owner(entry.index)
+        def to_bytes(entry: ObjectEntry) -> bytes:
             data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
             text_from_bytes(entry.data_type, data)  # refuses raw bytes that are no such value
-            await device.sdo.write(*entry.address, data, device.config.sdo_timeout)
-            return entry, data
+            return data
 
-        return self._thread.run_coroutine(write)
+        return self._thread.run_coroutine(
+            partial(self._objects.download, request.object, to_bytes)
+        )
 
     def _answer_write(self, response: WriteObject.Response, future: Future[Transfer]) -> None:
         try:
