@@ -142,9 +142,12 @@ def locate(arguments: argparse.Namespace) -> Robot:
     """
     folder = Path() if os.sep in arguments.robot else installed_robots_folder()
     robot = find_robot(arguments.robot, folder)
+    groups = tuple(arguments.group) or robot.groups
     return replace(
         robot,
-        groups=tuple(arguments.group) or robot.groups,
+        groups=groups,
+        # of robot.yaml, it belongs to the main group there
+        tip_link='' if robot.groups and groups[0] != robot.groups[0] else robot.tip_link,
         xacro_args={**robot.xacro_args, **dict(arguments.xacro_arg)},
     )
 

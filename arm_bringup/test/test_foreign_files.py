@@ -96,6 +96,19 @@ def test_xacro_arguments_of_the_folder_and_of_the_command_line(folder: Path) -> 
         parse([f'{folder}{os.sep}', '--xacro-arg', 'kind=ur10e'])
 
 
+def test_the_tip_of_robot_yaml_is_that_of_its_main_group(folder: Path) -> None:
+    """It is not taken for the end of another group of the command line."""
+    (folder / 'robot.yaml').write_text('{group: [left, right], tip_link: left_tool}')
+    place = f'{folder}{os.sep}'
+    for argv, tip in (
+        ([], 'left_tool'),
+        (['--group', 'left'], 'left_tool'),
+        (['--group', 'right'], ''),
+        (['--group', 'right', '--group', 'left'], ''),
+    ):
+        assert locate(parse([place, *argv])[0]).tip_link == tip
+
+
 def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_path: Path) -> None:
     """For ``$(find ...)`` in xacro files, and for the meshes of the description."""
     shared = tmp_path / 'share' / 'vendor_description'

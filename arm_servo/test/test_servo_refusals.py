@@ -12,7 +12,7 @@ from typing import Any
 
 from input_devices import InjectedDevices
 from isolation import Isolation
-from model_robots import FOLDER, texts
+from model_robots import FOLDER, texts, two_arms_texts
 import pytest
 import rclpy
 from rclpy.node import Node
@@ -24,6 +24,14 @@ from arm_servo.teleop.servo_gamepad import ServoGamepad
 from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
 from node_runner import ParameterError
 from operator_input import OperatorInputError
+
+TWO_ARMS = {
+    'robot_description': two_arms_texts()[0],
+    'robot_description_semantic': two_arms_texts()[1],
+    'group': 'left',
+    'other_groups': ['right'],
+    'limits': two_arms_texts()[2],
+}
 
 
 def motion() -> CanopenMotion:
@@ -42,7 +50,11 @@ def parameters(folder: Path, **values: object) -> list[str]:
     urdf, srdf = texts('gp110')
     arm = {'robot_description': urdf, 'robot_description_semantic': srdf}
     file = folder / 'parameters.yaml'
-    whole = arm | {'joint_limits': str(FOLDER / 'gp110' / 'limits.yaml')} | values
+    limits = FOLDER / 'gp110' / 'limits.yaml'
+    if table := values.pop('limits', None):
+        limits = folder / 'limits.yaml'
+        limits.write_text(json.dumps({'joint_limits': table}))
+    whole = arm | {'joint_limits': str(limits)} | values
     file.write_text(json.dumps({'/**': {'ros__parameters': whole}}))
     return ['--ros-args', '--params-file', str(file)]
 
@@ -53,6 +65,11 @@ def parameters(folder: Path, **values: object) -> list[str]:
         (motion, {'robot_description': ''}, 'no robot_description'),
         (motion, {'publish_joint_states': 3}, 'publish_joint_states is 3'),
         (motion, {}, 'bus.yml has no drive'),
+        (
+            motion,
+            TWO_ARMS | {'controller_name': 'right_controller'},
+            'another group of this robot',
+        ),
         (ServoKeyboardInput, {'sped': 0.1}, "did you mean 'speed'"),
         (ServoKeyboardInput, {'rate': 1}, 'rate is 1: it must be 10.0 to 500.0'),
         (gamepad, {'enable_button': 'eastt'}, "did you mean 'east'"),

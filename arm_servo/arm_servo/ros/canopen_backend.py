@@ -125,6 +125,12 @@ class CanopenMotion:
         models = declare_groups(manager)
         main, *others = models.arms
         name, broadcasts = declare_manager(manager, main)
+        names = [f'{model.group}_controller' for model in (*others, *models.tools)]
+        if name in names:  # each goal would reach both
+            raise ModelError(
+                f'controller_name {name}: another group of this robot has a controller of that'
+                ' name; choose another one, or let it be named after its group'
+            )
         on_bus = partial(BusDrives, self._master)
 
         def make_arm(model: RobotModel, controller: str, servo: str) -> ArmMotion[BusDrives]:
