@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from ..exceptions import DriveError, SdoTimeoutError
 from ..master.scheduler import completed, Promise, Scheduler, Task
@@ -25,6 +25,7 @@ from .stop_commands import StopCommands
 from .streaming import TargetStream
 
 T = TypeVar('T')
+Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
@@ -35,6 +36,7 @@ class DriveCommands:
     Attributes:
         drive: The drive.
         stops: Those that stop it.
+        offered: Those without arguments by name, for :meth:`request`.
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
@@ -42,6 +44,19 @@ class DriveCommands:
         self.drive = drive
         self._steps = DriveSequences(drive, scheduler)
         self.stops = StopCommands(drive, self._steps)
+        self._stopping: dict[str, Sequence] = {
+            'disable': self.stops.disable,
+            'halt': self.stops.halt,
+            'quick_stop': self.stops.quick_stop,
+            'shutdown': self.stops.shutdown,
+        }
+        self.offered: dict[str, Sequence] = {
+            'init': self.init,
+            'enable': self.enable,
+            'recover': self.recover,
+            'home': self.home,
+            **self._stopping,
+        }
         self._scheduler = scheduler
         self._running = ''
         self._delivery = completed()  # of the target or move that was commanded last
@@ -51,6 +66,10 @@ class DriveCommands:
         self._recovery = Recovery(
             drive, scheduler, lambda mode: self.run('recovery', self._enable_in(mode))
         )
+
+    def request(self, name: str) -> Promise[str]:
+        """Run one of those that are offered; what stops the drive ends the one that runs."""
+        return self.run(name, self.offered[name](), preempt=name in self._stopping)
 
     def run(
         self, name: str, sequence: Coroutine[Promise[Any], None, str], *, preempt: bool = False
@@ -77,7 +96,7 @@ class DriveCommands:
 
     def leave(self) -> Promise[str]:
         """Shut the drive down for good: what stops it has that result, all else is refused."""
-        self._leaving = self.run('shutdown', self.stops.shutdown(), preempt=True)
+        self._leaving = self.request('shutdown')
         return self._leaving
 
     def cancel(self, reason: str) -> None:

@@ -4,16 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from functools import partial
 import time
-from typing import Any, TypeAlias
 
-from ..cia402.drive_commands import DriveCommands
+from ..cia402.drive_commands import DriveCommands, Sequence
 from ..cia402.position_modes import Move
 from ..cia402.status import drive_status, DriveStatus
 from ..master.runner import NetworkThread
-from ..master.scheduler import Promise
 from ..standard.drive import DriveState, OperationMode
 from .device import DeviceSdo
 
@@ -23,8 +21,6 @@ POSITION_MODES = (
     OperationMode.INTERPOLATED_POSITION,
     OperationMode.CYCLIC_POSITION,
 )
-
-Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
 
 class CanopenDrive:
@@ -84,15 +80,15 @@ class CanopenDrive:
 
     def init(self) -> str:
         """Reset a fault, enable, home where bus.yml has a method; no mode is selected then."""
-        return self._run('init', self._commands.init)
+        return self._request('init')
 
     def enable(self) -> str:
         """Lead to Operation Enabled; a fault is not reset."""
-        return self._run('enable', self._commands.enable)
+        return self._request('enable')
 
     def recover(self) -> str:
         """Reset a fault and lead to Operation Enabled."""
-        return self._run('recover', self._commands.recover)
+        return self._request('recover')
 
     def home(self, method: int | None = None) -> str:
         """Home, then select the mode of before again.
@@ -112,19 +108,19 @@ class CanopenDrive:
 
     def disable(self) -> str:
         """Take the torque away (Switched On)."""
-        return self._run('disable', self._commands.stops.disable, preempt=True)
+        return self._request('disable')
 
     def halt(self) -> str:
         """Brake, and stay enabled; return when it stands. The next target goes on."""
-        return self._run('halt', self._commands.stops.halt, preempt=True)
+        return self._request('halt')
 
     def quick_stop(self) -> str:
         """Begin a quick stop; what follows is the drive's option code 0x605A."""
-        return self._run('quick_stop', self._commands.stops.quick_stop, preempt=True)
+        return self._request('quick_stop')
 
     def shutdown(self) -> str:
         """Bring the drive to rest, and take its power away."""
-        return self._run('shutdown', self._commands.stops.shutdown, preempt=True)
+        return self._request('shutdown')
 
     def set_target(self, target: float) -> str:
         """Command a position, velocity or effort, by the mode; return when the drive has it.
@@ -158,9 +154,11 @@ class CanopenDrive:
 
         return self._thread.run_coroutine(partial(commands.arrive, give, timeout)).result()
 
-    def _run(self, name: str, sequence: Sequence, *, preempt: bool = False) -> str:
-        commands = self._commands
-        return self._thread.run(lambda: commands.run(name, sequence(), preempt=preempt)).result()
+    def _request(self, name: str) -> str:
+        return self._thread.run(partial(self._commands.request, name)).result()
+
+    def _run(self, name: str, sequence: Sequence) -> str:
+        return self._thread.run(lambda: self._commands.run(name, sequence())).result()
 
     def _deliver(self, command: Callable[[], str]) -> str:
         return self._thread.run(lambda: self._commands.deliver(command)).result()

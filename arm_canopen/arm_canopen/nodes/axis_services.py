@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from canopen_interfaces.srv import COTargetDouble
@@ -35,8 +36,6 @@ MODE_SERVICES: dict[str, OperationMode] = {
 }
 """Services and the modes that they select; ros2_canopen has all but the second."""
 
-Sequence = Callable[[], Coroutine[Promise[Any], None, str]]
-
 
 class AxisServices:
     """What one axis offers, below ``~`` or, of several axes, below the name of its channel."""
@@ -61,14 +60,8 @@ class AxisServices:
         self._place = place
         self._thread = thread
         self._refusal = ''
-        self._offer('init', commands.init)
-        self._offer('enable', commands.enable)
-        self._offer('recover', commands.recover)
-        self._offer('home', commands.home)
-        self._offer('disable', commands.stops.disable, preempt=True)
-        self._offer('halt', commands.stops.halt, preempt=True)
-        self._offer('quick_stop', commands.stops.quick_stop, preempt=True)
-        self._offer('shutdown', commands.stops.shutdown, preempt=True)
+        for name in commands.offered:
+            self._offer(name, partial(commands.request, name))
         for name, mode in MODE_SERVICES.items():
             self._offer_mode(name, mode)
         node.offer(COTargetDouble, f'{place}/target', self._set_target, self._answer_target)
@@ -76,15 +69,16 @@ class AxisServices:
         node.create_subscription(Float64, f'{place}/target', self._stream, 10)
         self._home = HomeAction(node, commands, f'{place}/home', thread, node.output)
 
-    def _offer(self, name: str, sequence: Sequence, *, preempt: bool = False) -> None:
+    def _offer(self, name: str, request: Callable[[], Promise[str]]) -> None:
         def run() -> Promise[str]:
             self._node.admit()  # again, in the thread in which it may have been deactivated
-            return self._commands.run(name, sequence(), preempt=preempt)
+            return request()
 
         self._node.offer_trigger(f'{self._place}/{name}', lambda: self._thread.run(run))
 
     def _offer_mode(self, name: str, mode: OperationMode) -> None:
-        self._offer(name, lambda: self._commands.select_mode(mode))
+        commands = self._commands
+        self._offer(name, lambda: commands.run(name, commands.select_mode(mode)))
 
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
         return self._deliver(lambda: self._commands.set_target(request.target))

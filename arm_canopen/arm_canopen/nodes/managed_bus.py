@@ -78,9 +78,7 @@ class ManagedBus:
             if verb is Verb.ACTIVATE:
                 await self._booted(device)
             elif verb in (Verb.DEACTIVATE, Verb.SHUTDOWN):
-                await self._scheduler.gather(
-                    [axis.run('shutdown', axis.stops.shutdown(), preempt=True) for axis in axes]
-                )
+                await self._scheduler.gather([axis.request('shutdown') for axis in axes])
 
         return work
 
