@@ -5,16 +5,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import math
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from servo_drives import Drives, PERIOD
 
+from arm_model import CommandError
 from arm_servo.core.requests import PauseRequest, SpeedRequest, TargetRequest
 from arm_servo.exceptions import NotReadyError
 from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
+from arm_servo.ros.gripper.interfaces import ParallelGripper
 from arm_servo.ros.gripper.parameters import GripperParameters
 from arm_servo.ros.group_motion import ToolMotion
 from arm_servo.ros.trajectory.controller import TrajectoryController
@@ -159,6 +162,26 @@ def test_a_cancel_in_front_of_the_goal_counts_as_one(clock: Any) -> None:
     gripper.cancel(handle)
     gripper.run(0.1, blocked=True)
     assert gripper.ended == {'goal': 'canceled'}
+
+
+@pytest.mark.parametrize(
+    ('names', 'positions', 'velocities', 'words'),
+    [
+        (['a'], [0.1], [math.nan], 'velocity nan'),
+        (['a'], [0.1], [-0.1], 'velocity -0.1'),
+        (['a', 'a'], [0.1, 0.2], [], "'a' is named twice"),
+        (['a'], [math.inf], [], 'inf is no position'),
+        (['c'], [0.1], [], "no joint 'c'"),
+        (['a'], [0.1, 0.2], [], '2 positions'),
+    ],
+)
+def test_a_goal_with_wrong_numbers_is_refused(
+    names: list[str], positions: list[float], velocities: list[float], words: str
+) -> None:
+    """A speed that is no number is not taken for none."""
+    command = SimpleNamespace(name=names, position=positions, velocity=velocities)
+    with pytest.raises(CommandError, match=words):
+        ParallelGripper().request(SimpleNamespace(command=command), ['a', 'b'])
 
 
 def test_a_deactivated_controller_moves_no_gripper() -> None:

@@ -96,6 +96,10 @@ class ParallelGripper:
             raise CommandError(f'{len(names)} names, but {len(command.position)} positions')
         if lost := [name for name in names if name not in joints]:
             raise CommandError(f'no joint {lost[0]!r} in the gripper; joints: {", ".join(joints)}')
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise CommandError(f'joint {twice[0]!r} is named twice')
+        if wrong := [speed for speed in command.velocity if not speed >= 0.0]:
+            raise CommandError(f'velocity {wrong[0]}: it must be above 0, or 0 for the limit')
         speeds = [speed for speed in command.velocity if speed > 0.0]
         targets = _finite(dict(zip(names, command.position, strict=True)))
         return TargetRequest(targets, min(speeds, default=math.inf))
