@@ -85,7 +85,7 @@ def test_a_defect_that_ends_the_cycle_ends_the_program_with_its_reason(node: Nod
 
 
 def test_a_defect_that_ends_the_cycle_ends_a_boot(tmp_path: Path) -> None:
-    """Its caller hears why, and waits no longer; the drives could not be stopped."""
+    """Its caller is given the reason, and waits no longer; the drives could not be stopped."""
     bus = BreakingBus('here', VirtualWire())
     made = CanopenMaster(load_text(tmp_path, added('joint1', '')), bus)
 
