@@ -19,6 +19,7 @@ from arm_bringup.demos.wave.plan import (
     quintic_step,
     STEP_CURVATURE,
     STEP_SLOPE,
+    stop_duration,
     Swing,
     WaveStyle,
 )
@@ -282,6 +283,14 @@ def test_a_joint_without_a_range_swings_about_zero() -> None:
     swing = plan_swing(JointRange('wheel', -math.inf, math.inf, 1.0), 0.0, STYLE)
     assert swing.centre == 0.0
     assert 0 < swing.amplitude <= STYLE.amplitude
+
+
+def test_a_limit_of_thousands_makes_no_stop_of_hours() -> None:
+    """Baxter's URDF has a velocity limit of 10000 rad/s for its head."""
+    style = WaveStyle()
+    swing = plan_swing(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0, style)
+    assert swing.velocity == style.max_velocity
+    assert stop_duration([swing], style) < 2 * style.period
 
 
 def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:

@@ -170,11 +170,15 @@ class CanopenMaster:
         if not booted:
             statuses = [each.status() for each in self.devices.values()]
             missing = '; '.join(
-                f'{each.name} (node {each.node_id}) {each.phase.value}: {each.phase_detail}'
+                f'{each.name} (node {each.node_id}) {each.phase.value}'
+                + (f': {each.phase_detail}' if each.phase_detail else '')
                 for each in statuses
                 if not each.online
             )
-            raise BootError(f'not operational after {timeout:g} s: {missing}')
+            raise BootError(
+                f'not operational after {timeout:g} s: {missing}. '
+                'Check power, cable, bit rate and node ids of those that do not answer'
+            )
 
     def drive(self, name: str) -> CanopenDrive:
         """Return a drive by its name in bus.yml.

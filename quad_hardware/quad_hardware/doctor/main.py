@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run quad_hardware doctor``: finds what is wrong with port, robot, machine and ROS."""
+"""Doctor of the quadruped: finds what is wrong with port, robot, machine and ROS."""
 
 from __future__ import annotations
 

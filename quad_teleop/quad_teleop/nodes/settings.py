@@ -13,10 +13,8 @@ from ..body_pose import PoseSteps
 from ..speeds import MIN_SPEED, Speeds
 from ..velocity import rest_of, Velocity
 
-MAX_SPEED, MAX_TURN_SPEED = (
-    3.0,
-    10.0,
-)  # [m/s], [rad/s] of any legged robot that people drive by hand
+MAX_SPEED = 3.0  # [m/s] of any legged robot that people drive by hand
+MAX_TURN_SPEED = 10.0  # [rad/s]
 
 
 def declare_speeds(node: Node, prefix: str, default: Speeds) -> Speeds:

@@ -53,6 +53,7 @@ class WaveStyle:
         period: Time of one swing in [s].
         range_share: The swing covers at most this share of a joint's range.
         velocity_share: A joint is at most at this share of its velocity limit.
+        max_velocity: No joint is faster, in [rad/s] or [m/s]; some URDFs have limits of thousands.
         acceleration: Greatest acceleration in [rad/s^2] or [m/s^2]. URDF knows no such limit;
             the data sheet of the Panda allows 7.5 for its slowest joint.
         stop_share: Share of the acceleration that is kept for a stop.
@@ -63,6 +64,7 @@ class WaveStyle:
     period: float = 5.0
     range_share: float = 0.5
     velocity_share: float = 0.6
+    max_velocity: float = 4.0
     acceleration: float = 4.0
     stop_share: float = 0.4
     shortest_entry: float = 2.0
@@ -141,7 +143,7 @@ def plan_swing(limits: JointRange, phase: float, style: WaveStyle) -> Swing:
             f'joint {limits.name} cannot swing: its range is {limits.lower:g} to '
             f'{limits.upper:g}, its velocity limit {limits.velocity:g}'
         )
-    velocity = style.velocity_share * limits.velocity
+    velocity = min(style.velocity_share * limits.velocity, style.max_velocity)
     acceleration = (1 - style.stop_share) * style.acceleration
     half_range = (limits.upper - limits.lower) / 2
     amplitude = min(
