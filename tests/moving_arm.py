@@ -121,7 +121,7 @@ class GoalRun:
         """Whether it has ended."""
         return bool(self._result.done())
 
-    def wait(self, timeout: float = 20.0) -> tuple[int, FollowJointTrajectory.Result]:
+    def wait(self, timeout: float = 60.0) -> tuple[int, FollowJointTrajectory.Result]:
         """Wait for its end; return status and result."""
         self._client.spin_until(self._result.done, timeout, 'end of the goal')
         answer = self._result.result()

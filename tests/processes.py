@@ -68,7 +68,7 @@ class RunningProcess:
         """Tell whether it has not ended yet."""
         return self._process.poll() is None
 
-    def wait_for(self, pattern: str, timeout: float = 20.0, count: int = 1) -> str:
+    def wait_for(self, pattern: str, timeout: float = 60.0, count: int = 1) -> str:
         """Wait until lines match a regular expression, and return the last of them.
 
         Args:
@@ -89,7 +89,7 @@ class RunningProcess:
                     raise AssertionError(f'no {pattern!r} ({state}) in:\n{self.output}')
                 self._changed.wait(min(left, 0.5))
 
-    def wait_until_ready(self, timeout: float = 20.0) -> None:
+    def wait_until_ready(self, timeout: float = 60.0) -> None:
         """Wait until it reports that it is ready.
 
         Args:

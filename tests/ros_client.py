@@ -33,20 +33,20 @@ class RosClient:
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
 
-    def call(self, service_type: Any, name: str, request: Any, timeout: float = 20.0) -> Any:
+    def call(self, service_type: Any, name: str, request: Any, timeout: float = 60.0) -> Any:
         """Call a service and return its response."""
         future = self.call_async(service_type, name, request, timeout)
         self.spin_until(future.done, timeout, f'an answer of {name}')
         return future.result()
 
-    def call_async(self, service_type: Any, name: str, request: Any, timeout: float = 20.0) -> Any:
+    def call_async(self, service_type: Any, name: str, request: Any, timeout: float = 60.0) -> Any:
         """Wait for a service, call it and return the future."""
         client = self.node.create_client(service_type, name)
         if not client.wait_for_service(timeout):
             raise AssertionError(f'there is no service {name}')
         return client.call_async(request)
 
-    def trigger(self, name: str, timeout: float = 20.0) -> Any:
+    def trigger(self, name: str, timeout: float = 60.0) -> Any:
         """Call a std_srvs/Trigger."""
         return self.call(Trigger, name, Trigger.Request(), timeout)
 

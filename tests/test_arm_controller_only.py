@@ -25,7 +25,10 @@ def test_a_goal_and_a_jog_move_drives_elsewhere(isolation: Isolation) -> None:
     """A goal is reached; a jog takes over from the next one, without a jump; it ends at rest."""
     command = [executable('arm_bringup', 'bringup'), 'panda', '--controller-only']
     with TopicArm(isolation, command, 'all is ready') as arm:
-        reached = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 2.0)).wait()[1]
+        for _ in range(3):  # on a starved machine joint states come late, which ends a goal
+            reached = GoalRun(arm.client, goal_to([0.3, *READY[1:]], 2.0)).wait()[1]
+            if 'no joint states' not in reached.error_string:
+                break
         assert reached.error_code == 0, reached.error_string
         assert arm.at[0] == pytest.approx(0.3, abs=1e-6)
         run = GoalRun(arm.client, goal_to([1.0, *READY[1:]], 6.0))

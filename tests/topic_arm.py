@@ -66,9 +66,19 @@ class TopicArm:
         self.at = list(READY)
         self.arrays: list[list[float]] = []
         self.trajectories: list[JointTrajectory] = []
-        self._stack = ExitStack()
-        self.client = self._stack.enter_context(RosClient(isolation.domain_id))
-        self._drives = self._stack.enter_context(RosClient(isolation.domain_id, 'drives'))
+        self.publishes = True
+        self._heard = 0
+        self._stopped = threading.Event()
+        with ExitStack() as stack:
+            self._start(isolation, stack)
+            self.process = stack.enter_context(RunningProcess(command, isolation.env))
+            self.process.wait_for(ready)
+            self.client.spin_until(lambda: self._heard > HEARD, 60.0, 'somebody who listens')
+            self._stack = stack.pop_all()
+
+    def _start(self, isolation: Isolation, stack: ExitStack) -> None:
+        self.client = stack.enter_context(RosClient(isolation.domain_id))
+        self._drives = stack.enter_context(RosClient(isolation.domain_id, 'drives'))
         node = self._drives.node
         self._states = node.create_publisher(JointState, '/joint_states', 10)
         node.create_subscription(
@@ -77,16 +87,10 @@ class TopicArm:
         node.create_subscription(
             JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
         )
-        self.publishes = True
-        self._heard = 0
         node.create_timer(0.02, self._speak)
-        self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name='drives')
         self._thread.start()
-        self._stack.callback(self._stop)
-        self.process = self._stack.enter_context(RunningProcess(command, isolation.env))
-        self.process.wait_for(ready)
-        self.client.spin_until(lambda: self._heard > HEARD, 20.0, 'somebody who listens')
+        stack.callback(self._stop)
 
     def _run(self) -> None:
         """Live on while the test waits for something, as drives do."""

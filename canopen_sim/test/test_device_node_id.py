@@ -14,7 +14,7 @@ from arm_canopen.nodes.device_node import DeviceNode
 def test_node_id_is_that_of_the_device(isolation: Isolation) -> None:
     """A parameter for all nodes of the process does not give a device another node id."""
     config = SimpleNamespace(name='gripper', namespace='', remappings={}, node_id=7)
-    device: Any = SimpleNamespace(config=config)
+    device: Any = SimpleNamespace(config=config, objects=None)
     nobody: Any = None  # the services are not called
     rclpy.init(args=['--ros-args', '-p', 'node_id:=99'], domain_id=isolation.domain_id)
     try:
