@@ -39,8 +39,8 @@ settings.load_profile('workspace')
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Take two workers a core: half of the tests wait for processes, deadlines and the bus."""
-    return 2 * len(os.sched_getaffinity(0))
+    """Take a worker a core and one more: robots wait for deadlines, and starve beside more."""
+    return len(os.sched_getaffinity(0)) + 1
 
 
 @pytest.hookimpl(tryfirst=True)
