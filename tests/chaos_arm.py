@@ -36,7 +36,7 @@ AWAY = [at + 0.4 for at in READY]
 """Where it goes from READY in [rad]."""
 WAY_TIME = 2.0
 """How long it goes there in [s]."""
-PATIENCE = 60.0
+TIMEOUT = 60.0
 """Longest time in [s] until it works again; requests may go to a killed master until DDS knows."""
 ANSWER = 3.0
 """Longest time in [s] for one answer."""
@@ -204,7 +204,7 @@ class ArmVictim:
 
     def _works_again(self) -> None:
         """Enable what is not, as the README says; nothing moves by that; then move."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         words = ''
         while time.monotonic() < end:
             words = self._enabled() or self._goes()

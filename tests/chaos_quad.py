@@ -39,7 +39,7 @@ ROUNDING = 0.1
 """Degrees by which an angle on the wire may be beyond a limit, which is in radians."""
 SETTLING = 3.0
 """Time in [s] in which it ends its gait, of the robot's clock."""
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Longest time in [s] until it walks."""
 RECOVERY = 60.0
 """Longest time in [s] in which a busy computer may stop it again before it walks."""
@@ -69,7 +69,7 @@ class QuadVictim:
             self._quad = self._stack.enter_context(SimulatedQuad(isolation, folder))
             self._quad.tap.seed(seed)
             self._diagnostics = self._quad.client.listen(DiagnosticArray, '/diagnostics')
-            self._quad.client.spin_until(lambda: bool(self._quad.truth), PATIENCE, 'the truth')
+            self._quad.client.spin_until(lambda: bool(self._quad.truth), TIMEOUT, 'the truth')
             self._works_again()
         except BaseException:
             self._stack.close()
@@ -188,7 +188,7 @@ class QuadVictim:
         self._stays()
         self._quad.stand()
         self._quad.set_mode('walk')
-        before, end = self._place(), time.monotonic() + PATIENCE
+        before, end = self._place(), time.monotonic() + TIMEOUT
         while math.dist(before, self._place()) < WALKED:
             stopped = self._quad.state == 'fault' or time.monotonic() > end
             assert not stopped, f'goes nowhere, in state {self._quad.state}'

@@ -30,7 +30,7 @@ READMES = (
 """Packages that are libraries without ROS, too."""
 PANDA = CHECKOUT / 'arm_bringup' / 'robots' / 'panda'
 PORT = '/dev/ttyAMA0'  # of the robot, in the READMEs
-PATIENCE = 120.0  # [s]
+TIMEOUT = 120.0  # [s]
 
 
 def run_examples(
@@ -63,6 +63,6 @@ def run_examples(
             env=env,
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
             check=False,
         )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from arm_canopen.can import Bus
 
 STATUSWORD, POSITION = 0x6041, 0x6064
-PATIENCE = 2.0
+TIMEOUT = 2.0
 """Longest time in [s] for an answer."""
 
 
@@ -28,7 +28,7 @@ def read(bus: Bus, node_id: int, index: int) -> int:
     request = bytes([0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0])
     bus.send(Frame(CobId.SDO_REQUEST + node_id, request))
     answer = CobId.SDO_RESPONSE + node_id
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     while time.monotonic() < deadline:
         for frame in bus.receive(0.1):
             if frame.can_id == answer and frame.data[1:3] == index.to_bytes(2, 'little'):

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 AHEAD = Velocity(forward=0.2)
 """The demo's velocity."""
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Longest time in [s] for a mode to be accepted."""
 ANSWER = 1.0
 """Longest time in [s] for one answer."""
@@ -104,7 +104,7 @@ class SimulatedQuad:
     def set_mode(self, mode: str) -> None:
         """Ask for a mode until it is accepted: what it needs may not be heard yet."""
         words = 'no answer'
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
             # a killed controller is in the graph for a while: the request may be for it
             future = self._modes.call_async(SetMode.Request(mode=mode))
@@ -124,7 +124,7 @@ class SimulatedQuad:
             except AssertionError:  # DDS loses answers to a client that a new server does not know
                 return False
 
-        self.client.spin_until(cleared, PATIENCE, 'clear fault')
+        self.client.spin_until(cleared, TIMEOUT, 'clear fault')
 
     def spin(self, seconds: float) -> None:
         """Serve callbacks until the robot's clock has gone on by so many seconds."""
@@ -153,7 +153,7 @@ class SimulatedQuad:
         def ended() -> bool:
             return self.state == 'stand' or any(s.data == 'fault' for s in self.states[asked:])
 
-        self.client.spin_until(ended, PATIENCE, 'standing')
+        self.client.spin_until(ended, TIMEOUT, 'standing')
         assert self.state == 'stand', f'does not stand: {self.processes["controller"].lines[-1]}'
 
     def walk(self, seconds: float, velocity: Velocity = AHEAD) -> None:

@@ -56,7 +56,7 @@ SLICE = 0.05
 """Time in [s] for which each robot's callbacks are served in turn."""
 LOST, LATE = 'frames_lost', 'missed_pdos'
 """Counters of the master: frames that the kernel dropped, TPDOs that came after their cycle."""
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """Longest time in [s] until it walks."""
 CHARGING = 1200.0
 """Time in [s] between two full batteries of the quadruped; one lasts twice as long at a walk."""
@@ -204,7 +204,7 @@ class Robots:
             quad.clear_fault()
         quad.stand()
         quad.set_mode('walk')
-        quad.client.spin_until(lambda: quad.state == 'walk', PATIENCE, 'walking')
+        quad.client.spin_until(lambda: quad.state == 'walk', TIMEOUT, 'walking')
 
     def _continue(self) -> None:
         if self._result is None:

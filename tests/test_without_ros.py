@@ -94,7 +94,7 @@ FOR_ROS = [
     'urdf',
 ]
 """Executables of `ros2 run`, which would die on rclpy or have somebody else's name."""
-PATIENCE = 120.0  # [s] for a program on a busy machine
+TIMEOUT = 120.0  # [s] for a program on a busy machine
 NO_NETWORK = ('dns error', 'Failed to fetch', 'connect error', 'client error')
 NOT_SOURCE = shutil.ignore_patterns('__pycache__', '*.egg-info', 'build', 'test', 'bench')
 
@@ -121,7 +121,7 @@ class Environment:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
             check=False,
         )
 
@@ -136,7 +136,7 @@ class Environment:
                 yield process
             finally:
                 process.terminate()
-                process.wait(PATIENCE)
+                process.wait(TIMEOUT)
 
 
 @pytest.fixture(scope='module')
@@ -214,7 +214,7 @@ def test_a_bus_is_checked(environment: Environment) -> None:
 
 def test_frames_are_shown(environment: Environment, isolation: Isolation) -> None:
     """`canopen-candump` shows a frame of a multicast bus with its meaning."""
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + TIMEOUT
     with (
         open_bus(isolation.bus) as bus,
         environment.running('canopen-candump', isolation.bus, '-n', '1') as dump,

@@ -9,7 +9,7 @@ import re
 import subprocess
 import time
 
-PATIENCE = 30.0  # [s] of a test on a busy machine
+TIMEOUT = 30.0  # [s] of a test on a busy machine
 
 
 class Pane:
@@ -28,7 +28,7 @@ class Pane:
             env=self._environment,
             capture_output=True,
             text=True,
-            timeout=PATIENCE,
+            timeout=TIMEOUT,
             check=True,
         ).stdout
 
@@ -42,7 +42,7 @@ class Pane:
 
     def wait_for(self, pattern: str) -> str:
         """Wait until something is on the screen."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while not re.search(pattern, screen := self.screen()):
             assert time.monotonic() < deadline, f'no {pattern!r} in\n{screen}'
             time.sleep(0.05)

@@ -22,6 +22,7 @@ import pytest
 
 from arm_canopen import (
     AxisFeedback,
+    CanopenDrive,
     CanopenMaster,
     DriveState,
     Event,
@@ -222,6 +223,13 @@ def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
     assert drive.state is DriveState.OPERATION_ENABLED
 
 
+def wait_until_in_motion(drive: CanopenDrive) -> None:
+    """Wait until a drive that was sent far away is under way."""
+    deadline = time.monotonic() + TIMEOUT
+    while drive.velocity < 0.5:
+        assert time.monotonic() < deadline
+
+
 def test_a_stop_ends_a_motion(master: CanopenMaster) -> None:
     """Another thread may stop what this one waits for."""
     drive = master.drive('joint1')
@@ -229,9 +237,7 @@ def test_a_stop_ends_a_motion(master: CanopenMaster) -> None:
     drive.select_mode(OperationMode.PROFILE_POSITION)
     with ThreadPoolExecutor(1) as pool:
         moving = pool.submit(drive.move_to, 1000.0)
-        deadline = time.monotonic() + TIMEOUT
-        while drive.velocity < 0.5:
-            assert time.monotonic() < deadline
+        wait_until_in_motion(drive)
         drive.disable()
         with pytest.raises(DriveError):
             moving.result(TIMEOUT)
@@ -451,12 +457,11 @@ def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(
         drive.select_mode(OperationMode.PROFILE_POSITION)
         with ThreadPoolExecutor(1) as pool:
             moving = pool.submit(drive.move_to, 1000.0)
-            deadline = time.monotonic() + TIMEOUT
-            while drive.velocity < 0.5:
-                assert time.monotonic() < deadline
+            wait_until_in_motion(drive)
             drives.kill()
             with pytest.raises(DriveError, match='joint1'):
                 moving.result(TIMEOUT)
+        deadline = time.monotonic() + TIMEOUT
         while drive.status().node.online:
             assert time.monotonic() < deadline
         with pytest.raises(DriveError, match='offline'):

@@ -171,7 +171,7 @@ class WaveSource:
     def _advance(self, period: float) -> Sequence[float | None]:
         if self._state is WaveState.IDLE:
             return [None] * len(self._axes)
-        step = period * self._pace(period)
+        step = period * self._phase_rate(period)
         self._theta = math.remainder(self._theta + self._style.omega * step, 2 * math.pi)
         setpoints = [
             axis.advance(step, self._theta) if axis.active else None for axis in self._axes
@@ -180,7 +180,7 @@ class WaveSource:
             self._stand_still()
         return setpoints
 
-    def _pace(self, period: float) -> float:
+    def _phase_rate(self, period: float) -> float:
         """How fast the time of the wave goes in this cycle, from 1 down to 0 in a stop."""
         if self._state is WaveState.RUNNING:
             return 1.0
