@@ -20,6 +20,7 @@ from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.objects import AttachedBody, CollisionObject
+from .scene.padding import padded
 from .scene.planning_scene import PlanningScene
 from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
 from .start_poses import pose_quality, start_pose
@@ -66,6 +67,7 @@ __all__ = [
     'inverse',
     'load_limits',
     'names_of',
+    'padded',
     'pose_quality',
     'rotation_of',
     'start_pose',

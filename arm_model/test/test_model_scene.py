@@ -26,6 +26,7 @@ from arm_model import (
     Cone,
     Cylinder,
     Mesh,
+    padded,
     PlacedShape,
     Plane,
     PlanningScene,
@@ -54,6 +55,7 @@ POSITIONS = st.tuples(*[st.floats(-1.9, 1.9)] * 4).map(np.array)
 
 MODEL = chain('zyyp')
 TABLE = CollisionObject('table', Plane(offset=-0.1))
+AWAY = Pose(np.eye(3), np.array([3.0, 0.0, 0.5]))
 CUP = CollisionObject('cup', Cylinder(0.04, 0.1), Sphere(0.05))
 
 
@@ -360,3 +362,36 @@ def test_a_mimic_joint_follows() -> None:
         quotient = (ahead - behind)[:, near.pair] / (2.0 * STEP)
         assert near.gradient == pytest.approx(quotient, abs=1e-3)
         assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
+
+
+@given(shape=SHAPES, padding=st.floats(0.0, 0.1), scale=st.floats(1.0, 2.0))
+def test_a_padded_shape_holds_the_scaled_one(shape: Shape, padding: float, scale: float) -> None:
+    """From each of its sides it comes nearer, by the padding at most."""
+    solid, thick = CollisionObject('o', shape), CollisionObject('o', padded(shape, padding, scale))
+    scaled = CollisionObject('o', padded(shape, 0.0, scale))
+    places = np.array([0.3, -0.4, 0.2, 0.1])
+    near, far, middle = (
+        min(distances(MODEL.scene.without_objects().with_object(each.at(AWAY)), places).values())
+        for each in (thick, solid, scaled)
+    )
+    assert near <= middle + STEP <= far + 2 * STEP
+
+
+@pytest.mark.parametrize('numbers', [(-0.1, 1.0), (0.0, 0.0), (math.nan, 1.0), (0.0, math.inf)])
+def test_a_padding_that_is_none_is_refused(numbers: tuple[float, float]) -> None:
+    """Shrinking a shape below itself is no safety."""
+    with pytest.raises(SceneError, match='padding'):
+        padded(Box(0.1, 0.1, 0.1), *numbers)
+
+
+def test_a_plane_is_padded_along_its_normal() -> None:
+    """What is solid grows."""
+    assert padded(Plane(offset=-0.1), 0.02) == Plane(offset=-0.1 + 0.02)
+
+
+def test_several_parts_are_replaced_in_one_step() -> None:
+    """It is the scene that single steps make; what is not given stays."""
+    both = MODEL.scene.with_contents(objects={'table': TABLE, 'cup': CUP})
+    single = MODEL.scene.with_object(TABLE).with_object(CUP)
+    assert both.pairs == single.pairs
+    assert both.with_contents(objects={}).pairs == MODEL.scene.pairs

@@ -125,7 +125,7 @@ class PlanningScene:
         Raises:
             SceneError: A link or an attached body has its name.
         """
-        return self._with(objects={**self.objects, thing.name: thing})
+        return self.with_contents(objects={**self.objects, thing.name: thing})
 
     def without(self, name: str) -> PlanningScene:
         """Return the scene without an object or an attached body.
@@ -137,14 +137,16 @@ class PlanningScene:
             SceneError: There is none of this name.
         """
         self._thing(name)
-        return self._with(
-            {each: thing for each, thing in self.objects.items() if each != name},
-            {each: body for each, body in self.attached_bodies.items() if each != name},
+        return self.with_contents(
+            objects={each: thing for each, thing in self.objects.items() if each != name},
+            attached_bodies={
+                each: body for each, body in self.attached_bodies.items() if each != name
+            },
         )
 
     def without_objects(self) -> PlanningScene:
         """Return the robot alone: self-collision."""
-        return self._with({}, {})
+        return self.with_contents(objects={}, attached_bodies={})
 
     def attached(
         self, name: str, link: str, positions: Array, touch_links: Iterable[str] = ()
@@ -176,7 +178,7 @@ class PlanningScene:
         Raises:
             SceneError: A link or an object of the world has its name, or a link is unknown.
         """
-        return self._with(attached={**self.attached_bodies, body.object.name: body})
+        return self.with_contents(attached_bodies={**self.attached_bodies, body.object.name: body})
 
     def detached(self, name: str, positions: Array) -> PlanningScene:
         """Return the scene with an attached body laid down in the world, where it is.
@@ -210,13 +212,40 @@ class PlanningScene:
         link = self.attached_bodies[name].link
         return combined(self.kinematics.link_pose(link, positions), thing.pose)
 
+    def with_contents(
+        self,
+        *,
+        objects: Mapping[str, CollisionObject] | None = None,
+        attached_bodies: Mapping[str, AttachedBody] | None = None,
+        allowed: AllowedCollisionMatrix | None = None,
+        link_shapes: Mapping[str, Sequence[PlacedShape]] | None = None,
+    ) -> PlanningScene:
+        """Return the scene with several parts replaced in one step; None keeps a part.
+
+        Args:
+            objects: Objects of the world by name.
+            attached_bodies: Attached bodies by name.
+            allowed: Pairs that may touch.
+            link_shapes: Shapes of each link, such as padded ones.
+
+        Raises:
+            SceneError: Two things have one name, or a link is unknown.
+        """
+        return PlanningScene(
+            self.kinematics,
+            self.link_shapes if link_shapes is None else link_shapes,
+            self.allowed if allowed is None else allowed,
+            (self.objects if objects is None else objects).values(),
+            (self.attached_bodies if attached_bodies is None else attached_bodies).values(),
+        )
+
     def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
         """Return the scene with another matrix of what may touch.
 
         Args:
             allowed: The matrix; names in it may be unknown.
         """
-        return self._with(allowed=allowed)
+        return self.with_contents(allowed=allowed)
 
     def allowing(self, first: str, second: str, allowed: bool = True) -> PlanningScene:
         """Return the scene with an entry for all pairs of names that fit two patterns.
@@ -232,20 +261,6 @@ class PlanningScene:
         ones, others = (self._fitting(pattern) for pattern in (first, second))
         pairs = [frozenset((one, other)) for one in ones for other in others if one != other]
         return self.with_allowed(self.allowed.with_entries(pairs, allowed))
-
-    def _with(
-        self,
-        objects: Mapping[str, CollisionObject] | None = None,
-        attached: Mapping[str, AttachedBody] | None = None,
-        allowed: AllowedCollisionMatrix | None = None,
-    ) -> PlanningScene:
-        return PlanningScene(
-            self.kinematics,
-            self.link_shapes,
-            self.allowed if allowed is None else allowed,
-            (self.objects if objects is None else objects).values(),
-            (self.attached_bodies if attached is None else attached).values(),
-        )
 
     def _thing(self, name: str) -> CollisionObject:
         if name in self.objects:
