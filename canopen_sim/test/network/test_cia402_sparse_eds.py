@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Drives whose EDS leaves something out, or that have none, and RPDOs that lack the target."""
+"""Drives whose EDS leaves something out, or that have none, and PDOs that lack something."""
 
 from __future__ import annotations
 
@@ -108,6 +108,19 @@ def test_a_stream_needs_its_rpdo() -> None:
     """A target in every cycle does not go by SDO; the object to be mapped is named."""
     with pytest.raises(DriveError, match='0x607A is in no RPDO'):
         unmapped().select(JOINT, OperationMode.CYCLIC_POSITION)
+
+
+@pytest.mark.parametrize('period', [0.02, 0.05, 0.2])
+def test_a_position_without_a_tpdo_is_read_once_a_period(period: float) -> None:
+    """As often as `period` of the device says, by SDO."""
+    config = drive_config(JOINT, 2)
+    config = replace(config, tpdos=config.tpdos[:1], poll_period=period)
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    begin = net.now
+    net.run(2.0)
+    requests = [data[:3] for data in net.frames(0x602, since=begin)]
+    assert requests.count(b'\x40\x64\x60') == pytest.approx(2.0 / period, rel=0.1)
 
 
 def test_a_drive_moves_by_the_default_dictionary() -> None:
