@@ -1,14 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot model in ROS: from parameters, and its frames beside those of TF."""
+"""The robot model in ROS: from parameters, its frames beside those of TF, scenes of messages."""
 
 from .numbers import duration_fields, seconds, xyz, xyzw
+from .planning_scene import (
+    allowed_collisions,
+    apply_attached_object,
+    apply_collision_object,
+    apply_planning_scene,
+    FrameOf,
+)
 from .robot_parameters import declare_groups, declare_robot, GroupModels, same_robot
 from .tf_listener import TfListener
 
 __all__ = [
+    'FrameOf',
     'GroupModels',
     'TfListener',
+    'allowed_collisions',
+    'apply_attached_object',
+    'apply_collision_object',
+    'apply_planning_scene',
     'declare_groups',
     'declare_robot',
     'duration_fields',

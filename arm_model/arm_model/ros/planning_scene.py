@@ -1,0 +1,420 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes of moveit_msgs as scenes of the model: objects, attached bodies, allowed collisions.
+
+All that a message changes makes one new scene. Attached bodies come before objects of the world,
+as in MoveIt: what a link takes up, a message may remove from the world besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from moveit_msgs.msg import (
+    AllowedCollisionMatrix as MatrixMessage,
+)
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+)
+from moveit_msgs.msg import (
+    CollisionObject as ObjectMessage,
+)
+from moveit_msgs.msg import (
+    PlanningScene as SceneMessage,
+)
+import numpy as np
+from shape_msgs.msg import Mesh as MeshMessage
+from shape_msgs.msg import Plane as PlaneMessage
+from shape_msgs.msg import SolidPrimitive
+
+from ..arrays import Array, checked
+from ..exceptions import CommandError, SceneError
+from ..pose import combined, inverse, ORIGIN, Pose, rotation_of
+from ..scene.allowed_collisions import AllowedCollisionMatrix
+from ..scene.objects import AttachedBody, CollisionObject
+from ..scene.planning_scene import PlanningScene
+from ..scene.shapes import Box, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
+from .numbers import xyz, xyzw
+
+FrameOf = Callable[[str], Pose]
+"""Returns the pose of a frame in the root link, or raises a SceneError where there is none."""
+
+ADD, REMOVE, APPEND, MOVE = (  # in Python a constant of the type byte is bytes
+    int.from_bytes(each, 'little') if isinstance(each, bytes) else int(each)
+    for each in (
+        ObjectMessage.ADD,
+        ObjectMessage.REMOVE,
+        ObjectMessage.APPEND,
+        ObjectMessage.MOVE,
+    )
+)
+
+LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]] = {
+    SolidPrimitive.BOX: (
+        Box,
+        (SolidPrimitive.BOX_X, SolidPrimitive.BOX_Y, SolidPrimitive.BOX_Z),
+    ),
+    SolidPrimitive.SPHERE: (Sphere, (SolidPrimitive.SPHERE_RADIUS,)),
+    SolidPrimitive.CYLINDER: (
+        Cylinder,
+        (SolidPrimitive.CYLINDER_RADIUS, SolidPrimitive.CYLINDER_HEIGHT),
+    ),
+    SolidPrimitive.CONE: (Cone, (SolidPrimitive.CONE_RADIUS, SolidPrimitive.CONE_HEIGHT)),
+}
+"""Shapes, and where their lengths are in ``dimensions``, by type of primitive."""
+
+
+def apply_planning_scene(
+    scene: PlanningScene,
+    message: SceneMessage,
+    positions: Array,
+    frame_of: FrameOf | None = None,
+) -> PlanningScene:
+    """Return a scene with what a message has in the place of what it replaces.
+
+    A whole scene replaces objects and attached bodies, a diff (``is_diff``) changes those that it
+    names. A matrix without names leaves what may touch as it is. Joints in the message count
+    nowhere. Padding, scale and octomap are not read.
+
+    Args:
+        scene: The scene before.
+        message: The message.
+        positions: Joint positions in [rad], for frames that move with the arm.
+        frame_of: Returns frames that are no links; without it there are none.
+
+    Raises:
+        SceneError: The message does not fit the robot, or the scene before.
+    """
+    state = message.robot_state
+    is_whole = not message.is_diff
+    keeps = state.is_diff or not (
+        state.joint_state.name or state.attached_collision_objects or is_whole
+    )
+    draft = _Draft(
+        scene,
+        positions,
+        frame_of,
+        {} if is_whole else dict(scene.objects),
+        dict(scene.attached_bodies) if keeps and not is_whole else {},
+    )
+    for attached in state.attached_collision_objects:
+        draft.apply_attached(attached)
+    for thing in message.world.collision_objects:
+        draft.apply(thing)
+    return draft.scene(_merged(scene, message.allowed_collision_matrix))
+
+
+def apply_collision_object(
+    scene: PlanningScene,
+    message: ObjectMessage,
+    positions: Array,
+    frame_of: FrameOf | None = None,
+) -> PlanningScene:
+    """Return a scene with an object added, moved, extended or removed.
+
+    Args:
+        scene: The scene before.
+        message: The message; REMOVE without an id removes all objects of the world.
+        positions: Joint positions in [rad], for frames that move with the arm.
+        frame_of: Returns frames that are no links; without it there are none.
+
+    Raises:
+        SceneError: The object is unknown, or not usable.
+    """
+    draft = _Draft.of(scene, positions, frame_of)
+    draft.apply(message)
+    return draft.scene()
+
+
+def apply_attached_object(
+    scene: PlanningScene,
+    message: AttachedCollisionObject,
+    positions: Array,
+    frame_of: FrameOf | None = None,
+) -> PlanningScene:
+    """Return a scene with an object attached to a link, or laid down in the world.
+
+    Args:
+        scene: The scene before.
+        message: The message; ADD without shapes takes up an object of the world, REMOVE without
+            an id lays down all bodies of the link.
+        positions: Joint positions in [rad]: where the arm is then.
+        frame_of: Returns frames that are no links; without it there are none.
+
+    Raises:
+        SceneError: Link or object are unknown, or not usable.
+    """
+    draft = _Draft.of(scene, positions, frame_of)
+    draft.apply_attached(message)
+    return draft.scene()
+
+
+def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
+    """Return what may touch.
+
+    Args:
+        message: The message.
+
+    Raises:
+        SceneError: Rows or columns are missing.
+    """
+    names, rows = list(message.entry_names), list(message.entry_values)
+    defaults = list(message.default_entry_values)
+    if len(rows) != len(names) or any(len(row.enabled) != len(names) for row in rows):
+        raise SceneError(
+            f'allowed_collision_matrix: {len(names)} entry_names need as many entry_values, each'
+            ' of that length'
+        )
+    if len(defaults) != len(message.default_entry_names):
+        raise SceneError(
+            f'allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names'
+            f' and {len(defaults)} default_entry_values'
+        )
+    entries = {
+        frozenset((first, names[column])): bool(rows[row].enabled[column])
+        for row, first in enumerate(names)
+        for column in range(row)
+    }
+    return AllowedCollisionMatrix(
+        entries, dict(zip(message.default_entry_names, map(bool, defaults), strict=True))
+    )
+
+
+def _merged(scene: PlanningScene, message: MatrixMessage) -> AllowedCollisionMatrix | None:
+    """Return the matrix of a message, and what the scene has for links that it does not name."""
+    if not (message.entry_names or message.default_entry_names):
+        return None
+    given = allowed_collisions(message)
+    named, links = set(message.entry_names), set(scene.kinematics.frames)
+    kept = {
+        pair: allowed
+        for pair, allowed in scene.allowed.entries.items()
+        if pair <= links and not pair <= named
+    }
+    return AllowedCollisionMatrix(kept | dict(given.entries), given.defaults)
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """Objects and attached bodies while messages change them."""
+
+    before: PlanningScene
+    positions: Array
+    frame_of: FrameOf | None
+    objects: dict[str, CollisionObject]
+    attached: dict[str, AttachedBody]
+
+    @classmethod
+    def of(cls, scene: PlanningScene, positions: Array, frame_of: FrameOf | None) -> _Draft:
+        """Begin with a scene."""
+        return cls(scene, positions, frame_of, dict(scene.objects), dict(scene.attached_bodies))
+
+    def scene(self, allowed: AllowedCollisionMatrix | None = None) -> PlanningScene:
+        """Return the scene that was made."""
+        return self.before.with_contents(
+            objects=self.objects, attached_bodies=self.attached, allowed=allowed
+        )
+
+    def apply(self, message: ObjectMessage) -> None:
+        """Add, move, extend or remove an object of the world."""
+        name, operation = message.id, _operation(message)
+        if operation == REMOVE:
+            self._remove(name)
+        elif operation == MOVE:
+            self.objects[name] = self._moved(message)
+        elif operation == APPEND and name in self.objects:
+            before = self.objects[name]
+            back = combined(inverse(before.pose), self._pose(message))
+            more = [
+                PlacedShape(each.shape, combined(back, each.pose)) for each in _shapes(message)
+            ]
+            self.objects[name] = CollisionObject(name, *before.shapes, *more, pose=before.pose)
+        else:
+            self.objects[name] = self._new(message)
+
+    def apply_attached(self, message: AttachedCollisionObject) -> None:
+        """Attach an object, or lay it down."""
+        thing, link = message.object, message.link_name
+        name, operation = thing.id, _operation(thing)
+        if operation == REMOVE:
+            self._detach(name, link)
+            return
+        if operation == MOVE:
+            raise SceneError(
+                f'attached object {name!r}: MOVE has no meaning; ADD it again at its new place'
+            )
+        place = inverse(self._link(name, link))
+        touch = frozenset(message.touch_links)
+        shapes = list(_shapes(thing))
+        if operation == APPEND and name in self.attached:
+            body = self.attached[name]
+            if body.link != link:
+                raise SceneError(f'attached object {name!r} is on {body.link!r}, not on {link!r}')
+            back = combined(inverse(body.object.pose), combined(place, self._pose(thing)))
+            more = [PlacedShape(each.shape, combined(back, each.pose)) for each in shapes]
+            whole = CollisionObject(name, *body.object.shapes, *more, pose=body.object.pose)
+            self.attached[name] = AttachedBody(whole, link, body.touch_links | touch)
+            return
+        if shapes:
+            in_world = self._new(thing)
+        elif name in self.objects:
+            in_world = self.objects[name]
+        else:
+            raise SceneError(
+                f'attached object {name!r} has no shapes, and no object of the world has this name'
+            )
+        self.objects.pop(name, None)
+        in_link = in_world.at(combined(place, in_world.pose))
+        self.attached[name] = AttachedBody(in_link, link, touch)
+
+    def _remove(self, name: str) -> None:
+        if not name:
+            self.objects.clear()
+        elif name not in self.attached:  # what a link has taken up is in the world no more
+            self._known(name)
+            del self.objects[name]
+
+    def _detach(self, name: str, link: str) -> None:
+        fitting = [
+            each
+            for each, body in self.attached.items()
+            if name in {'', each} and link in {'', body.link}
+        ]
+        if name and not fitting:
+            known = ', '.join(self.attached) or 'none'
+            raise SceneError(f'no attached object {name!r} on {link!r}; there are: {known}')
+        for each in fitting:
+            body = self.attached.pop(each)
+            place = combined(self._link(each, body.link), body.object.pose)
+            self.objects[each] = body.object.at(place)
+
+    def _new(self, message: ObjectMessage) -> CollisionObject:
+        return CollisionObject(message.id, *_shapes(message), pose=self._pose(message))
+
+    def _moved(self, message: ObjectMessage) -> CollisionObject:
+        before = self._known(message.id)
+        if any((message.primitives, message.meshes, message.planes)):
+            raise SceneError(f'object {message.id!r}: MOVE takes no shapes; use ADD to replace it')
+        poses = [*message.primitive_poses, *message.mesh_poses, *message.plane_poses]
+        shapes: tuple[PlacedShape, ...] = before.shapes
+        if poses:
+            if len(poses) != len(shapes):
+                raise SceneError(
+                    f'object {message.id!r}: {len(poses)} poses to move {len(shapes)} shapes'
+                )
+            shapes = tuple(
+                PlacedShape(old.shape, _pose(new, message.id))
+                for old, new in zip(shapes, poses, strict=True)
+            )
+        return CollisionObject(message.id, *shapes, pose=self._pose(message))
+
+    def _known(self, name: str) -> CollisionObject:
+        if name not in self.objects:
+            known = ', '.join(self.objects) or 'none'
+            raise SceneError(f'no object {name!r} in the world; there are: {known}')
+        return self.objects[name]
+
+    def _pose(self, message: ObjectMessage) -> Pose:
+        """Return where an object is, in the root link."""
+        place = _pose(message.pose, message.id)
+        return combined(self._frame(message.id, message.header.frame_id), place)
+
+    def _frame(self, name: str, frame: str) -> Pose:
+        kinematics = self.before.kinematics
+        if frame in {'', kinematics.root}:
+            return ORIGIN
+        if frame in kinematics.frames:
+            return kinematics.link_pose(frame, self.positions)
+        if self.frame_of is None:
+            known = ', '.join(kinematics.frames)
+            raise SceneError(f'object {name!r}: no frame {frame!r}; links: {known}')
+        return self.frame_of(frame)
+
+    def _link(self, name: str, link: str) -> Pose:
+        """Return where a link is, in the root link."""
+        if link not in self.before.kinematics.frames:
+            known = ', '.join(self.before.kinematics.frames)
+            raise SceneError(f'attached object {name!r}: no link {link!r}; links: {known}')
+        return self.before.kinematics.link_pose(link, self.positions)
+
+
+def _operation(message: ObjectMessage) -> int:
+    given = message.operation
+    operation = int.from_bytes(given, 'little') if isinstance(given, bytes) else int(given)
+    if operation not in {ADD, REMOVE, APPEND, MOVE}:
+        raise SceneError(
+            f'object {message.id!r}: no operation {operation}; choose ADD, REMOVE, APPEND or MOVE'
+        )
+    return operation
+
+
+def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
+    """Yield primitives, meshes and planes; a pose that is not given is the object's origin."""
+    name = message.id
+    for what, things, poses, shape_of in (
+        ('primitive', message.primitives, message.primitive_poses, _primitive),
+        ('mesh', message.meshes, message.mesh_poses, _mesh),
+        ('plane', message.planes, message.plane_poses, _plane),
+    ):
+        if len(poses) not in {0, len(things)}:
+            raise SceneError(
+                f'object {name!r}: {len(things)} {what} shapes and {len(poses)} poses'
+            )
+        for number, thing in enumerate(things):
+            pose = _pose(poses[number], name) if len(poses) else ORIGIN
+            yield PlacedShape(shape_of(thing, name), pose)
+
+
+def _primitive(message: SolidPrimitive, name: str) -> Shape:
+    dimensions = [float(each) for each in message.dimensions]
+    if message.type == SolidPrimitive.PRISM:
+        return _prism(message, dimensions, name)
+    if message.type not in LENGTHS:
+        raise SceneError(
+            f'object {name!r}: no primitive {message.type}; choose BOX, SPHERE, CYLINDER, CONE'
+            ' or PRISM'
+        )
+    kind, places = LENGTHS[message.type]
+    if len(dimensions) != len(places):
+        raise SceneError(
+            f'object {name!r}: a {kind.__name__.lower()} has {len(places)} dimensions, not'
+            f' {len(dimensions)}'
+        )
+    return kind(*(dimensions[place] for place in places))
+
+
+def _prism(message: SolidPrimitive, dimensions: list[float], name: str) -> Shape:
+    corners = [(point.x, point.y) for point in message.polygon.points]
+    if len(dimensions) != 1 or len(corners) < 3:
+        raise SceneError(
+            f'object {name!r}: a prism has 1 dimension and 3 corners at least, not'
+            f' {len(dimensions)} and {len(corners)}'
+        )
+    half = 0.5 * dimensions[SolidPrimitive.PRISM_HEIGHT]
+    return Mesh([(x, y, z) for x, y in corners for z in (-half, half)])
+
+
+def _mesh(message: MeshMessage, name: str) -> Shape:
+    try:
+        return Mesh([(point.x, point.y, point.z) for point in message.vertices])
+    except SceneError as error:
+        raise SceneError(f'object {name!r}: {error}') from error
+
+
+def _plane(message: PlaneMessage, _name: str) -> Shape:
+    """Return the half-space below a plane a x + b y + c z + d = 0."""
+    a, b, c, d = (float(each) for each in message.coef)
+    length = float(np.linalg.norm((a, b, c)))
+    return Plane((a, b, c), -d / length if length else 0.0)
+
+
+def _pose(message: Any, name: str) -> Pose:  # noqa: ANN401  # message classes have no type
+    """Return a pose; an orientation of zeros is none, as in MoveIt."""
+    quaternion = xyzw(message.orientation)
+    try:
+        rotation = rotation_of(quaternion) if any(quaternion) else ORIGIN.rotation
+        return Pose(rotation, checked(xyz(message.position), 3, 'position'))
+    except CommandError as error:
+        raise SceneError(f'object {name!r}: {error}') from error
