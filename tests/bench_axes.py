@@ -211,7 +211,7 @@ def steady_state(arm: SimulatedArm, seconds: float) -> Rows:
 
 
 def is_there(look: Callable[[], object]) -> bool:
-    """Tell whether a look finds something."""
+    """Return whether a look finds something."""
     return look() is not None
 
 
@@ -230,7 +230,7 @@ def cpu_time(process: RunningProcess) -> float:
 
 
 def is_boot_up(can_id: int, data: bytes) -> bool:
-    """Tell whether a frame is a boot-up message."""
+    """Return whether a frame is a boot-up message."""
     return 0x701 <= can_id <= 0x77F and data == b'\0'
 
 

@@ -86,7 +86,7 @@ def run_alone(path: str, interface: str) -> dict[str, float]:
     config = load_bus(path)
 
     def ignore(event: Event) -> None:
-        """There is nobody to tell."""
+        """Report to nobody."""
 
     with open_bus(interface) as can:
         network = Network(config, can.send, ignore)

@@ -137,7 +137,7 @@ def ended(arm: MovingArm, positions: Sequence[float], duration: float) -> None:
 
 @dataclass(slots=True)
 class Seen:
-    """What the drives were told and told, cycle by cycle, in some frames."""
+    """What the drives received and reported, cycle by cycle, in some frames."""
 
     frames: Sequence[Frame]
 

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program on a simulated bus, and one that attacks it from elsewhere.
 
-``hear NAME ADDRESS`` prints each frame of a bus, and sends one now and then; a socket beside it is
-a member of the group on the interface with this address, as python-can's own tools are. ``attack
-GROUP PORT ADDRESS TARGET`` sends frames of 0x666 to the group from an address, and to the target.
+``listen NAME ADDRESS`` prints each frame of a bus, and sends one now and then; a socket beside it
+is a member of the group on the interface with this address, as python-can's own tools are.
+``attack GROUP PORT ADDRESS TARGET`` sends frames of 0x666 to the group from an address, and to the
+target.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from arm_canopen.can.multicast_format import encode
 PERIOD = 0.05  # [s]
 
 
-def hear(name: str, address: str) -> None:
-    """Print what is heard, until it is ended."""
+def listen(name: str, address: str) -> None:
+    """Print what is received, until it is ended."""
     _, group, port = name.split(':')
     member = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     member.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -50,7 +51,7 @@ def attack(group: str, port: str, address: str, target: str) -> None:
 
 
 if __name__ == '__main__':
-    if sys.argv[1] == 'hear':
-        hear(*sys.argv[2:])
+    if sys.argv[1] == 'listen':
+        listen(*sys.argv[2:])
     else:
         attack(*sys.argv[2:])

@@ -140,11 +140,11 @@ class QuadVictim:
         state = self._quad.state
         if state != 'fault' or not self._quad.processes['controller'].is_running():
             return state
-        words = self._told()
+        words = self._reasons()
         assert words, 'is in fault, and /diagnostics does not say why'
         return f'fault: {words}'
 
-    def _told(self) -> str:
+    def _reasons(self) -> str:
         """Return what the last diagnostics complain of."""
         return '; '.join(
             status.message
@@ -205,7 +205,7 @@ class QuadVictim:
         return position.x, position.y
 
     def _check_targets(self) -> None:
-        """Look at all that servos were told since the last look."""
+        """Check all targets of servos since the last look."""
         targets = list(self._quad.tap.targets)
         step = self._quad.tap.largest_step()
         if step > LARGEST_STEP:

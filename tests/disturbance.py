@@ -126,7 +126,7 @@ def run(victim: Victim, events: Iterable[Event]) -> Report:
         except AssertionError as error:
             report.violations += [f'{number}, {event}: {v}' for v in (error, *victim.violations())]
             print(f'-> NOT RECOVERED: {error}', flush=True)
-            break  # what follows would tell of this one
+            break  # what follows would show the effects of this one
         print(f'-> {outcome}', flush=True)
         report.outcomes[outcome.partition(':')[0]] += 1
         report.violations += [f'{number}, {event}: {v}' for v in victim.violations()]

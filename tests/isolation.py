@@ -51,8 +51,8 @@ class Isolation:
 def reserve() -> Iterator[Isolation]:
     """Reserve a ROS domain and a CAN bus, against all processes of this machine that do the same.
 
-    A domain is used again as late as possible: who comes into one right behind a test still hears
-    of that test's nodes.
+    A domain is used again as late as possible: the nodes of a test that has just ended are
+    still discovered in its domain.
 
     Raises:
         RuntimeError: Every domain is reserved.

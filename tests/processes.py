@@ -65,7 +65,7 @@ class RunningProcess:
         return '\n'.join(self.lines)
 
     def is_running(self) -> bool:
-        """Tell whether it has not ended yet."""
+        """Return whether it has not ended yet."""
         return self._process.poll() is None
 
     def wait_for(self, pattern: str, timeout: float = 60.0, count: int = 1) -> str:

@@ -43,5 +43,5 @@ def read_position(bus: Bus, node_id: int) -> int:
 
 
 def is_enabled(bus: Bus, node_id: int) -> bool:
-    """Tell whether a drive is in Operation enabled."""
+    """Return whether a drive is in Operation enabled."""
     return drive_state(read(bus, node_id, STATUSWORD)) is DriveState.OPERATION_ENABLED

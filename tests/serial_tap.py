@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A serial cable with a listener: what the bridge tells the servos, as the wire has it."""
+"""A serial cable with a listener: what the bridge sends to the servos, as the wire has it."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class SerialTap:
 
     Attributes:
         link: Path of the bridge's end.
-        targets: What the bridge told the servos so far (the protocol that pushes states).
+        targets: What the bridge sent to the servos so far (the protocol that pushes states).
         reports: Steady times in [s] at which the robot's states had come in.
         noise: Share of the bytes, of both directions, in which a bit is inverted from now on.
     """
@@ -107,13 +107,13 @@ class SerialTap:
         return max(self._steps(since), default=0.0)
 
     def longest_silence(self, since: float) -> float:
-        """Return the longest time in [s] in which the bridge heard no state of the robot.
+        """Return the longest time in [s] in which the bridge received no state of the robot.
 
         Args:
             since: Steady time in [s] at which the first silence begins at the earliest.
         """
-        heard = (report for report in list(self.reports) if report > since)
-        times = [since, *heard, time.monotonic()]
+        arrivals = (report for report in list(self.reports) if report > since)
+        times = [since, *arrivals, time.monotonic()]
         return max(after - before for before, after in itertools.pairwise(times))
 
     def _steps(self, since: float) -> Iterator[float]:

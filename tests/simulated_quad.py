@@ -102,7 +102,7 @@ class SimulatedQuad:
         return process
 
     def set_mode(self, mode: str) -> None:
-        """Ask for a mode until it is accepted: what it needs may not be heard yet."""
+        """Ask for a mode until it is accepted: what it needs may not be received yet."""
         words = 'no answer'
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:

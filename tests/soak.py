@@ -3,7 +3,7 @@
 """Seven axes on trajectories and a walking quadruped for long: what is lost, what grows?
 
 Run it with ``make soak``, or ``python tests/soak.py [--duration S]`` in the environment. The exit
-code tells the verdict. On a machine that others use, frames may be lost that we would not lose.
+code is the verdict. On a machine that others use, frames may be lost that we would not lose.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ SAMPLING = 10.0
 LARGEST_SLOPE = 1.0
 """Growth of memory that counts as flat in [MB/h]."""
 NOISE = 0.1
-"""Growth in [MB] that is too little to tell, as long as the run is short."""
+"""Growth in [MB] that is too little to count, as long as the run is short."""
 MEGABYTE = 1e6
 FIRST_NODE = 2
 WAY_TIME = 3.0
@@ -259,10 +259,10 @@ def soak(duration: float, folder: Path) -> bool:
         'unanswered SYNCs': frames.unanswered(),
         "lost by this program's count": frames.missed,
     }
-    return tell(duration, robots, frames, usages, lost)
+    return report(duration, robots, frames, usages, lost)
 
 
-def tell(
+def report(
     duration: float,
     robots: Robots,
     frames: FrameCount,

@@ -49,7 +49,7 @@ def test_demo_of_motion(isolation: Isolation) -> None:
 
 
 def test_ctrl_c_in_the_middle_of_the_demo(isolation: Isolation) -> None:
-    """The arm comes to rest, the drives are disabled, and what was measured is told."""
+    """The arm comes to rest, the drives are disabled, and what was measured is reported."""
     with BusRecorder(isolation.bus) as recorder:
         with start(isolation, 'arm_bringup', 'motion_demo', 'prbt') as demo:
             demo.wait_for('a square in the base frame', 90.0)

@@ -84,7 +84,7 @@ def _stops_on_the_path_when_one_drive_fails(arm: MovingArm) -> None:
     assert 'panda_joint3' not in result.error_string
     # the result may be here before the last states are
     arm.client.spin_until(lambda: not any(states[-1].reference.velocities), 5.0, 'rest')
-    # at rest the state tells where the drives stand
+    # at rest the state shows where the drives stand
     moving = [any(state.reference.velocities) for state in states]
     rest = moving.index(False, moving.index(True))
     way = np.array([list(state.reference.positions) for state in states[:rest]]) - READY

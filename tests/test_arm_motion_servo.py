@@ -81,12 +81,12 @@ class Jogger:
     def refused(self, message: Any, words: str) -> None:
         """Publish a command until the status says why it is refused."""
 
-        def told() -> bool:
+        def reported() -> bool:
             status = self.words[-1]
             return bool(status.code == ServoStatus.INVALID and words in status.message)
 
         before = self.at
-        self.until(message, told, f'refusal with {words!r}')
+        self.until(message, reported, f'refusal with {words!r}')
         assert self.at == pytest.approx(before, abs=1e-9)
 
     def at_rest(self) -> None:
@@ -115,7 +115,7 @@ def test_an_arm_is_jogged_in_every_way(isolation: Isolation, tmp_path: Path) -> 
         jogger = Jogger(arm)
         arm.client.spin_until(lambda: bool(jogger.words and jogger.states), 10.0, 'status')
         _jogs(jogger)
-        _is_told_what_is_wrong(jogger)
+        _refuses_what_is_wrong(jogger)
         _is_switched_and_paused(jogger)
         _takes_over_from_a_trajectory(jogger)
 
@@ -163,7 +163,7 @@ def _pose(jogger: Jogger) -> None:
     jogger.at_rest()
 
 
-def _is_told_what_is_wrong(jogger: Jogger) -> None:
+def _refuses_what_is_wrong(jogger: Jogger) -> None:
     old = twist('panda_link0', x=0.5)
     old.header.stamp.sec = 1000
     pose = PoseStamped()

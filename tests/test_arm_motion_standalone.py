@@ -95,7 +95,7 @@ def test_one_program_is_chosen_by_its_back_end(isolation: Isolation, tmp_path: P
             arm.process.wait_for('another program has a node /servo_node')
 
 
-def test_a_goal_is_told_that_the_program_ends(isolation: Isolation, tmp_path: Path) -> None:
+def test_a_goal_is_aborted_when_the_program_ends(isolation: Isolation, tmp_path: Path) -> None:
     """Ctrl-C in the middle of it: the arm comes to rest on the path, the client gets a result."""
     command = standalone(tmp_path, 'trajectory_controller')
     with TopicArm(isolation, command, READY_WORDS) as arm:
@@ -113,7 +113,7 @@ def test_a_goal_is_told_that_the_program_ends(isolation: Isolation, tmp_path: Pa
 def test_a_goal_that_the_arm_did_not_reach_is_no_success(
     isolation: Isolation, tmp_path: Path
 ) -> None:
-    """A stuck arm is told without any tolerance asked for: at the goal, on a long way sooner."""
+    """A stuck arm is reported without a tolerance in the goal: at its end, on long ways sooner."""
     command = standalone(tmp_path, 'trajectory_controller', 'constraints.goal_time:=0.3')
     with TopicArm(isolation, command, READY_WORDS) as arm:
         arm.moves = False
@@ -158,7 +158,7 @@ def _switch(arm: TopicArm, on: list[str], off: list[str]) -> None:
 def test_jogging_goes_out_as_trajectories(isolation: Isolation, tmp_path: Path) -> None:
     """A jog moves its joint; Ctrl-C in the middle of it ends at rest, with exit code 0.
 
-    What is left out of the description is told, and at the end there are no words of libraries.
+    What is left out of the description is reported, and libraries log nothing at the end.
     """
     odd = '<group_state name="odd" group="panda_arm"><joint name="elbow" value="0"/></group_state>'
     command = standalone(tmp_path, 'servo_node', semantic=odd)

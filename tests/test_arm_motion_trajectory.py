@@ -35,7 +35,7 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         states = arm.client.listen(
             JointTrajectoryControllerState, f'{CONTROLLER}/controller_state'
         )
-        _tells_where_it_stands(arm, states)
+        _reports_where_it_stands(arm, states)
         _refuses_before_init(arm)
         arm.follow()
         _refuses_what_is_wrong(arm)
@@ -47,7 +47,7 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         _names_the_lost_drives(arm)
 
 
-def test_a_goal_is_told_that_the_master_ends(isolation: Isolation, tmp_path: Path) -> None:
+def test_a_goal_is_aborted_when_the_master_ends(isolation: Isolation, tmp_path: Path) -> None:
     """Ctrl-C in the middle of it: the drives stop, and the client gets a result."""
     with MovingArm(isolation, tmp_path) as arm:
         arm.follow()
@@ -61,7 +61,7 @@ def test_a_goal_is_told_that_the_master_ends(isolation: Isolation, tmp_path: Pat
         assert 'leaked' not in arm.master.output
 
 
-def _tells_where_it_stands(
+def _reports_where_it_stands(
     arm: MovingArm, states: Sequence[JointTrajectoryControllerState]
 ) -> None:
     """Before any command, and before the drives are enabled."""

@@ -21,15 +21,15 @@ def test_nothing_enters_or_leaves_by_the_cable(isolation: Isolation) -> None:
     env = os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}
     _, group, port = isolation.bus.split(':')
     with two_hosts() as (robot, desk):
-        hear = ['hear', isolation.bus, robot.address]
+        listen = ['listen', isolation.bus, robot.address]
         attack = ['attack', group, port, desk.address, robot.address]
-        with robot.run([*PROGRAM, *hear], env) as bus:
+        with robot.run([*PROGRAM, *listen], env) as bus:
             bus.wait_for('open')
             sent = robot.packets()[1]
             with desk.run([*PROGRAM, *attack], env) as attacker:
                 attacker.wait_for('sent')
-                # beside it a second member of the bus, which is heard
-                with robot.run([*PROGRAM, *hear], env):
+                # beside it a second member of the bus, which is received
+                with robot.run([*PROGRAM, *listen], env):
                     bus.wait_for('080', count=20)
             assert robot.packets()[0] > 20
             assert '666' not in bus.lines

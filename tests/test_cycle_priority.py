@@ -56,5 +56,5 @@ def test_cycles_have_real_time_priority(
         }
         for program in programs:
             (pid,) = [pid for line, pid in found.items() if f'/{program} ' in line]
-            told = [line for line in bringup.lines if REFUSED in line and program in line]
-            assert len(real_time_threads(pid)) == (0 if told else 1), (program, found)
+            refused = [line for line in bringup.lines if REFUSED in line and program in line]
+            assert len(real_time_threads(pid)) == (0 if refused else 1), (program, found)

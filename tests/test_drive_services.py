@@ -60,7 +60,7 @@ def positions(arm: SimulatedArm) -> list[float]:
 
 
 def test_homing_as_an_action_and_as_a_service(isolation: Isolation) -> None:
-    """Feedback tells the phase, cancelling stops it, a method that fails says why."""
+    """Feedback has the phase, cancelling stops it, a method that fails says why."""
     with SimulatedArm(isolation) as arm:
         goal = Goal(arm, 35)
         done = goal.result()
@@ -112,8 +112,8 @@ def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
         assert halted.success, halted.message
         assert 'Operation enabled' in halted.message
 
-        heard = positions(arm)
-        arm.client.spin_until(lambda: len(heard) > 5, 10.0, 'joint states')
+        received = positions(arm)
+        arm.client.spin_until(lambda: len(received) > 5, 10.0, 'joint states')
         relative = Move.Request(target=0.1, relative=True)
         assert not arm.client.call(Move, '/panda_joint5/move', relative).success
         back = arm.client.call(Move, f'{JOINT}/move', Move.Request(target=0.0))
@@ -121,7 +121,7 @@ def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
         for _ in range(2):
             step = Move.Request(target=0.1, relative=True, queue=True)
             assert arm.client.call(Move, f'{JOINT}/move', step).success
-        arm.client.spin_until(lambda: abs(heard[-1] - 0.2) < 2e-3, 20.0, 'position 0.2')
+        arm.client.spin_until(lambda: abs(received[-1] - 0.2) < 2e-3, 20.0, 'position 0.2')
 
         assert arm.client.trigger(f'{JOINT}/cyclic_position_mode').success
         stream = arm.client.node.create_publisher(Float64, f'{JOINT}/target', 10)
@@ -131,7 +131,7 @@ def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
 
         def send() -> bool:
             stream.publish(Float64(data=0.0))
-            return abs(heard[-1]) < 2e-3
+            return abs(received[-1]) < 2e-3
 
         arm.client.spin_until(send, 20.0, 'position 0.0')
         arm.master.wait_for('the stream of targets has paused')

@@ -78,7 +78,7 @@ def kill(quad: SimulatedQuad, name: str) -> float:
 
 
 def check_upright(quad: SimulatedQuad) -> None:
-    """The robot stands, and no servo was ever told to jump."""
+    """The robot stands, and no servo ever got a target that jumps."""
     assert tilt(quad) < math.radians(15.0)
     assert quad.tap.largest_step() < LARGEST_STEP
 
@@ -121,7 +121,9 @@ def test_a_controller_that_was_frozen_moves_nothing_until_it_is_asked(
     assert quad.tap.largest_step(since=woken) < RESUMED
 
 
-def test_a_killed_bridge_is_told_and_its_successor_goes_on_smoothly(quad: SimulatedQuad) -> None:
+def test_a_killed_bridge_is_reported_and_its_successor_goes_on_smoothly(
+    quad: SimulatedQuad,
+) -> None:
     """The controller stops by itself; after the fault is cleared it walks again."""
     quad.set_mode('walk')
     quad.walk(1.5)

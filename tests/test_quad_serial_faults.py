@@ -98,14 +98,14 @@ HELD = ('controller', 'fault, .*(joint states|attitude|imu)|joint states are .* 
     ],
     ids=['unplugged', 'silent', 'without power', 'corrupt', 'lossy'],
 )
-def test_a_broken_line_is_told_and_survived(
+def test_a_broken_line_is_reported_and_survived(
     quad: SimulatedQuad, fault: str, settings: list[str], reasons: list[tuple[str, str]]
 ) -> None:
     """Upright, without a jump, and walking again when the line is good again."""
     diagnostics = quad.client.listen(DiagnosticArray, '/diagnostics')
-    told = [said(quad, speaker, reason) for speaker, reason in reasons]
+    counts = [said(quad, speaker, reason) for speaker, reason in reasons]
     inject(quad, fault, *settings)
-    for count, (speaker, reason) in zip(told, reasons, strict=True):
+    for count, (speaker, reason) in zip(counts, reasons, strict=True):
         quad.processes[speaker].wait_for(reason, count=count + 1)
     if fault != 'brown_out':  # servos without torque hold nobody up
         assert tilt(quad) < math.radians(15.0)
@@ -119,7 +119,7 @@ def said(quad: SimulatedQuad, speaker: str, reason: str) -> int:
 
 
 def test_a_robot_that_is_killed_is_named_and_its_successor_walks(quad: SimulatedQuad) -> None:
-    """Its terminal is gone without a farewell; the one that comes lies until it is asked."""
+    """Its terminal is gone without a word; the one that comes lies until it is asked."""
     diagnostics = quad.client.listen(DiagnosticArray, '/diagnostics')
     bridge, controller = quad.processes['hardware'], quad.processes['controller']
     count = said(quad, 'hardware', GONE), said(quad, 'controller', STOPPED[1])
@@ -141,12 +141,12 @@ def test_a_robot_that_is_killed_is_named_and_its_successor_walks(quad: Simulated
 
 def test_with_a_dead_imu_the_robot_is_laid_down(quad: SimulatedQuad) -> None:
     """Its fault stops the walk; lying down needs joints only, and is done; then it is cleared."""
-    told = said(quad, 'controller', 'fault, attitude')
+    before = said(quad, 'controller', 'fault, attitude')
     standing = quad.truth[-1].pose.pose.position.z
     request = InjectFault.Request(fault='imu')
     assert quad.client.call(InjectFault, '/fake_xgo/fault', request).success
     quad.walk(1.5)
-    quad.processes['controller'].wait_for('fault, attitude', count=told + 1)
+    quad.processes['controller'].wait_for('fault, attitude', count=before + 1)
     quad.set_mode('lie')
     quad.client.spin_until(lambda: quad.state == 'lie', 20.0, 'lying')
     quad.spin(0.5)

@@ -67,7 +67,7 @@ def wave() -> Node:
 def test_a_refused_node_leaves_nothing_in_the_graph(
     isolation: Isolation, make: Callable[[], Node], parameter: str, reason: str
 ) -> None:
-    """A node that raises what its program tells in a line is gone from the process's graph."""
+    """A node that raises what its program logs in a line is gone from the process's graph."""
     rclpy.init(args=['--ros-args', '-p', parameter], domain_id=isolation.domain_id)
     watcher = Node('watcher')
     try:

@@ -19,7 +19,7 @@ from ros_client import RosClient
 from simulated_arm import panda_bus
 
 TIMEOUT = 60.0  # [s]
-# what the master logs at its start is heard although it is found later
+# what the master logs at its start is received although the node is found later
 LATCHED = QoSProfile(  # type: ignore[no-untyped-call]
     depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
@@ -39,10 +39,10 @@ def test_a_bus_that_goes_down_is_a_message_of_the_master_on_rosout(isolation: Is
         RosClient(isolation.domain_id) as client,
         RunningProcess(command, isolation.env) as master,
     ):
-        heard: list[Log] = client.listen(Log, '/rosout', LATCHED)
+        received: list[Log] = client.listen(Log, '/rosout', LATCHED)
 
         def of_master(level: int) -> list[str]:
-            return [each.msg for each in heard if each.name == 'master' and each.level == level]
+            return [each.msg for each in received if each.name == 'master' and each.level == level]
 
         client.spin_until(lambda: bool(of_master(Log.INFO)), TIMEOUT, 'the master on /rosout')
         os.kill(master.pid, signal.SIGUSR1)

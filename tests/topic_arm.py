@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 LIFETIME = 600.0
-"""Longest life of the drives in [s]."""
+"""Longest time in [s] that the drives run."""
 
 PATIENT = {'joint_state_timeout': '3.0', 'following_delay': '0.8'}
 """How late joint states may be in [s]: on a busy machine the drives wait for the processor."""
 
-HEARD = 10
-"""Joint states that somebody has heard, before the arm counts as there."""
+RECEIVED_STATES = 10
+"""Joint states that a subscriber has received before the arm counts as there."""
 
 
 def standalone(folder: Path, program: str, *arguments: str, semantic: str = '') -> list[str]:
@@ -50,11 +50,11 @@ def standalone(folder: Path, program: str, *arguments: str, semantic: str = '') 
 
 
 class TopicArm:
-    """Drives that go where they are told and publish it, and what tells them.
+    """Drives that follow set-points and publish joint states, and the program that commands them.
 
     Attributes:
         at: Where it is in [rad].
-        moves: Whether it goes where it is told.
+        moves: Whether it goes to its set-points.
         publishes: Whether it publishes where it is.
         arrays: Set-points as arrays so far.
         trajectories: Set-points as trajectories so far.
@@ -67,13 +67,15 @@ class TopicArm:
         self.arrays: list[list[float]] = []
         self.trajectories: list[JointTrajectory] = []
         self.publishes = True
-        self._heard = 0
+        self._received = 0
         self._stopped = threading.Event()
         with ExitStack() as stack:
             self._start(isolation, stack)
             self.process = stack.enter_context(RunningProcess(command, isolation.env))
             self.process.wait_for(ready)
-            self.client.spin_until(lambda: self._heard > HEARD, 60.0, 'somebody who listens')
+            self.client.spin_until(
+                lambda: self._received > RECEIVED_STATES, 60.0, 'subscriber of /joint_states'
+            )
             self._stack = stack.pop_all()
 
     def _start(self, isolation: Isolation, stack: ExitStack) -> None:
@@ -93,7 +95,7 @@ class TopicArm:
         stack.callback(self._stop)
 
     def _run(self) -> None:
-        """Live on while the test waits for something, as drives do."""
+        """Run on while the test waits for something, as drives do."""
         self._drives.spin_until(self._stopped.is_set, LIFETIME, 'end of the test')
 
     def _stop(self) -> None:
@@ -104,7 +106,7 @@ class TopicArm:
         if not self.publishes:
             return
         self._states.publish(JointState(name=JOINTS, position=self.at))
-        self._heard += self._states.get_subscription_count() > 0
+        self._received += self._states.get_subscription_count() > 0
 
     def _take_array(self, message: Float64MultiArray) -> None:
         self.arrays.append(list(message.data))

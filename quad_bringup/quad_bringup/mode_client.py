@@ -60,12 +60,12 @@ class ModeClient(GraphClient):
             CallError: It refused, or did not answer in time.
             GivenUpError: It is no longer wanted.
         """
-        patience = time.monotonic() + REFUSAL_TIMEOUT
+        deadline = time.monotonic() + REFUSAL_TIMEOUT
         while True:
             answer = self._request(mode, timeout)
             if answer.success:
                 return str(answer.message)
-            if time.monotonic() > patience:
+            if time.monotonic() > deadline:
                 raise CallError(f'the mode {mode!r} was refused: {answer.message}')
             self.listen(RETRY_PERIOD)
 

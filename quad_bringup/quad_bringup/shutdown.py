@@ -9,7 +9,7 @@ from typing import Protocol
 
 from process_supervisor import CallError, GivenUpError
 
-HEAR_TIMEOUT = 5.0
+STATE_TIMEOUT = 5.0
 """Longest time in [s] to receive what the controller is doing."""
 LIE_TIMEOUT = 10.0
 """Longest time in [s] for it to lie, or to stand still."""
@@ -91,7 +91,7 @@ def _leave(
     client: Client,
 ) -> None:
     try:
-        client.wait_until(lambda: bool(client.state), HEAR_TIMEOUT, 'the state of the controller')
+        client.wait_until(lambda: bool(client.state), STATE_TIMEOUT, 'the state of the controller')
         end(client, report)
     except GivenUpError:
         report(f'stopping without {what}')

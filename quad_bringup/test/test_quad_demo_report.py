@@ -46,7 +46,7 @@ VIEW = QuadView('XGO lite, simulated', LEGS)
 STATUS = DemoStatus(12.34, 'walk', (), ('ros2 topic hz /joint_command',))
 
 
-def test_a_robot_that_moves_as_told_is_no_problem() -> None:
+def test_a_robot_that_moves_as_commanded_is_no_problem() -> None:
     """The summary has commanded, measured, odometry, tilt and jitter."""
     assert problems(GOOD, STRETCHES) == []
     lines = summary_lines(GOOD, STRETCHES)
@@ -75,7 +75,7 @@ def test_a_slow_robot_that_stands_has_not_walked() -> None:
     ],
     ids=['slow', 'sideways', 'turning', 'nan', 'unknown'],
 )
-def test_a_robot_that_moves_otherwise_is_told(moved: Velocity | None, words: str) -> None:
+def test_a_robot_that_moves_otherwise_is_reported(moved: Velocity | None, words: str) -> None:
     """By the segment, with both velocities."""
     (text,) = problems(GOOD, [Measured(WALK, moved, None)])
     assert re.search(words, text)
@@ -100,7 +100,7 @@ def test_odometry_counts_where_there_is_no_ground_truth() -> None:
     ],
     ids=['fault', 'tilt', 'no tilt', 'slow loop', 'no loop'],
 )
-def test_what_else_can_go_wrong_is_told(change: dict[str, object], words: str) -> None:
+def test_what_else_can_go_wrong_is_reported(change: dict[str, object], words: str) -> None:
     """One sentence each."""
     (text,) = problems(replace(GOOD, **change), STRETCHES)  # type: ignore[arg-type]
     assert words in text
@@ -171,6 +171,6 @@ def test_the_picture_never_outgrows_the_terminal(
 @pytest.mark.parametrize(
     ('width', 'height', 'room'), [(80, 24, True), (79, 24, False), (80, 17, True), (80, 16, False)]
 )
-def test_too_small_a_terminal_is_told_in_time(width: int, height: int, room: bool) -> None:
+def test_too_small_a_terminal_is_reported_in_time(width: int, height: int, room: bool) -> None:
     """The usual 80 x 24 is enough."""
     assert VIEW.fits(width, height) is room

@@ -42,7 +42,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 class Robot:
-    """A client of a robot that moves as it is told, times a factor."""
+    """A client of a robot that moves as commanded, times a factor."""
 
     def __init__(self, clock: Clock, factor: float = 1.0) -> None:
         self.modes: list[str] = []
@@ -83,15 +83,15 @@ class Robot:
 
     def _move(self) -> None:
         self._clock.now += STEP
-        last, told = self.milestones.measured, self.commands[-1] if self.commands else None
-        told = told or STANDSTILL
+        last, command = self.milestones.measured, self.commands[-1] if self.commands else None
+        command = command or STANDSTILL
         assert last is not None
         way = STEP * self._factor
         moved = Milestone(
             self._clock.now,
-            last.forward + way * told.forward,
-            last.left + way * told.left,
-            last.turn + way * told.turn,
+            last.forward + way * command.forward,
+            last.left + way * command.left,
+            last.turn + way * command.turn,
         )
         self.milestones = Milestones(moved, None)
 

@@ -19,7 +19,7 @@ class Controller:
         self.state = state
         self.modes: list[str] = []
         self.closed = False
-        self.obeys, self.refusal = True, ''
+        self.follows, self.refusal = True, ''
         self.outcomes: list[str] = []  # of requests, in the place of the mode
         self.given_up: Callable[[], bool] = lambda: False
 
@@ -28,7 +28,7 @@ class Controller:
         if self.refusal:
             raise CallError(f'the mode {mode!r} was refused: {self.refusal}')
         self.modes.append(mode)
-        if self.obeys:
+        if self.follows:
             self.state = self.outcomes.pop(0) if self.outcomes else mode
         return mode
 
@@ -61,7 +61,7 @@ def leave(controller: Controller, *, given_up: bool = False, hold: bool = False)
     'state', ['stand', 'walk', 'turn', 'policy', 'to stand', 'to walk', 'fault', 'to fault']
 )
 def test_a_robot_on_its_feet_lies_down(state: str) -> None:
-    """Also one that is on its way there, or has a fault; the user is told how not to wait."""
+    """Also one that is on its way there, or has a fault; the log says how not to wait."""
     controller = Controller(state)
     said = leave(controller)
     assert controller.modes == ['lie']
@@ -70,7 +70,7 @@ def test_a_robot_on_its_feet_lies_down(state: str) -> None:
 
 @pytest.mark.parametrize('state', ['walk', 'turn', 'policy', 'to walk', 'to stand'])
 def test_a_robot_that_is_to_hold_ends_its_gait_first(state: str) -> None:
-    """So that no foot is in the air when its servos hold; the user is told how not to wait."""
+    """So that no foot is in the air when its servos hold; the log says how not to wait."""
     controller = Controller(state)
     assert leave(controller, hold=True) == ['standing still first; Ctrl-C again stops at once']
     assert (controller.modes, controller.state) == (['stand'], 'stand')
@@ -113,10 +113,10 @@ def test_a_robot_that_lies_is_left_as_it_is(state: str) -> None:
 
 
 def test_a_controller_that_does_not_help_is_left() -> None:
-    """It refuses, never gets there, or is not heard of: said, and no error."""
+    """It refuses, never gets there, or its state never arrives: reported, and no error."""
     refusing, idle, silent = Controller('walk'), Controller('walk'), Controller('')
     refusing.refusal = 'battery low'
-    idle.obeys = False
+    idle.follows = False
     assert leave(refusing)[-1].endswith('refused: battery low')
     assert leave(idle)[-1].endswith('in vain for it to lie')
     assert leave(silent)[-1].endswith('in vain for the state of the controller')

@@ -130,8 +130,8 @@ def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol:
     register = Code.VERSION if first is V2 else Register.FIRMWARE
     request = Frame(Kind.READ, register, b'' if first is V2 else bytes((10,)))
     line.receive(request.encode(first), 0.0)
-    heard = StreamParser(first, ROBOT_KINDS).feed(line.advance(0.1))
-    assert [frame.address for frame in heard] == [register]
+    received = StreamParser(first, ROBOT_KINDS).feed(line.advance(0.1))
+    assert [frame.address for frame in received] == [register]
 
 
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
@@ -150,8 +150,8 @@ def test_soft_servos_reach_the_simulator(tmp_path: Path) -> None:
     assert parse_servo(options.servo) is ServoModel.VENDOR_RL
 
 
-def test_who_commands_stops_before_who_transmits_before_who_obeys(tmp_path: Path) -> None:
-    """So nobody hears commands of nobody."""
+def test_who_commands_stops_before_who_transmits_before_who_moves(tmp_path: Path) -> None:
+    """So that no process receives commands of one that has ended."""
     found = processes(tmp_path, Stack('p', simulate=True))
     orders = {name: spec.stop_order for name, spec in found.items()}
     assert orders['controller'] < orders['hardware'] < orders['fake_xgo']

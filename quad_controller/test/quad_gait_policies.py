@@ -35,7 +35,7 @@ def metadata(**changes: str | None) -> dict[str, str]:
 
 
 class FakeNetwork:
-    """Answers as it is told, and keeps what it was asked."""
+    """Answers as it is set up to, and keeps the requests."""
 
     def __init__(self, values: Mapping[str, str], joints: int = 12) -> None:
         """Have some metadata."""

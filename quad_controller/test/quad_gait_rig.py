@@ -29,7 +29,7 @@ def tilted(angle: float) -> ImuSample:
 
 
 class StillPolicy:
-    """A policy that stands, and answers wrongly when it is told to."""
+    """A policy that stands, and answers wrongly on request."""
 
     name = 'still'
 

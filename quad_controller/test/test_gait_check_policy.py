@@ -30,7 +30,7 @@ def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str])
 def test_a_policy_that_only_stands_walks_nowhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The walk tells what happened, and not what was commanded; that is no success."""
+    """The walk reports what happened, and not what was commanded; that is no success."""
     path = write_policy(tmp_path / 'still.onnx', metadata())
     assert run([str(path), '--walk', '0.2', '0', '0', '--duration', '2']) == 1
     output = capsys.readouterr().out

@@ -70,7 +70,7 @@ def test_a_foot_is_lifted_less_the_faster_it_is_and_never_dragged(
     assert lift.height(-x, -y) == fast
 
 
-def test_a_slow_robot_lifts_its_feet_as_it_is_told() -> None:
+def test_a_slow_robot_lifts_its_feet_as_high_as_commanded() -> None:
     """Where the joints have speed to spare."""
     assert LIFTS[Gait.CRAWL].height(0.06, 0.0) == HEIGHT
     assert LIFTS[Gait.TROT].height(0.1, 0.0) == HEIGHT

@@ -75,7 +75,7 @@ def test_odd_joint_states_are_refused_and_the_next_good_one_is_taken() -> None:
 
 
 def test_a_joint_of_the_arm_that_is_never_reported_is_where_it_is_sent() -> None:
-    """Protocol v1 does not tell of one; once it was told of, it may not get lost."""
+    """Protocol v1 does not report one; once it was reported, it may not get lost."""
     reader, sent = JointReader(ARM_ROBOT), (*FOLDED, 0.4)
     legs = JointState(name=list(ROBOT.names), position=[0.5] * 12, velocity=[1.0] * 12)
     assert joints(reader, legs, sent) == JointSample((*[0.5] * 12, 0.4), (*[1.0] * 12, 0.0))
@@ -232,7 +232,7 @@ def test_feedback_makes_steps_and_is_used_once() -> None:
     assert figures.steps >= 2
 
 
-def test_a_defect_is_told_and_ends_the_loop() -> None:
+def test_a_defect_is_reported_and_ends_the_loop() -> None:
     """What goes wrong in the thread reaches the node, and stopping afterwards does not hang."""
     failures: queue.Queue[Exception] = queue.Queue()
 

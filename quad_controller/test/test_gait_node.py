@@ -45,7 +45,7 @@ FOLDED = [0.0, 1.4, -1.0] * 4
 
 
 class Robot:
-    """Joints that go where they are told, published as a hardware node does.
+    """Joints that go to their targets, published as a hardware node does.
 
     Attributes:
         client: A ROS node of the test.
@@ -54,7 +54,7 @@ class Robot:
         names: Under which they are published.
         largest_speed: The largest speed of a target so far in [rad/s].
         commands: All joint commands so far.
-        states: All states that the node told.
+        states: All states that the node published.
     """
 
     def __init__(self, client: RosClient, process: RunningProcess) -> None:
@@ -96,7 +96,7 @@ class Robot:
         self.commands.append(message)
 
     def until_ready(self) -> None:
-        """Wait until the node has heard all that it needs."""
+        """Wait until the node has received all that it needs."""
         self.client.spin_until(
             lambda: bool(self.commands) and any('ready' in line for line in self.process.lines),
             20.0,
@@ -179,7 +179,7 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
 
 
 def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> None:
-    """By its name it is loaded; in a dry run its answers are told beside the commands."""
+    """By its name it is loaded; in a dry run its answers are published beside the commands."""
     with ExitStack() as stack:
         words = ['-p', 'policy:=trot_imitation', '-p', 'policy_dry_run:=true']
         process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
@@ -195,7 +195,7 @@ def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> 
 
 
 def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_path: Path) -> None:
-    """A renamed joint is told in the table and in the answer; the robot walks all the same."""
+    """A renamed joint is named in the table and in the answer; the robot still walks."""
     names = joined(['fl_hip', *ROBOT.names[1:]])
     path = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
     with ExitStack() as stack:
@@ -212,7 +212,7 @@ def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_pa
 
 
 def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None:
-    """A robot whose reports lack a joint is held, and the joint told; then it can be cleared."""
+    """A robot whose reports lack a joint is held, and the joint named; then it can be cleared."""
     robot.begin()
     robot.until_ready()
     assert robot.mode('stand').success
@@ -239,7 +239,7 @@ def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot)
     ],
 )
 def test_odd_parameters_are_refused_at_the_start(parameter: str, reason: str) -> None:
-    """A parameter that makes no sense is told, and nothing runs."""
+    """A parameter that makes no sense is reported, and nothing runs."""
     rclpy.init(args=['--ros-args', '-p', parameter])
     try:
         with pytest.raises(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The gait in physics: it goes where it is told to, upright, and survives pushes."""
+"""The gait in physics: it goes as commanded, upright, and survives pushes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ LEVEL = math.radians(5.0)
         Velocity(0.15, 0.0, -0.6),
     ],
 )
-def test_trot_goes_where_it_is_told_to(velocity: Velocity) -> None:
+def test_trot_goes_as_commanded(velocity: Velocity) -> None:
     """Ten seconds of trot, 35 periods, keep speed and direction, and the body upright."""
     rig = PhysicsRig()
     rig.mode('walk')
@@ -83,7 +83,7 @@ def test_other_builds_of_the_robot_walk_too(preset: str, arm: bool) -> None:
 @pytest.mark.parametrize(
     'velocity', [Velocity(0.05), Velocity(0.0, 0.04), Velocity(0.0, 0.0, 0.4)]
 )
-def test_other_gaits_go_where_they_are_told_to(gait: str, velocity: Velocity) -> None:
+def test_other_gaits_go_as_commanded(gait: str, velocity: Velocity) -> None:
     """Crawl and pace keep a fifth of the speed, at least, and do not fall."""
     rig = PhysicsRig()
     rig.mode(f'gait:{gait}')

@@ -100,7 +100,7 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
         )
 
 
-def test_keys_that_are_not_understood_are_told() -> None:
+def test_keys_that_are_not_understood_are_reported() -> None:
     """What looks like a rate or size is in the table with a warning."""
     report = str(check(FakeNetwork(metadata(decimation='4', latent_dim='8'))).report)
     assert 'not understood: decimation = 4, latent_dim = 8' in report
@@ -120,7 +120,7 @@ def test_shapes_and_answers_are_looked_at() -> None:
         assert reason in refusal.value.reason
 
 
-def test_what_the_file_leaves_open_is_told() -> None:
+def test_what_the_file_leaves_open_is_reported() -> None:
     """Without a phase period the vendor's is taken, with a warning in the table."""
     report = str(check(FakeNetwork(metadata(phase_period=None))).report)
     assert "0.4 s, the vendor's" in report
@@ -255,7 +255,7 @@ def test_targets_stay_within_soft_limits() -> None:
 
 
 def test_numbers_that_are_none_are_no_targets() -> None:
-    """A NaN answer, and a network that raises, are told and give no targets."""
+    """A NaN answer, and a network that raises, are reported and give no targets."""
     network = FakeNetwork(metadata())
     runner = check(network).runner
     network.action[0, 3] = np.nan
@@ -349,7 +349,7 @@ def test_gradients_are_derivatives() -> None:
 
 
 def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
-    """A missing file and one that is no ONNX are told apart."""
+    """A missing file and one that is no ONNX are distinguished."""
     options = PolicyOptions()
     with pytest.raises(PolicyError, match='No such file'):
         load_policy(tmp_path / 'missing.onnx', ROBOT, STAND, options, PERIOD)
@@ -365,7 +365,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path) -> None:
     'velocity', [Velocity(0.2), Velocity(-0.15), Velocity(0.0, 0.1), Velocity(0.0, 0.0, 1.0)]
 )
 def test_the_shipped_policy_walks(velocity: Velocity) -> None:
-    """The imitation of the gait goes where it is told to in physics, and does not fall."""
+    """The imitation of the gait goes as commanded in physics, and does not fall."""
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
     policy = load_policy(SHIPPED, MODEL, stand, PolicyOptions(), PERIOD)
     rig = PhysicsRig(policy=policy.runner)

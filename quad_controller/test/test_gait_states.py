@@ -173,14 +173,14 @@ def test_the_gait_is_tuned_while_nothing_walks() -> None:
         Rig().controller.retune(GaitParameters(nominal_height=0.5))
 
 
-def test_a_velocity_that_is_too_much_is_told_once() -> None:
+def test_a_velocity_that_is_too_much_is_reported_once() -> None:
     """The robot goes as fast as it can, in the same direction, and says how fast that is."""
     rig = standing()
     rig.ask('walk')
     rig.run(1.0, Velocity(0.8))
     assert rig.controller.status.velocity == Velocity(0.3)
-    told = [line for line in rig.log if 'is more than' in line]
-    assert told == [
+    logged = [line for line in rig.log if 'is more than' in line]
+    assert logged == [
         '0.80 0.00 m/s 0.00 rad/s is more than a trot can; clamped to 0.30 0.00 m/s 0.00 rad/s'
     ]
     rig.run(1.0, Velocity(0.2))
@@ -376,7 +376,7 @@ def test_one_odd_sample_after_a_pause_is_no_fault() -> None:
 
 
 @pytest.mark.parametrize('frozen', [(1,), tuple(range(12))])
-def test_a_frozen_sensor_is_told(frozen: tuple[int, ...]) -> None:
+def test_a_frozen_sensor_is_reported(frozen: tuple[int, ...]) -> None:
     """Joint states that come on time but never change are a warning, and only those are."""
     rig = standing()
     rig.ask('walk')
@@ -393,8 +393,8 @@ def test_a_frozen_sensor_is_told(frozen: tuple[int, ...]) -> None:
         )
         rig.log += [event.text for event in output.events]
         rig.positions = output.targets or rig.positions
-    told = [line for line in rig.log if 'do not follow their targets' in line]
-    assert len(told) == 1
+    logged = [line for line in rig.log if 'do not follow their targets' in line]
+    assert len(logged) == 1
     (warning,) = rig.controller.status.warnings
     assert ('fl_thigh_joint' if len(frozen) == 1 else 'all that move') in warning
     rig.run(2.5, FORWARD)
@@ -455,7 +455,7 @@ def test_a_silence_after_a_message_of_no_use_is_a_silence() -> None:
     assert 'fl_hip_joint' not in '; '.join(rig.controller.status.warnings)
 
 
-def test_a_tumbling_robot_is_told_from_a_tilted_one() -> None:
+def test_a_tumbling_robot_is_distinguished_from_a_tilted_one() -> None:
     """A turn rate that lasts is a fault of its own words: the tilt is not what is wrong."""
     rig = standing()
     rig.ask('walk')
@@ -601,7 +601,7 @@ def test_measurements_that_are_no_numbers_count_as_missing() -> None:
     assert rig.controller.status.refused == 40
 
 
-def test_other_joints_stay_where_they_are_or_go_where_told() -> None:
+def test_other_joints_stay_where_they_are_or_go_where_commanded() -> None:
     """An arm is left alone unless it was given a pose."""
     for arm_pose, expected in (((), 0.4), ((-1.0,), -1.0)):
         controller = Controller(ARM_ROBOT, GaitParameters(), StateParameters(), arm_pose=arm_pose)
@@ -642,7 +642,7 @@ def test_a_policy_that_fails_is_replaced_by_the_gait(walks: bool) -> None:
 
 
 def test_a_dry_run_watches_the_policy_only() -> None:
-    """The policy's targets are told beside those of the gait, and its mode is refused."""
+    """The policy's targets are published beside those of the gait, and its mode is refused."""
     policy = StillPolicy(STAND)
     controller = Controller(
         ROBOT, GaitParameters(), StateParameters(), policy=policy, dry_run=True
@@ -657,7 +657,7 @@ def test_a_dry_run_watches_the_policy_only() -> None:
     ('velocities', 'turning', 'reason'),
     [(None, UPRIGHT.angular_velocity, 'velocities of the joints'), ((0.0,) * 12, None, '/imu')],
 )
-def test_a_policy_is_told_nothing_that_is_not_measured(
+def test_a_policy_is_given_nothing_that_is_not_measured(
     velocities: tuple[float, ...] | None, turning: Vector | None, reason: str
 ) -> None:
     """Without joint velocities or turning its mode is refused; the gait walks without them."""
@@ -682,11 +682,11 @@ def test_an_attitude_whose_signs_nobody_knows_is_not_acted_upon() -> None:
         rig.ask('walk')
         rig.run(2.0, FORWARD)
         ends.append(rig.positions)
-        told = [
+        warnings = [
             text for text in rig.controller.status.warnings if 'orientation_covariance' in text
         ]
         uncertain = imu is not None and imu.is_uncertain
-        assert bool(told) == uncertain
+        assert bool(warnings) == uncertain
         assert rig.controller.set_mode('policy').accepted is not uncertain
     level, unchecked, without = ends
     assert unchecked == without

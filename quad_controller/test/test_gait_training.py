@@ -50,7 +50,7 @@ class Lesson:
 
 @pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity(yaw=0.6)])
 def test_the_teacher_walks(velocity: Velocity) -> None:
-    """In physics, as fast as it is told to, and upright: or its imitation would not."""
+    """In physics, as fast as commanded, and upright: or its imitation would not."""
     rig = PhysicsRig(policy=Lesson(GaitTeacher(MODEL, GaitParameters())))
     rig.mode('policy')
     rig.run(1.0, velocity)

@@ -108,7 +108,7 @@ def test_from_every_fault_there_is_a_way_down(failure: Failure, asked: str) -> N
 def test_a_robot_on_its_way_down_stays_there_until_its_fault_is_cleared(
     imu: ImuSample | None,
 ) -> None:
-    """Lying, the fault is still latched and told; it is cleared where its reason is gone."""
+    """Lying, the fault is still latched and reported; it is cleared where its reason is gone."""
     rig, _ = on_its_feet('walk')
     rig.imu = imu
     rig.run(1.5, FORWARD)

@@ -47,7 +47,7 @@ class Rig(ABC):
     Attributes:
         node: Process of the node.
         client: A node of the test.
-        heard: Messages by topic.
+        received: Messages by topic.
     """
 
     def __init__(self, isolation: Isolation, port: Path, *arguments: str) -> None:
@@ -56,7 +56,7 @@ class Rig(ABC):
         try:
             self._add_robot(self._stack, port)
             self.client = self._stack.enter_context(RosClient(isolation.domain_id))
-            self.heard: dict[str, list[Any]] = {
+            self.received: dict[str, list[Any]] = {
                 topic: self.client.listen(kind, topic, qos_profile_sensor_data)
                 for topic, kind in TOPICS.items()
             }
@@ -91,18 +91,18 @@ class Rig(ABC):
         assert self.node.stop() == 0
         self.node = self.start(*arguments)
         self.node.wait_for('running: reports arrive', TIMEOUT)
-        self.heard['/joint_states'].clear()
+        self.received['/joint_states'].clear()
         self.wait_until_ready()
 
     def wait_until_ready(self) -> None:
-        """Wait until the node reports and hears commands."""
-        self.hear('/joint_states')
+        """Wait until the node reports and receives commands."""
+        self.receive('/joint_states')
         matched = self._commands.get_subscription_count
         self.client.spin_until(lambda: matched() > 0, TIMEOUT, 'subscriber of commands')
 
-    def hear(self, topic: str, count: int = 1) -> Any:
+    def receive(self, topic: str, count: int = 1) -> Any:
         """Wait for new messages of a topic; return the last."""
-        messages = self.heard[topic]
+        messages = self.received[topic]
         until = len(messages) + count
         self.client.spin_until(lambda: len(messages) >= until, TIMEOUT, f'{topic} {count} times')
         return messages[-1]
@@ -141,7 +141,7 @@ class Rig(ABC):
 
     def status(self, name: str) -> DiagnosticStatus:
         """Return the newest diagnostic of a name."""
-        array = self.heard['/diagnostics'][-1] if self.heard['/diagnostics'] else None
+        array = self.received['/diagnostics'][-1] if self.received['/diagnostics'] else None
         found = [s for s in array.status if s.name.endswith(name)] if array else []
         return found[0] if found else DiagnosticStatus()
 
@@ -156,11 +156,11 @@ class Rig(ABC):
 
     def watch_steps(self) -> Callable[[], list[float]]:
         """Look at the largest step of a target in every diagnostic from now on [rad]."""
-        first = len(self.heard['/diagnostics'])
+        first = len(self.received['/diagnostics'])
 
         def steps() -> list[float]:
-            self.hear('/diagnostics', 2)
-            statuses = (s for array in self.heard['/diagnostics'][first:] for s in array.status)
+            self.receive('/diagnostics', 2)
+            statuses = (s for array in self.received['/diagnostics'][first:] for s in array.status)
             pairs = (pair for status in statuses for pair in status.values)
             return [float(pair.value) for pair in pairs if pair.key == 'largest_step']
 
@@ -198,12 +198,12 @@ class NodeRig(Rig):
         self.peer = stack.enter_context(PtyPeer(port, self._protocol))
 
     def begin_anew(self) -> None:
-        """Put the robot to zero, without faults, and forget what was heard."""
+        """Put the robot to zero, without faults, and forget what was received."""
         self.peer.behaviour = Behaviour()
-        self.hear('/joint_states', 3)  # by then the last command of another test has arrived
+        self.receive('/joint_states', 3)  # by then the last command of another test has arrived
         self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
         self.peer.commands.clear()
-        for messages in self.heard.values():
+        for messages in self.received.values():
             messages.clear()
         self.wait_until_ready()
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A robot without physics on a pseudo-terminal: servos are where they were told to be."""
+"""A robot without physics on a pseudo-terminal: servos are at their targets."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Behaviour:
     """What the robot does; a test changes it while it runs.
 
     Attributes:
-        silent: It hears, and says nothing.
+        silent: It receives, and sends nothing.
         corrupt: Share of the bytes sent that are damaged.
         attitude: Roll, pitch, yaw [deg].
         acceleration: Specific force [m/s²].

@@ -49,7 +49,7 @@ def test_sign_and_offset_are_found(sign: int, offset: float, turn: float) -> Non
     assert found.position(true.angle(0.7)) == pytest.approx(0.7)
 
 
-def test_a_turn_that_tells_nothing_is_refused() -> None:
+def test_a_turn_that_shows_nothing_is_refused() -> None:
     """A hand that shakes is no direction."""
     with pytest.raises(CommandError, match=r'motor 11 turned by 3.0 degrees'):
         with_direction(KNEE, 10.0, 13.0)

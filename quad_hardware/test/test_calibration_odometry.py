@@ -34,7 +34,7 @@ pytestmark = pytest.mark.scenario
 
 
 class WalkingRobot(Node):
-    """Goes where it is told; its odometry counts what its scale says."""
+    """Goes as commanded; its odometry counts what its scale says."""
 
     def __init__(self, context: Context) -> None:
         """Stand at an angle, for the way counts in the robot's own heading."""
@@ -43,10 +43,10 @@ class WalkingRobot(Node):
         self.velocity = Twist()
         self.way = 0.0
         self._odom = self.create_publisher(Odometry, 'odom', 10)
-        self.create_subscription(Twist, 'cmd_vel', self._obey, 1)
+        self.create_subscription(Twist, 'cmd_vel', self._move, 1)
         self.create_timer(PERIOD, self._step)
 
-    def _obey(self, message: Twist) -> None:
+    def _move(self, message: Twist) -> None:
         self.velocity = message
 
     def _step(self) -> None:
@@ -124,7 +124,7 @@ def test_a_way_that_cannot_be_walked_is_refused(
 def test_who_breaks_off_has_it_stopped(
     walking_robot: WalkingRobot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C on the way: the robot is told to stand, and nothing is written."""
+    """Ctrl-C on the way: the robot is commanded to stand, and nothing is written."""
     place = odometry.Walker.place
 
     def break_off(walker: odometry.Walker) -> Place:

@@ -106,14 +106,14 @@ def test_a_tree_with_a_loop_or_a_gap_reaches_nothing() -> None:
 def test_the_environment(
     environment: dict[str, str], subject: str, severity: Severity, words: str
 ) -> None:
-    """Unsourced shells, domains that are none, and domains that nobody else hears."""
+    """Unsourced shells, domains that are none, and domains that nobody else is in."""
     finding = found(check_environment(environment), subject)
     assert finding.severity is severity
     assert words in str(finding)
 
 
-def test_scarce_memory_is_told() -> None:
-    """Before the kernel tells it."""
+def test_scarce_memory_is_reported() -> None:
+    """Before the kernel runs out of it."""
     (little,) = check_memory('MemTotal: 1700000 kB\nMemAvailable: 100000 kB\n')
     (much,) = check_memory('MemTotal: 1700000 kB\nMemAvailable: 900000 kB\n')
     assert (little.severity, much.severity) == (Severity.WARNING, Severity.GOOD)

@@ -179,7 +179,7 @@ def test_a_damaged_clock_ages_no_other_report(error: float) -> None:
 
 
 def test_reports_that_were_held_up_keep_their_times() -> None:
-    """All of a pause come at once; the clock of the robot still tells when they were made."""
+    """All of a pause come at once; the clock of the robot still shows when they were made."""
     plausibility, clock = Plausibility(LEG_MOTORS), SampleClock()
     for tick in range(100):
         made = tick * 0.02
@@ -190,7 +190,7 @@ def test_reports_that_were_held_up_keep_their_times() -> None:
 
 
 def test_one_damaged_report_does_not_empty_the_battery() -> None:
-    """Nor a charge that cannot be; a battery that is low is told within half a second."""
+    """Nor a charge that cannot be; a battery that is low is reported within half a second."""
     battery = BatteryFilter()
     battery.take(STATE)
     assert battery.state == Battery()

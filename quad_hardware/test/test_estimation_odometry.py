@@ -142,7 +142,7 @@ def test_a_board_that_begins_anew_turns_nobody(clock: bool) -> None:
 
 
 def test_a_robot_that_was_turned_while_its_cable_was_out_is_turned() -> None:
-    """The clock of the board tells that its yaw still counts from the same heading."""
+    """The clock of the board shows that its yaw still counts from the same heading."""
     found = yaws([(0.0, 10.0, 0.0), (0.02, 10.02, 0.0), (3.0, 13.0, 90.0), (3.02, 13.02, 90.0)])
     assert np.degrees(found) == pytest.approx([0.0, 0.0, 90.0, 90.0])
 

@@ -231,17 +231,17 @@ def test_the_level_of_the_link(status: LinkStatus, level: bytes) -> None:
     assert LinkDiagnostic().describe('hardware_node', '/dev/x', status).level == level
 
 
-def test_damage_is_told_as_long_as_it_lasts() -> None:
+def test_damage_is_reported_as_long_as_it_lasts() -> None:
     """A cable that was put right is no warning, and one that breaks late is one at once."""
     link = LinkDiagnostic()
     levels = []
     for frames, damaged in [(5000, 0), (5050, 20), (5100, 20), (10, 0), (60, 30)]:
         counters = ParserCounters(frames=frames, bad_checksum=damaged)
-        told = link.describe('hardware_node', '/dev/x', link_status(parser=counters))
-        levels.append(told.level)
+        status = link.describe('hardware_node', '/dev/x', link_status(parser=counters))
+        levels.append(status.level)
     ok, warn = DiagnosticStatus.OK, DiagnosticStatus.WARN
     assert levels == [ok, warn, ok, ok, warn]
-    assert '30 damaged and 50 good frames lately' in told.message
+    assert '30 damaged and 50 good frames lately' in status.message
 
 
 @pytest.mark.parametrize(

@@ -44,22 +44,22 @@ def rig(shared_rig: NodeRig) -> NodeRig:
 
 
 def test_the_topics_of_the_article(rig: NodeRig) -> None:
-    """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos obey."""
+    """Joints in radians in URDF order, IMU, odometry, battery, transforms; servos follow."""
     rig.peer.behaviour.attitude = (0.0, 0.0, 90.0)
     rig.stream(POSE, 1.0)
-    joints = rig.hear('/joint_states', 3)
+    joints = rig.receive('/joint_states', 3)
     assert list(joints.name) == [j.name for j in movable_joints(robot_urdf('lite'))]
     assert list(joints.position) == pytest.approx(POSE, abs=0.01)
     assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(
         [math.degrees(p) for p in POSE], abs=0.5
     )
-    imu = rig.hear('/imu')
+    imu = rig.receive('/imu')
     assert imu.header.frame_id == 'imu_link'
     assert (imu.orientation.z, imu.orientation.w) == pytest.approx((0.5**0.5, 0.5**0.5))
     assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.01)
-    assert rig.hear('/odom').child_frame_id == 'base_link'
-    assert rig.hear('/battery_state').percentage == pytest.approx(0.8)
-    pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.hear('/tf').transforms]
+    assert rig.receive('/odom').child_frame_id == 'base_link'
+    assert rig.receive('/battery_state').percentage == pytest.approx(0.8)
+    pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.receive('/tf').transforms]
     assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
     published = rig.client.node.get_publishers_info_by_topic('/joint_states')
     assert published[0].qos_profile.reliability == ReliabilityPolicy.RELIABLE
@@ -67,7 +67,7 @@ def test_the_topics_of_the_article(rig: NodeRig) -> None:
     assert rig.largest_step() <= LARGEST_STEP + 0.01
 
 
-def test_wrong_commands_move_nothing_and_are_told(rig: NodeRig) -> None:
+def test_wrong_commands_move_nothing_and_are_reported(rig: NodeRig) -> None:
     """NaN, infinity, wrong lengths: refused with the reason, and not a byte is sent."""
     for wrong, reason in (
         ([math.nan, *HOME[1:]], 'fl_hip_joint'),
@@ -83,35 +83,35 @@ def test_wrong_commands_move_nothing_and_are_told(rig: NodeRig) -> None:
     rig.client.spin_until(lambda: bool(rig.peer.commands), TIMEOUT, 'right command')
 
 
-def test_with_a_dead_imu_the_joints_are_reported_and_obey(rig: NodeRig) -> None:
+def test_with_a_dead_imu_the_joints_are_reported_and_follow(rig: NodeRig) -> None:
     """No /imu and no /odom, an error that says so, and a command reaches the servos."""
     rig.peer.behaviour.attitude = (math.nan,) * 3
     rig.wait_for_status('robot', DiagnosticStatus.ERROR, 'imu')
-    counts = len(rig.heard['/imu']), len(rig.heard['/odom'])
+    counts = len(rig.received['/imu']), len(rig.received['/odom'])
     rig.stream(POSE, 1.0)
-    assert list(rig.hear('/joint_states', 3).position) == pytest.approx(POSE, abs=0.01)
-    assert (len(rig.heard['/imu']), len(rig.heard['/odom'])) == counts
+    assert list(rig.receive('/joint_states', 3).position) == pytest.approx(POSE, abs=0.01)
+    assert (len(rig.received['/imu']), len(rig.received['/odom'])) == counts
     rig.peer.behaviour.attitude = (0.0, 0.0, 0.0)
-    rig.hear('/imu')
+    rig.receive('/imu')
 
 
-def test_beyond_limits_is_taken_to_them_and_told(rig: NodeRig) -> None:
+def test_beyond_limits_is_taken_to_them_and_reported(rig: NodeRig) -> None:
     """The servo ends at the limit of the URDF."""
     rig.stream([2.0, 0.0, 0.0] * 4, 1.0)
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'fl_hip_joint')
     assert rig.peer.angles[13] == pytest.approx(math.degrees(0.5236), abs=0.02)
 
 
-def test_a_servo_beyond_its_limits_is_left_there_and_told(rig: NodeRig) -> None:
+def test_a_servo_beyond_its_limits_is_left_there_and_reported(rig: NodeRig) -> None:
     """A stream that asks it to stay sends exactly where it is."""
     rig.peer.angles[13] = 40.0
-    rig.hear('/joint_states', 30)  # by then the stream of another test has ended
+    rig.receive('/joint_states', 30)  # by then the stream of another test has ended
     found = [math.radians(40.0), *HOME[1:]]
     rig.peer.commands.clear()
     rig.stream(found, 0.3)
     assert {command[13] for command in rig.peer.commands} == {40.0}
-    told = rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'found beyond limits')
-    assert 'fl_hip_joint' in told.message
+    status = rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'found beyond limits')
+    assert 'fl_hip_joint' in status.message
     rig.stream(HOME, 0.8)
     assert rig.peer.angles[13] == pytest.approx(0.0, abs=0.1)
     assert rig.largest_step() <= LARGEST_STEP + 0.01
@@ -150,10 +150,10 @@ def test_no_command_goes_out_while_no_report_can_be(rig: NodeRig) -> None:
 
 @pytest.mark.parametrize('garbage', [250.0, math.nan])
 def test_an_arm_that_is_not_there_disturbs_nothing(rig: NodeRig, garbage: float) -> None:
-    """Whatever its slots report, the legs are published, and obey."""
+    """Whatever its slots report, the legs are published, and follow."""
     rig.peer.angles[54] = garbage
     rig.stream(POSE, 0.8)
-    assert list(rig.hear('/joint_states', 10).position) == pytest.approx(POSE, abs=0.01)
+    assert list(rig.receive('/joint_states', 10).position) == pytest.approx(POSE, abs=0.01)
     rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
 
 
@@ -168,9 +168,9 @@ def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -
         'lying pose',
     )
     assert rig.largest_step() <= LARGEST_STEP + 0.01
-    rig.hear('/joint_states', 10)
+    rig.receive('/joint_states', 10)
     count = len(rig.peer.commands)
-    rig.hear('/joint_states', 10)
+    rig.receive('/joint_states', 10)
     assert len(rig.peer.commands) == count
     rig.stream(list(pose_positions(Pose.LIE).values()), 0.1)
     rig.wait_for_status('joint commands', DiagnosticStatus.OK, 'received')
@@ -179,17 +179,17 @@ def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -
 def test_commands_that_end_at_rest_leave_the_posture(rig: NodeRig) -> None:
     """Nothing moves unasked: not a byte is sent after the last command."""
     rig.stream(POSE, 1.5)
-    rig.hear('/joint_states', 5)
+    rig.receive('/joint_states', 5)
     count = len(rig.peer.commands)
-    rig.hear('/joint_states', 50)
+    rig.receive('/joint_states', 50)
     assert len(rig.peer.commands) == count
 
 
 def test_a_leg_that_is_held_in_the_air_comes_down_with_the_end_of_commands(rig: NodeRig) -> None:
     """As when a controller in fault held there, and was ended."""
     rig.stream([0.0, 0.9, -0.3, *POSE[3:]], 1.5)
-    told = rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
-    assert 'in the air' in told.message
+    status = rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
+    assert 'in the air' in status.message
     lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
     rig.client.spin_until(
         lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
@@ -229,12 +229,12 @@ def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:
 def test_damaged_bytes_give_no_wild_reports(rig: NodeRig) -> None:
     """1 % of the bytes wrong: what is published is right or small, and the line is blamed."""
     rig.peer.behaviour.corrupt = 0.01
-    count = len(rig.heard['/joint_states'])
+    count = len(rig.received['/joint_states'])
     rig.wait_for_status('serial link', DiagnosticStatus.WARN, 'good frames lately')
-    later = rig.heard['/joint_states'][count:]
+    later = rig.received['/joint_states'][count:]
     assert all(abs(p) < 1.1 for message in later for p in message.position)
     rig.peer.behaviour.corrupt = 0.0
-    rig.hear('/joint_states', 5)
+    rig.receive('/joint_states', 5)
 
 
 def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
@@ -246,7 +246,7 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'without torque')
     assert rig.peer.commands == []
     rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-    rig.hear('/joint_states', 5)
+    rig.receive('/joint_states', 5)
     assert rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=True)).success
     rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
@@ -256,18 +256,18 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
 def test_torque_comes_back_where_the_arm_is(
     isolation: Isolation, tmp_path: Path, protocol: Protocol
 ) -> None:
-    """Every servo that is reported is told its place before it wakes; an arm would snap back."""
+    """Each reported servo gets its own position as target before it wakes; an arm would snap."""
     torque = '/hardware_node/torque'
     reported = set(MOTOR_ORDER if protocol is V2 else BULK_READ_ORDER)
     with NodeRig(isolation, tmp_path, '-p', 'arm:=true', protocol=protocol) as rig:
         assert rig.client.call(SetBool, torque, SetBool.Request(data=False)).success
         rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
         rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
-        rig.hear('/joint_states', 5)
+        rig.receive('/joint_states', 5)
         assert rig.client.call(SetBool, torque, SetBool.Request(data=True)).success
         rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
-        told = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}
-    assert told == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
+        targets = {motor: angle for angles in rig.peer.commands for motor, angle in angles.items()}
+    assert targets == dict.fromkeys(reported, pytest.approx(20.0, abs=0.6))
 
 
 def test_a_stop_is_clean(rig: NodeRig) -> None:

@@ -73,7 +73,7 @@ def test_a_robot_with_arm_takes_legs_or_all() -> None:
 
 
 def test_a_stream_begins_slowly_where_the_robot_is() -> None:
-    """The first step is small, later ones are large, and it is told that they are slowed."""
+    """The first step is small, later ones are large, and it is reported that they are slowed."""
     limiter = CommandLimiter(JOINTS, LimiterSettings(speed=10.0, start_speed=1.0, start_time=0.5))
     wanted = [*HOME[:1], 1.0, *HOME[2:]]
     first = limiter.step(wanted, HOME, 0.0)
@@ -107,7 +107,7 @@ def test_after_a_pause_the_stream_begins_anew() -> None:
     assert limiter.step(HOME, moved, 1.02).targets[1] == pytest.approx(0.3 - 0.04)
 
 
-def test_limits_are_told() -> None:
+def test_limits_are_reported() -> None:
     """Beyond a limit, the target is the limit, and the joint is named."""
     limiter = CommandLimiter(JOINTS)
     command = limiter.step([9.0, *HOME[1:]], [0.52, *HOME[1:]], 0.0)
@@ -125,7 +125,7 @@ def test_a_leg_that_nobody_has_seen_is_not_moved() -> None:
     assert limiter.step([0.5] * 12, HOME, 0.04).targets == pytest.approx([0.04] * 12)
 
 
-def test_an_arm_servo_that_is_not_reported_takes_its_first_target_and_that_is_told() -> None:
+def test_an_arm_servo_that_is_not_reported_takes_its_first_target_and_that_is_reported() -> None:
     """There is nothing to begin from; then it is where it was sent, even after a pause."""
     limiter = CommandLimiter(ARM_JOINTS)
     measured = [*HOME, None, 0.0, 0.0, 0.0]
@@ -140,7 +140,7 @@ def test_an_arm_servo_that_is_not_reported_takes_its_first_target_and_that_is_to
 
 
 def test_a_servo_found_beyond_its_limits_is_not_moved_by_starting() -> None:
-    """Asked to stay, it stays, for as long as it is asked; and it is told."""
+    """Asked to stay, it stays, for as long as it is asked; and it is reported."""
     limiter = CommandLimiter(JOINTS)
     found = [0.9, *HOME[1:]]
     for tick in range(50):
@@ -150,7 +150,7 @@ def test_a_servo_found_beyond_its_limits_is_not_moved_by_starting() -> None:
 
 
 def test_from_beyond_its_limits_a_servo_only_comes_back() -> None:
-    """Farther is refused and told, nearer is slow, and what was gained is not given away."""
+    """Farther is refused and reported, nearer is slow, and what was gained is not given away."""
     limiter = CommandLimiter(JOINTS)
     found = [0.9, *HOME[1:]]
     farther = limiter.step([1.2, *HOME[1:]], found, 0.0)

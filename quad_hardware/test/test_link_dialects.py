@@ -202,7 +202,7 @@ def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> No
 def test_an_unseen_servo_has_arrived_only_when_it_has(
     orders: list[tuple[float, float]], place: float
 ) -> None:
-    """From wherever it begins, whatever it was told: what is called arrived is there."""
+    """From wherever it begins, whatever its targets: what is called arrived is there."""
     servo = UnseenServo(ANGLE_SPANS[Model.LITE][54], 0.0)
     now = 0.0
     for target, time in orders:

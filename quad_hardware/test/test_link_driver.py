@@ -252,7 +252,9 @@ def test_a_rider_is_not_taken_for_a_dog(tmp_path: Path) -> None:
         assert peer.commands == []
 
 
-def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_failure_is_reported_and_got_over(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     """What goes wrong with a report ends the conversation, not the link: it begins anew."""
     failures = [ZeroDivisionError(), KeyError(54)]
     changes: list[tuple[LinkState, str]] = []
@@ -274,8 +276,8 @@ def test_a_failure_is_told_and_got_over(tmp_path: Path, caplog: pytest.LogCaptur
         wait_for(lambda: bool(peer.commands), 'command')
         driver.stop()
         SerialPort(str(peer.link), 115200).close()
-    told = [detail for state, detail in changes if state is LinkState.FAILED]
-    assert ['ZeroDivisionError()' in told[0], 'KeyError(54)' in told[1]] == [True, True]
+    details = [detail for state, detail in changes if state is LinkState.FAILED]
+    assert ['ZeroDivisionError()' in details[0], 'KeyError(54)' in details[1]] == [True, True]
     assert 'Traceback' in caplog.text
 
 
@@ -301,12 +303,12 @@ def test_an_order_does_not_outlive_its_connection(tmp_path: Path) -> None:
         assert peer.commands == []
 
 
-def test_a_failure_that_cannot_be_told_ends_nothing(tmp_path: Path) -> None:
-    """Nor when the callback that hears of it fails as well."""
+def test_a_failure_that_cannot_be_reported_ends_nothing(tmp_path: Path) -> None:
+    """Nor when the callback that reports it fails as well."""
     states: list[Report] = []
     failing = [LinkState.WAITING, LinkState.FAILED]
 
-    def hear(state: LinkState, _detail: str) -> None:
+    def report(state: LinkState, _detail: str) -> None:
         if state in failing:
             failing.remove(state)
             raise RuntimeError
@@ -315,7 +317,7 @@ def test_a_failure_that_cannot_be_told_ends_nothing(tmp_path: Path) -> None:
         driver = Driver(
             LinkOptions(str(peer.link)),
             lambda state: states.append(state) or '',  # type: ignore[func-returns-value]
-            hear,
+            report,
         )
         driver.start()
         wait_for(lambda: bool(states), 'report')

@@ -77,7 +77,7 @@ def test_the_last_accepted_order_arrives() -> None:
     assert taken == sorted(taken)
 
 
-def test_a_change_of_torque_that_is_not_sent_is_told(tmp_path: Path) -> None:
+def test_a_change_of_torque_that_is_not_sent_is_reported(tmp_path: Path) -> None:
     """It was accepted, and then the conversation broke off: the change of the link says so."""
     changes: list[tuple[LinkState, str]] = []
     accepted: list[bool] = []
@@ -108,7 +108,7 @@ def test_a_change_of_torque_that_is_not_sent_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures('hurried')
-def test_a_lost_robot_may_be_told_in_the_midst_of_a_command() -> None:
+def test_a_lost_robot_may_be_reported_in_the_midst_of_a_command() -> None:
     """The driver's thread ends the stream while the node's takes a command of it."""
     joints = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
     limiter, done = CommandLimiter(joints), threading.Event()

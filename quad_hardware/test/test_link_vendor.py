@@ -38,7 +38,7 @@ def peer(tmp_path: Path) -> Iterator[PtyPeer]:
 def test_the_library_does_the_talking(
     peer: PtyPeer, monkeypatch: pytest.MonkeyPatch, *, acceleration: bool
 ) -> None:
-    """States by its parser and slots, angles by its method: what the robot hears is right."""
+    """States by its parser and slots, angles by its method: what the robot receives is right."""
     if not acceleration:  # which is no public name
         whole = feedback.device_state
         names = ('battery', 'roll', 'pitch', 'yaw', 'joint_pos_deg', 'joint_vel_deg_s')

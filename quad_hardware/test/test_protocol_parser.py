@@ -115,7 +115,7 @@ def test_a_flipped_byte_costs_one_frame_only(position: int, flip: int) -> None:
 
 
 def test_the_other_sides_frames_are_no_frames() -> None:
-    """A host that hears its own echo does not take it for an answer."""
+    """A host that receives its own echo does not take it for an answer."""
     parser = StreamParser(V1, ROBOT_KINDS)
     assert parser.feed(Frame(Kind.READ, 1, b'\x01').encode(V1)) == []
     assert parser.counters.bad_kind == 1

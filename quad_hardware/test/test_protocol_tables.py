@@ -187,7 +187,7 @@ def test_a_long_write_runs_through_the_registers() -> None:
     ],
 )
 def test_a_firmware_names_the_model(firmware: str, model: Model | None) -> None:
-    """The first letters tell; a rider is no quadruped."""
+    """The first letters decide; a rider is no quadruped."""
     assert model_of_firmware(firmware) is model
 
 

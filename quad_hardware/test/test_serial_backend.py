@@ -86,7 +86,7 @@ def test_a_program_that_stops_stepping_leaves_no_leg_in_the_air(peer: PtyPeer) -
             pytest.fail(f'it is not laid down: {peer.angles}')
 
 
-def test_a_robot_that_is_lost_is_told(peer: PtyPeer) -> None:
+def test_a_robot_that_is_lost_is_reported(peer: PtyPeer) -> None:
     """By the step that waits for its report."""
 
     def step_for_ever() -> None:

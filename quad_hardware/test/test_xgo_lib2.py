@@ -112,7 +112,7 @@ def test_a_wrong_motor_or_angle_is_refused(v2_peer: PtyPeer) -> None:
 
 
 def test_a_port_has_one_user(v2_peer: PtyPeer) -> None:
-    """A second program is told that the port is taken, and does not steal bytes."""
+    """A second program gets an error, for the port is taken, and steals no bytes."""
     with XgoDog(str(v2_peer.link)), pytest.raises(XgoError, match='another program has it open'):
         XgoDog(str(v2_peer.link))
 

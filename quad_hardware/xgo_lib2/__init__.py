@@ -3,7 +3,7 @@
 """Stands in for the vendor's library of this name, and steps aside where that is installed.
 
 Modules as in the vendor's: ``client`` (XgoDog), ``feedback`` (SendStateParser), ``protocol``,
-``registry``, ``errors``. ``xgo_lib2.__file__`` tells which of the two was imported.
+``registry``, ``errors``. ``xgo_lib2.__file__`` shows which of the two was imported.
 """
 
 from ._vendor import take_over as _take_over

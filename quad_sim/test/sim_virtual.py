@@ -21,7 +21,7 @@ class VirtualRobot:
         self.line.set_baud(protocol.baud)
         self.parser = StreamParser(protocol, ROBOT_KINDS)
         self.now = 0.0
-        self.heard = b''
+        self.received = b''
 
     def send(self, frame: Frame) -> None:
         """Begin to send a frame."""
@@ -33,7 +33,7 @@ class VirtualRobot:
         for _ in range(round(duration / TICK)):
             self.now += TICK
             if data := self.line.advance(self.now):
-                self.heard += data
+                self.received += data
                 frames += self.parser.feed(data)
         return frames
 

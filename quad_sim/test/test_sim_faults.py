@@ -76,20 +76,20 @@ def test_a_flip_inverts_one_bit() -> None:
 def test_damage_on_the_line_costs_frames_and_repeats_itself() -> None:
     """One percent of bytes gone: some states are lost, none is wrong, twice the same."""
 
-    def heard() -> tuple[bytes, int]:
+    def exchange() -> tuple[bytes, int]:
         robot = VirtualRobot(*KINEMATIC, '--fault', 'drop,rate=0.01', '--seed', '3')
         for _ in range(5):  # the frame that asks for states may be hit as well
             robot.send(ON)
             robot.run(0.01)
-        return robot.heard, len(robot.run(2.0))
+        return robot.received, len(robot.run(2.0))
 
-    first, second = heard(), heard()
+    first, second = exchange(), exchange()
     assert first == second
     assert 2 <= first[1] < 60
 
 
 def test_silence_begins_and_ends() -> None:
-    """The robot hears and moves, and says nothing, from one time to another."""
+    """The robot receives and moves, and sends nothing, from one time to another."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'silence,at=1,for=0.5')
     robot.send(ON)
     assert len(robot.run(1.0)) >= 48
@@ -147,7 +147,7 @@ def test_a_brown_out_forgets_everything_and_lets_go() -> None:
     assert robot.simulation.plant.base_pose.position[2] < height - 0.015
 
 
-def test_an_empty_battery_is_told() -> None:
+def test_an_empty_battery_is_reported() -> None:
     """The charge jumps, and the fault bit of the board says so."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'battery,at=0.5,level=7')
     robot.send(ON)
@@ -157,8 +157,8 @@ def test_an_empty_battery_is_told() -> None:
     assert after.faults & Fault.LOW_BATTERY
 
 
-def test_a_dead_imu_says_no_number_and_the_servos_obey() -> None:
-    """The fault bit says so, angles go on, and a servo goes where it is told."""
+def test_a_dead_imu_says_no_number_and_the_servos_follow() -> None:
+    """The fault bit says so, angles go on, and a servo goes to its target."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'imu,at=0.5,for=1')
     robot.send(ON)
     before, *_, dead = (decode_feedback(frame.payload) for frame in robot.run(1.0))
@@ -203,13 +203,13 @@ def test_faults_change_nothing_when_they_are_over() -> None:
         robot.run(0.3)
         robot.send(ON)
         robot.run(0.5)
-    assert one.heard == other.heard
+    assert one.received == other.received
 
 
 def test_the_same_bytes_at_the_same_times_have_the_same_answer() -> None:
     """With noise, physics and damage: two robots with one seed say the same, bit for bit."""
 
-    def life(seed: str) -> bytes:
+    def run(seed: str) -> bytes:
         robot = VirtualRobot('--seed', seed, '--fault', 'flip,rate=0.001', '--start', 'stand')
         robot.send(ON)
         robot.run(0.1)
@@ -218,10 +218,10 @@ def test_the_same_bytes_at_the_same_times_have_the_same_answer() -> None:
         for _ in range(5):
             robot.send(Frame(Kind.WRITE, Code.SERVO, move))
             robot.run(0.1)
-        return robot.heard
+        return robot.received
 
-    assert life('1') == life('1')
-    assert life('1') != life('2')
+    assert run('1') == run('1')
+    assert run('1') != run('2')
 
 
 @pytest.mark.parametrize(

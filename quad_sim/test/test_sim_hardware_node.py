@@ -35,7 +35,7 @@ class XgoRig(Rig):
         process.wait_for(str(port))
 
     def reporting(self) -> bool:
-        """Tell whether the newest diagnostic has the link running."""
+        """Return whether the newest diagnostic has the link running."""
         return 'reports arrive' in self.status('serial link').message or (
             'damaged' in self.status('serial link').message
         )
@@ -52,26 +52,26 @@ def shared_rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[XgoRig]:
 def rig(shared_rig: XgoRig) -> XgoRig:
     """The robot, standing."""
     shared_rig.stream(STAND, 1.2)
-    shared_rig.heard['/joint_states'].clear()
+    shared_rig.received['/joint_states'].clear()
     return shared_rig
 
 
 def test_it_stands_up(rig: XgoRig) -> None:
     """Joints where they were sent, the height that physics has, the footprint on the ground."""
     rig.stream(STAND, 0.5)
-    joints = rig.hear('/joint_states', 2)
+    joints = rig.receive('/joint_states', 2)
     assert list(joints.position) == pytest.approx(STAND, abs=0.1)
-    odom = rig.hear('/odom')
-    truth = rig.hear('/fake_xgo/ground_truth')
+    odom = rig.receive('/odom')
+    truth = rig.receive('/fake_xgo/ground_truth')
     height = truth.pose.pose.position.z
     assert height > 0.07
     assert odom.pose.pose.position.z == pytest.approx(height, abs=0.01)
-    to_base, to_footprint = rig.hear('/tf').transforms
+    to_base, to_footprint = rig.receive('/tf').transforms
     below = to_footprint.transform.translation
     assert math.hypot(below.x, below.y, below.z) == pytest.approx(
         to_base.transform.translation.z, abs=1e-6
     )
-    assert rig.hear('/imu').linear_acceleration.z == pytest.approx(9.8, abs=0.6)
+    assert rig.receive('/imu').linear_acceleration.z == pytest.approx(9.8, abs=0.6)
 
 
 @pytest.mark.parametrize(('fault', 'duration'), [('unplug', 2.0), ('flip', 1.0), ('silence', 0.8)])
@@ -87,9 +87,9 @@ def test_a_fault_ends_in_standing_and_without_a_jump(
     rig.stream(STAND, duration + 0.5)
     rig.client.spin_until(rig.reporting, TIMEOUT, 'reports again')
     rig.stream(STAND, 1.0)
-    assert list(rig.hear('/joint_states').position) == pytest.approx(STAND, abs=0.1)
+    assert list(rig.receive('/joint_states').position) == pytest.approx(STAND, abs=0.1)
     assert max(steps()) <= LARGEST_STEP
-    for message in rig.heard['/joint_states']:
+    for message in rig.received['/joint_states']:
         assert all(abs(position) < math.pi / 2 + 0.1 for position in message.position)
 
 
@@ -97,6 +97,6 @@ def test_the_old_protocol_does_as_well(rig: XgoRig) -> None:
     """The same robot, asked in protocol v1: the gyro is measured, joints are coarser."""
     rig.restart('-p', 'protocol:=v1')
     rig.stream(STAND, 1.2)
-    assert list(rig.hear('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
-    covariance = rig.hear('/imu').angular_velocity_covariance
+    assert list(rig.receive('/joint_states', 3).position) == pytest.approx(STAND, abs=0.1)
+    covariance = rig.receive('/imu').angular_velocity_covariance
     assert covariance[0] == pytest.approx(0.02**2)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in physics obeys the laws that its users rely on."""
+"""The robot in physics follows the laws that its users rely on."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_a_standing_robot_survives_a_kick() -> None:
 def test_equal_robots_have_equal_lives() -> None:
     """Same seed: the same states and measurements, bit for bit."""
 
-    def life(seed: int) -> tuple[bytes, bytes]:
+    def run(seed: int) -> tuple[bytes, bytes]:
         robot = Robot(URDF, seed=seed, noise=BOARD)
         noisy = b''
         for tick in range(50):
@@ -130,9 +130,9 @@ def test_equal_robots_have_equal_lives() -> None:
             noisy += measured.positions.tobytes() + repr(measured.imu).encode()
         return robot.joint_positions.tobytes() + repr(robot.base_pose).encode(), noisy
 
-    assert life(1) == life(1)
-    assert life(1)[0] == life(2)[0]
-    assert life(1)[1] != life(2)[1]
+    assert run(1) == run(1)
+    assert run(1)[0] == run(2)[0]
+    assert run(1)[1] != run(2)[1]
 
 
 def test_a_reset_robot_is_a_new_one() -> None:

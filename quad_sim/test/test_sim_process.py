@@ -145,7 +145,7 @@ def test_it_is_found_under_both_names(package: str) -> None:
         (['--mount', '14=1'], 'no servo has id 14'),
     ],
 )
-def test_an_option_without_sense_is_told(
+def test_an_option_without_sense_is_reported(
     arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 2, one line with the remedy, and no port."""

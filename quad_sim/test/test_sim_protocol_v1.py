@@ -79,7 +79,7 @@ def test_golden_bytes(tmp_path: Path) -> None:
             assert answer_bytes[3] == 0x12
 
 
-def test_what_a_resting_robot_tells(tmp_path: Path) -> None:
+def test_what_a_resting_robot_reports(tmp_path: Path) -> None:
     """Firmware, battery, level attitude, one g upwards, and the servos of the standing pose."""
     with robot(tmp_path, '--start', 'stand') as (client, _):
         assert client.firmware().startswith('L-')
@@ -132,7 +132,9 @@ def test_motors_without_torque_let_go(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('zero', [127, 128])
-def test_it_walks_when_it_is_told_to_and_stops_at_both_zeros(tmp_path: Path, zero: int) -> None:
+def test_it_walks_when_it_is_commanded_to_and_stops_at_both_zeros(
+    tmp_path: Path, zero: int
+) -> None:
     """VX walks ahead without falling; 127 and 128 both mean standing still."""
     with robot(tmp_path, '--start', 'stand') as (client, served):
         client.move(0x30, 20.0)

@@ -43,7 +43,7 @@ def last_state(robot: VirtualRobot) -> Feedback:
     return states(robot.run(0.05))[-1]
 
 
-def test_version_and_battery_are_told() -> None:
+def test_version_and_battery_are_reported() -> None:
     """Both answers have the address of the question and the payload of the table."""
     robot = VirtualRobot(*KINEMATIC, '--battery', '42', '--firmware', 'X-1.2')
     (version,) = robot.ask(Frame(Kind.READ, Code.VERSION))
@@ -59,7 +59,7 @@ def test_states_come_at_their_rate_and_in_sequence() -> None:
     robot.send(FEEDBACK_ON)
     received = states(robot.run(2.0))
     assert len(received) in {99, 100, 101}
-    assert len(robot.heard) == 254 * len(received)
+    assert len(robot.received) == 254 * len(received)
     assert [state.sequence for state in received] == list(range(len(received)))
     steps = {b.device_time - a.device_time for a, b in pairwise(received)}
     assert steps <= {19, 20, 21}
@@ -143,9 +143,9 @@ def test_torque_is_switched_by_motor_and_for_all() -> None:
     assert all(map(servos.torque_on, servos.fitted))
 
 
-@pytest.mark.parametrize('told', [False, True])
-def test_a_servo_that_wakes_goes_to_its_last_target(*, told: bool) -> None:
-    """So a host tells it where it is before it gives the torque back."""
+@pytest.mark.parametrize('sent', [False, True])
+def test_a_servo_that_wakes_goes_to_its_last_target(*, sent: bool) -> None:
+    """So a host sends it its position before it gives the torque back."""
     robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--arm')
     servos = robot.simulation.board.servos
     robot.ask(Frame(Kind.WRITE, Code.FEEDBACK, b'\1'))
@@ -153,7 +153,7 @@ def test_a_servo_that_wakes_goes_to_its_last_target(*, told: bool) -> None:
     robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 0))))
     sunk = states(robot.run(1.5))[-1].position
     assert max(abs(a - b) for a, b in zip(standing, sunk, strict=True)) > 15.0
-    if told:
+    if sent:
         groups = (
             V2.functions[Code.SERVOS].pack(motor=(motor,), angle=(angle,))
             for motor, angle in zip(MOTOR_ORDER, sunk, strict=True)
@@ -162,7 +162,7 @@ def test_a_servo_that_wakes_goes_to_its_last_target(*, told: bool) -> None:
     robot.ask(Frame(Kind.WRITE, Code.TORQUE, bytes((0xFF, 1))))
     assert all(map(servos.torque_on, servos.fitted))
     woken = states(robot.run(1.0))[-1].position
-    expected = sunk if told else standing
+    expected = sunk if sent else standing
     assert woken == pytest.approx(expected, abs=6.0)
 
 
@@ -252,9 +252,9 @@ def test_states_stay_away_from_a_host_that_went_on_to_the_other_speed() -> None:
     robot.send(FEEDBACK_ON)
     robot.run(0.1)
     robot.line.set_baud(V1.baud)
-    robot.heard = b''
+    robot.received = b''
     robot.run(0.2)
-    assert robot.heard == b''
+    assert robot.received == b''
 
 
 def test_states_over_a_real_pseudo_terminal(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ both = pytest.mark.parametrize('protocol', [V1, V2], ids=['v1', 'v2'])
 
 
 def answers(robot: VirtualRobot) -> bool:
-    """Tell whether a question is answered, after the pause in which a rest is given up."""
+    """Return whether a question is answered, after the pause in which a rest is given up."""
     robot.run(0.1)
     protocol = robot.protocol
     wanted = Frame(Kind.REPLY, QUESTION[protocol].address, b'\x64')
@@ -122,7 +122,7 @@ def test_any_number_of_bytes_may_be_asked_for() -> None:
 
 
 def test_the_old_protocol_may_run_at_another_speed() -> None:
-    """A board that a program has switched to 2 Mbaud hears protocol v1 only there."""
+    """A board that a program has switched to 2 Mbaud receives protocol v1 only there."""
     robot = VirtualRobot(*KINEMATIC, '--protocol', 'v1', '--v1-baud', '2000000', protocol=V1)
     assert robot.ask(QUESTION[V1]) == []
     robot.line.set_baud(2_000_000)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The other end of the teleop nodes: hears velocities and poses, and answers set_mode."""
+"""The other end of the teleop nodes: receives velocities and poses, and answers set_mode."""
 
 from __future__ import annotations
 
@@ -41,18 +41,18 @@ class Robot:
 
     @property
     def velocities(self) -> list[tuple[float, float, float]]:
-        """What was heard on /cmd_vel: x, y [m/s] and yaw [rad/s]."""
+        """What was received on /cmd_vel: x, y [m/s] and yaw [rad/s]."""
         return [(each.linear.x, each.linear.y, each.angular.z) for each in self.twists]
 
     def wait_for(self, velocity: tuple[float, float, float], *, after: int = 0) -> int:
-        """Wait until a velocity is heard; return how many messages there are then."""
+        """Wait until a velocity is received; return how many messages there are then."""
         wanted = tuple(round(part, 6) for part in velocity)
 
-        def heard() -> bool:
+        def received() -> bool:
             found = self.velocities[after:]
             return any(tuple(round(part, 6) for part in each) == wanted for each in found)
 
-        self.client.spin_until(heard, TEST_TIMEOUT, f'velocity {velocity} on /cmd_vel')
+        self.client.spin_until(received, TEST_TIMEOUT, f'velocity {velocity} on /cmd_vel')
         return len(self.twists)
 
     def wait_until_stopped(self) -> None:

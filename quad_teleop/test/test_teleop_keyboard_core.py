@@ -214,7 +214,7 @@ def test_speeds_stay_within_their_limits(keys: list[str]) -> None:
     assert 0.01 <= target.speeds.angular <= target.speeds.angular_limit
 
 
-def test_limit_is_told() -> None:
+def test_limit_is_reported() -> None:
     """At the limit a key does nothing, and says so."""
     target = teleop()
     answers = [feed(target, 'w') for _ in range(20)]

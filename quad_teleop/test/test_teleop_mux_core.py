@@ -24,8 +24,8 @@ def mux(*locks: Input) -> Multiplexer:
     return Multiplexer(Inputs(sources, locks))
 
 
-def test_higher_priority_is_heard() -> None:
-    """The keyboard takes over from the planner, which is heard again after its time-out."""
+def test_higher_priority_is_forwarded() -> None:
+    """The keyboard takes over from the planner, which is forwarded again after its time-out."""
     target = mux()
     assert target.velocity(NAVIGATION, FORWARD, 0.0)
     assert target.velocity(KEYBOARD, FORWARD, 0.1)
@@ -64,7 +64,7 @@ def test_lock_stops_what_is_below_it() -> None:
 
 
 def test_lock_with_a_time_out_closes_by_silence() -> None:
-    """A heartbeat that stops locks, and so does one that was never heard."""
+    """A heartbeat that stops locks, and so does one that was never received."""
     target = mux(Input('heartbeat', 'heartbeat', 1.0, 255))
     assert not target.velocity(KEYBOARD, FORWARD, 0.0)
     target.lock('heartbeat', False, 1.0)
@@ -74,7 +74,7 @@ def test_lock_with_a_time_out_closes_by_silence() -> None:
 
 
 def test_source_without_a_time_out_keeps_its_place() -> None:
-    """Time-out 0 never expires, but only once the source was heard at all."""
+    """Time-out 0 never expires, but only once the source was received at all."""
     target = Multiplexer(Inputs((Input('a', 'a', 0.0, 50), Input('b', 'b', 0.5, 10)), locks=()))
     assert target.velocity('b', FORWARD, 0.0)
     assert target.velocity('a', FORWARD, 1.0)
@@ -83,7 +83,7 @@ def test_source_without_a_time_out_keeps_its_place() -> None:
 
 
 def test_equal_priorities_go_by_name() -> None:
-    """Of two the first by name is heard, so that it is always the same one."""
+    """Of two the first by name is forwarded, so that it is always the same one."""
     inputs = read_inputs(
         {
             f'{name}.{field}': value
@@ -100,7 +100,7 @@ def test_equal_priorities_go_by_name() -> None:
 
 @pytest.mark.parametrize('number', [math.nan, math.inf, -math.inf])
 def test_no_number_is_refused(number: float) -> None:
-    """NaN is not forwarded, is told, and does not keep others from being heard."""
+    """NaN is not forwarded, is reported, and does not block other sources."""
     target = mux()
     with pytest.raises(CommandError, match='keyboard sends'):
         target.velocity(KEYBOARD, (number, *STILL[1:]), 0.0)

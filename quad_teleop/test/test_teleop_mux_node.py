@@ -36,14 +36,16 @@ def publisher(client: RosClient, message_type: Any, topic: str) -> Any:
     """Publish to the node, as soon as it listens."""
     publisher = client.node.create_publisher(message_type, topic, 1)
     client.spin_until(
-        lambda: publisher.get_subscription_count() > 0, TEST_TIMEOUT, f'{topic} heard'
+        lambda: publisher.get_subscription_count() > 0, TEST_TIMEOUT, f'subscriber of {topic}'
     )
     return publisher
 
 
-def wait_for(client: RosClient, heard: list[Any], x: float) -> None:
+def wait_for(client: RosClient, received: list[Any], x: float) -> None:
     """Wait until the last velocity that came out is this one."""
-    client.spin_until(lambda: bool(heard) and heard[-1].linear.x == x, TEST_TIMEOUT, f'x = {x}')
+    client.spin_until(
+        lambda: bool(received) and received[-1].linear.x == x, TEST_TIMEOUT, f'x = {x}'
+    )
 
 
 def forward(x: float) -> Twist:
@@ -57,7 +59,7 @@ def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -
     """The shipped file: keyboard over planner, a lock over both, and a zero after silence."""
     with mux(isolation, '--params-file', str(CONFIG), '-r', 'cmd_vel_out:=cmd_vel') as process:
         process.wait_for('lock e_stop')
-        heard = client.listen(Twist, 'cmd_vel')
+        received = client.listen(Twist, 'cmd_vel')
         navigation = publisher(client, Twist, 'nav_vel')
         keyboard = publisher(client, Twist, 'key_vel')
         stop = publisher(client, Bool, 'e_stop')
@@ -65,22 +67,22 @@ def test_priorities_locks_and_silence(isolation: Isolation, client: RosClient) -
         client.spin_until(lambda: count('cmd_vel') > 0, TEST_TIMEOUT, 'output')
 
         navigation.publish(forward(0.25))
-        wait_for(client, heard, 0.25)
+        wait_for(client, received, 0.25)
         keyboard.publish(forward(0.125))
-        wait_for(client, heard, 0.125)
-        wait_for(client, heard, 0.0)  # both fell silent
-        assert len(heard) == 3
+        wait_for(client, received, 0.125)
+        wait_for(client, received, 0.0)  # both fell silent
+        assert len(received) == 3
 
         keyboard.publish(forward(0.125))
-        wait_for(client, heard, 0.125)
+        wait_for(client, received, 0.125)
         stop.publish(Bool(data=True))
-        wait_for(client, heard, 0.0)
+        wait_for(client, received, 0.0)
         keyboard.publish(forward(0.5))
         client.spin_until(lambda: bool(diagnostic(client)), TEST_TIMEOUT, 'diagnostics')
-        assert heard[-1].linear.x == 0.0
+        assert received[-1].linear.x == 0.0
         stop.publish(Bool(data=False))
         client.spin_until(
-            lambda: (keyboard.publish(forward(0.5)), heard[-1].linear.x == 0.5)[1],
+            lambda: (keyboard.publish(forward(0.5)), received[-1].linear.x == 0.5)[1],
             TEST_TIMEOUT,
             'keyboard after the lock',
         )
@@ -99,21 +101,21 @@ def diagnostic(client: RosClient) -> list[Any]:
 def test_no_number_is_not_forwarded(isolation: Isolation, client: RosClient) -> None:
     """NaN is dropped with a warning that names the source; what follows is forwarded."""
     with mux(isolation) as process:
-        heard = client.listen(Twist, 'cmd_vel_out')
+        received = client.listen(Twist, 'cmd_vel_out')
         keyboard = publisher(client, Twist, 'key_vel')
         count = client.node.count_publishers
         client.spin_until(lambda: count('cmd_vel_out') > 0, TEST_TIMEOUT, 'output')
         keyboard.publish(forward(float('nan')))
         process.wait_for('keyboard sends .*nan.* not finite')
         keyboard.publish(forward(0.5))
-        wait_for(client, heard, 0.5)
-        assert len(heard) == 1
+        wait_for(client, received, 0.5)
+        assert len(received) == 1
 
 
 def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
     """With use_stamped the messages pass as they are, header too; the zero has a time."""
     with mux(isolation, '-p', 'use_stamped:=true'):
-        heard = client.listen(TwistStamped, 'cmd_vel_out')
+        received = client.listen(TwistStamped, 'cmd_vel_out')
         keyboard = publisher(client, TwistStamped, 'key_vel')
         count = client.node.count_publishers
         client.spin_until(lambda: count('cmd_vel_out') > 0, TEST_TIMEOUT, 'output')
@@ -123,9 +125,9 @@ def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
         def passes() -> bool:
             """Publish; the multiplexer may not know this listener yet."""
             keyboard.publish(message)
-            return bool(heard)
+            return bool(received)
 
         client.spin_until(passes, TEST_TIMEOUT, 'velocity')
-        client.spin_until(lambda: heard[-1].twist == Twist(), TEST_TIMEOUT, 'zero')
-    assert heard[0] == message
-    assert heard[-1].header.stamp.sec > 0
+        client.spin_until(lambda: received[-1].twist == Twist(), TEST_TIMEOUT, 'zero')
+    assert received[0] == message
+    assert received[-1].header.stamp.sec > 0

@@ -63,7 +63,7 @@ def test_state_of_the_controller_is_shown() -> None:
     ],
 )
 def test_hint_says_why_nothing_moves(view: View, word: str) -> None:
-    """A person who holds a key and sees nothing move is told what to press; else silence."""
+    """A person who holds a key and sees nothing move reads what to press; else nothing."""
     assert re.search(word, hint(view)) if word else not hint(view)
 
 

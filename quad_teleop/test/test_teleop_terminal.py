@@ -56,7 +56,7 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
 
 
 def settle(robot: Robot, terminal: ScriptedTerminal) -> None:
-    """Wait until the robot hears, and the terminal has promised true releases."""
+    """Wait until the robot receives, and the terminal has promised true releases."""
     robot.wait_until_linked()
     terminal.wait_written(rb'idle +\| true releases', TEST_TIMEOUT)
 

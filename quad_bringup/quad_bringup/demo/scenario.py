@@ -28,7 +28,7 @@ KEPT_STRETCHES = 40
 
 @dataclass(frozen=True, slots=True)
 class Milestones:
-    """What the body has covered, as two sources tell it; None for a silent one.
+    """What the body has covered, as two sources report it; None without a report.
 
     Attributes:
         measured: The simulator.

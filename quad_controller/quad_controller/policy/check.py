@@ -272,7 +272,7 @@ def _assumptions(metadata: PolicyMetadata, options: PolicyOptions) -> Iterator[R
         yield _row('phase threshold', f'0 to {MAX_THRESHOLD:g}', f'{threshold:g}', fits)
     frame = metadata.imu_frame if options.imu_frame is ImuFrame.AUTO else options.imu_frame.value
     known_frames = {ImuFrame.BASE.value, ImuFrame.YAWED.value}
-    # nothing measured tells which it is, and with the wrong one the policy falls
+    # no measurement shows which it is, and with the wrong one the policy falls
     found = 'not in the file: set policy_imu_frame' if frame is None else frame
     yield _row('imu frame', 'base or yawed', found, frame in known_frames)
 

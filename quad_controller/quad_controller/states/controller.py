@@ -194,7 +194,7 @@ class Controller:
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Hear that joint states or attitudes come which are of no use.
+        """Count joint states or attitudes that are received and cannot be used.
 
         Args:
             what: JOINTS or IMU.
@@ -248,7 +248,7 @@ class Controller:
             events.append(Event(EventKind.NEWS, f'{before.value} -> {state.value}'))
 
     def _report_conditions(self, events: list[Event]) -> None:
-        """Tell what stops the robot without being a fault, and when it is over."""
+        """Report what stops the robot without being a fault, and when it is over."""
         state = self._machine.state
         events += self._notices.step(self._conditions(state), self._ended_conditions(state))
 

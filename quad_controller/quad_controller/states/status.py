@@ -55,7 +55,7 @@ class EventKind(Enum):
     NEWS = 'news'
     WARNING = 'warning'
     TROUBLE = 'trouble'
-    REPEATED = 'repeated'  # trouble of every step: enough to tell it now and then
+    REPEATED = 'repeated'  # trouble of every step: reported now and then only
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sees joints that stand still while their targets move: frozen sensors, servos without power.
 
-Messages that keep coming with the same values have no age that would tell.
+Messages that keep coming with the same values have no age that would show it.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from ..report import Report
 from .console import Console
 from .robot import ImuReading, LimpRobot
 
-MIN_TILT = math.radians(8.0)  # [rad] that tells a direction from a hand that shakes
+MIN_TILT = math.radians(8.0)  # [rad] that distinguishes a direction from a shaking hand
 MIN_TURN = math.radians(20.0)  # [rad]
 MAX_OFF = math.radians(35.0)  # [rad] of a direction in which a person tilts
 MAX_LEVEL_TILT = math.radians(20.0)  # [rad]

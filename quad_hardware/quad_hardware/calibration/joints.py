@@ -10,7 +10,7 @@ import math
 from ..exceptions import CommandError
 from ..joints import JointServo
 
-MIN_TURN = 8.0  # [deg] that tells a direction from a hand that shakes
+MIN_TURN = 8.0  # [deg] that distinguishes a direction from a shaking hand
 LIMIT_MARGIN = math.radians(2.0)  # [rad] that targets stay away from a stop
 
 
@@ -23,7 +23,7 @@ def with_direction(servo: JointServo, zero: float, turned: float) -> JointServo:
     """Return a servo whose joint went the positive way from one angle to another [deg].
 
     Raises:
-        CommandError: It was turned too little to tell.
+        CommandError: It was turned by less than MIN_TURN.
     """
     if abs(turned - zero) < MIN_TURN:
         raise CommandError(

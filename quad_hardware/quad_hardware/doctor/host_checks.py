@@ -62,7 +62,7 @@ def check_memory(meminfo: str) -> Iterator[Finding]:
 
 
 def check_library() -> Finding:
-    """Tell whose xgo_lib2 Python finds."""
+    """Report whose xgo_lib2 Python finds."""
     spec = importlib.util.find_spec('xgo_lib2')
     if spec is None:
         return warning('xgo_lib2', 'not found', 'build the workspace: it brings one of its own')

@@ -12,7 +12,7 @@ DRIFT = 1e-4  # share by which the robot's clock may be off
 RESTART = 1.0  # [s] a difference beyond that is a robot that began anew
 LATE = 0.1  # [s] a report that is later than others by that may be right, and they wrong
 LATE_TIMEOUT = 0.5  # [s] for which all reports are late, until they are believed
-MAX_LAG = 1.0  # [s] by which reports of one life of the board come late, or after each other
+MAX_LAG = 1.0  # [s] by which reports of one run of the board come late, or after each other
 BOOT_TIME = 0.5  # [s] without a report is no shorter while the board boots
 
 
@@ -59,7 +59,7 @@ class BoardWatch:
     """Finds restarts, after which the board counts its yaw from another heading than before.
 
     Each report is compared with the one before. Where the board reports its clock, the clock
-    tells. Elsewhere each silence that is long enough for a restart counts as one: nothing was
+    shows it. Elsewhere each silence that is long enough for a restart counts as one: nothing was
     sent meanwhile, so the robot did not walk.
     """
 

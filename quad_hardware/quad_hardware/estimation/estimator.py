@@ -108,7 +108,7 @@ class Estimator:
         self._odometry = LegOdometry(settings.odometry, self._robot.foot_radius)
 
     def command(self, time: float, targets: Sequence[float]) -> None:
-        """Note what was sent to the legs, which tells the feet that stand from those that swing.
+        """Note what was sent to the legs: it shows which feet stand and which swing.
 
         Args:
             time: When, on the monotonic clock [s].

@@ -193,8 +193,10 @@ class JointCommander:
             'beyond limits, taken to them': set(command.clamped) - set(command.outside),
             'found beyond limits, moved only towards them': command.outside,
         }
-        if told := [f'{what}: {", ".join(sorted(who))}' for what, who in beyond.items() if who]:
-            self._trouble('; '.join(told))
+        if troubles := [
+            f'{what}: {", ".join(sorted(who))}' for what, who in beyond.items() if who
+        ]:
+            self._trouble('; '.join(troubles))
 
     def _trouble(self, reason: str) -> None:
         self.counters.reason, self.counters.troubled = reason, True

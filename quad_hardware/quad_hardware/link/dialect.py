@@ -56,7 +56,7 @@ class Dialect(ABC, Generic[Received]):
 
     Attributes:
         protocol: What the robot speaks.
-        can_release: Its servos can be told to let go.
+        can_release: The torque of its servos can be switched off.
 
     The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
     frames; and :meth:`handle_frame` for each frame.

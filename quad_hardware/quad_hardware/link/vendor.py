@@ -5,8 +5,8 @@
 It knows the layout of protocol v2, which is not public. What is public of it is used as it
 is: ``client.XgoDog(port)``, ``read_version``, ``system_set_feedback``,
 ``feedback.SendStateParser.feed_bytes``, and the names in its states. The method that writes a
-servo angle by motor id is not public, and has to be named. Looked for, and told when they are not
-found, are the serial port inside XgoDog and the name of the acceleration.
+servo angle by motor id is not public, and has to be named. Looked for, and reported when they are
+not found, are the serial port inside XgoDog and the name of the acceleration.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ class VendorDialect(Dialect[object]):
         return Step(b'', self._request_at)
 
     def handle_frame(self, frame: object, now: float) -> Report | None:
-        """Take a state of the vendor's parser; what it does not tell is not made up.
+        """Take a state of the vendor's parser; what it does not report is not made up.
 
         Raises:
             LinkError: The state has not what is public of it.

@@ -43,7 +43,7 @@ from .parameters import declare_parameters
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
-SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can hear as well
+SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can receive as well
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 

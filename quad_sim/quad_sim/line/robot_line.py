@@ -110,11 +110,11 @@ class RobotLine:
         self._change_faults(now)
         while (arrival := min(self.to_robot.next_arrival, self._push_time)) <= now:
             if self._push_time <= self.to_robot.next_arrival:
-                # a process that was held up does not send all that it owes in a burst
+                # a process that was held up does not send all that is due in a burst
                 self._push(arrival if now - arrival < LATE else now)
             else:
                 for arrived in self.to_robot.take(arrival):
-                    self._hear(arrived)
+                    self._receive(arrived)
         self._board.advance(now)
         if now - self._received_at > QUIET:
             self._give_up_waiting(now)
@@ -140,7 +140,7 @@ class RobotLine:
         if self._board.awake:
             self._send(frame, V2, now)
 
-    def _hear(self, arrived: Arrival) -> None:
+    def _receive(self, arrived: Arrival) -> None:
         baud = self._baud
         protocol, parser = self._by_baud.get(baud), self._parsers.get(baud)
         if protocol is None or parser is None:

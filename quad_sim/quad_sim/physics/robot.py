@@ -100,7 +100,7 @@ class Robot:
         """
         mujoco.mj_resetData(self._model, self._data)
         self._random = np.random.default_rng(seed)
-        self._steps, self._owed = 0, 0.0
+        self._steps, self._remainder = 0, 0.0
         self._push_until: int | None = None
         self.set_torque(True)
         start = start_positions(self.joint_names, pose or {})
@@ -199,12 +199,12 @@ class Robot:
         Raises:
             SimulationError: The physics blew up.
         """
-        self._owed += duration / self._model.opt.timestep
-        count = int(self._owed + 1e-6)
-        self._owed -= count
+        self._remainder += duration / self._model.opt.timestep
+        count = int(self._remainder + 1e-6)
+        self._remainder -= count
         for _ in range(count):
             self._step_once()
-        # MuJoCo puts such a robot back to its start by itself: only its warnings tell
+        # MuJoCo puts such a robot back to its start by itself: only its warnings show it
         if any(self._data.warning[int(kind)].number for kind in UNSTABLE):
             raise SimulationError(
                 f'the physics blew up at {self.time:.3f} s; use a softer servo or a shorter step'

@@ -21,7 +21,7 @@ NEVER = -math.inf
 
 
 @dataclass(slots=True)
-class _Heard:
+class _InputState:
     time: float = NEVER
     locked: bool = False
 
@@ -36,8 +36,8 @@ class Multiplexer:
             inputs: What is listened to.
         """
         self.inputs = inputs
-        self._sources = {each.name: _Heard() for each in inputs.sources}
-        self._locks = {each.name: _Heard() for each in inputs.locks}
+        self._sources = {each.name: _InputState() for each in inputs.sources}
+        self._locks = {each.name: _InputState() for each in inputs.locks}
         self._forwarded: str | None = None  # the source whose motion was forwarded last
 
     def lock_priority(self, now: float) -> int:

@@ -53,7 +53,7 @@ class TwistMux(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
         self.create_timer(DIAGNOSTIC_PERIOD, self._diagnose, clock=steady)
-        self._tell(inputs)
+        self._log_inputs(inputs)
 
     def _inputs(self) -> Inputs:
         topics, locks = (
@@ -121,7 +121,7 @@ class TwistMux(Node):
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
 
-    def _tell(self, inputs: Inputs) -> None:
+    def _log_inputs(self, inputs: Inputs) -> None:
         for kind, group in (('source', inputs.sources), ('lock', inputs.locks)):
             for each in sorted(group, key=lambda one: -one.priority):
                 self.get_logger().info(f'{kind} {each.name}: {_text("", each).strip()}')
