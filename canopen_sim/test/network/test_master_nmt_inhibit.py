@@ -10,7 +10,7 @@ from drive_samples import bus_config, drive_config
 import pytest
 from virtual_network import Sent, START, VirtualNetwork
 
-from arm_canopen.master.events import EventKind
+from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.cob_id import CobId
 from arm_canopen.standard.nmt import NmtCommand
 
@@ -106,3 +106,18 @@ def test_a_command_is_done_when_it_has_left() -> None:
     assert [promise.done for promise in sent] == [True] + [False] * 6
     net.result(sent[-1])
     assert net.now - begin == pytest.approx(0.6)
+
+
+def test_a_reset_that_waits_is_a_commanded_one_when_it_has_left() -> None:
+    """What was queued behind it does not count yet: no device is said to restart by itself."""
+    net = seven_drives(0.1)
+    net.boot()
+    net.run(0.2)
+    for command in (NmtCommand.RESET_COMMUNICATION, NmtCommand.START):
+        sent = [net.network.send_nmt(command, node_id) for node_id in NODE_IDS]
+    net.result(sent[-1])
+    net.run_until(net.all_ready)
+    net.run(1.0)
+    restarts = [event for event in net.events if 'RESET_COMMUNICATION' in event.text]
+    assert [event.node for event in restarts] == list(net.devices)
+    assert all(event.severity is Severity.INFO for event in restarts)
