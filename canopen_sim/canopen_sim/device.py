@@ -229,7 +229,7 @@ class Device:
             return
         if not position_kept:
             for drive in self.drives:
-                drive.lose_position(now)
+                drive.count_from(0.0, now)
         self._parts = self._powered_parts
         self._subscribe()
         self.advance(now)

@@ -14,6 +14,8 @@ from .boot_plan import is_requested
 from .check_subject import Subject
 from .drive_model import DriveConfig
 from .factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from .findings import Findings
+from .model import BusConfig, NodeConfig
 
 POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
 FACTOR_KEY = 'scale_from_factor_group'
@@ -21,6 +23,7 @@ POSITION_TOLERANCE = 0.01
 """User units (rad, m) by which a position may miss its target because increments are whole."""
 COARSE_SCALE = 1.0
 """Device units per user unit of velocity below which more than half a user unit becomes 0."""
+POSITION_MAX = 2**31 - 1  # [inc] of 0x6064, an INTEGER32
 SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
 
 
@@ -66,6 +69,32 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
     per_radian = factors.position_scale
     radians = increments / per_radian if per_radian else None
     return AxisUnits(axis.name or subject.node.name, rule, increments, velocity, radians)
+
+
+def reported_increments(
+    bus: BusConfig, node: NodeConfig, axis: DriveConfig, position: float
+) -> int:
+    """Return what an axis reports in 0x6064 at a position, in [inc].
+
+    Args:
+        bus: The bus.
+        node: A drive on it.
+        axis: One of its axes.
+        position: A position in user units.
+
+    Raises:
+        ValueError: It is not a number, or does not fit 0x6064 (INTEGER32).
+    """
+    per_increment = axis.scale_pos_from_dev
+    if axis.scale_from_factor_group:
+        per_increment = 1.0 / axis_units(Subject(bus, node, Findings()), axis).increments
+    scaled = (position - axis.offset_pos_from_dev) / per_increment
+    if not -POSITION_MAX - 1 <= scaled <= POSITION_MAX:
+        raise ValueError(
+            f'{axis.name}: position {position:g} is {scaled:g} increments, and 0x6064 is an '
+            'INTEGER32'
+        )
+    return round(scaled)
 
 
 def check_units(subject: Subject) -> None:

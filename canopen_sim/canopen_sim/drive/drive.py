@@ -48,6 +48,7 @@ class Drive:
 
     Attributes:
         deadline: Steady time in [s] at which it wants to look at its axis.
+        number: Of the axis in its device, from 0.
         faults: Codes of the faults since the last fault reset.
         causes: Faults whose cause is still there; no fault reset helps against them.
     """
@@ -73,7 +74,7 @@ class Drive:
         self.deadline = NEVER
         self.faults: set[int] = set()
         self.causes: set[Fault] = set()
-        self._number = number
+        self.number = number
         self._objects = objects = DriveObjects(store, number)
         self._errors = errors
         self._clock = clock
@@ -125,17 +126,23 @@ class Drive:
         self._axis.advance(now)
         self._machine.reset()
         self._word = 0
-        self._errors.forget(self._number)
+        self._errors.forget(self.number)
         self.faults.clear()
         self._following.clear()
         self._modes.reset()
         self._axis.speed = self._objects.speed
         self._publish(now)
 
-    def lose_position(self, now: float) -> None:
-        """Count from 0 where the motor is, as an incremental encoder does after power-on."""
+    def count_from(self, position: float, now: float | None = None) -> None:
+        """Count from a position where the motor is, as its encoder does after power-on.
+
+        Args:
+            position: What the encoder reads, in [inc]; 0 for an incremental one.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
         self._axis.advance(now)
-        self._axis.shift(-self._axis.position)
+        self._axis.shift(position - self._axis.position)
         self._publish(now)
 
     def start(self, now: float) -> None:
@@ -302,13 +309,13 @@ class Drive:
         self.faults.add(code)
         self._objects.error_code.put(code)
         self._machine.fault(at_once=at_once)
-        self._errors.report(self._number, code, now)
+        self._errors.report(self.number, code, now)
 
     def _reset_fault(self, now: float) -> None:
         if any(fault.value.code for fault in self.causes):
             return
         for code in sorted(self.faults):
-            self._errors.clear(self._number, code, now)
+            self._errors.clear(self.number, code, now)
         self.faults.clear()
         self._following.clear()
         self._objects.error_code.put(0)

@@ -9,11 +9,12 @@ import sys
 
 from rclpy.node import Node
 
-from arm_canopen.config import load_bus
+from arm_canopen.config import BusConfig, load_bus
 from arm_canopen.exceptions import CanopenError
 from node_runner import ParameterReader
 
 from ..host import DeviceHost
+from ..simulation import add_devices
 from .slave_process import memories, run_slaves, SimulatedDevices
 
 HELP = """\
@@ -26,6 +27,8 @@ example:
 
 parameters:
   bus_config          bus.yml whose devices are simulated (required)
+  positions.<drive>   where a drive stands at power-on in the units of bus.yml [rad or m], as an
+                      absolute encoder reports it (default: 0 increments)
 """
 
 
@@ -49,12 +52,26 @@ def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
     for warning in bus.warnings:
         node.get_logger().warning(str(warning))
     memory = memories(node)
-    for config in bus.nodes:
-        host.add(config.node_id, config.dictionary, memory=memory(config.node_id))
+    add_devices(host, bus, _positions(node, bus), memory)
     drives = sum(device.drive is not None for device in host.devices)
     others = len(host.devices) - drives
     what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
     return SimulatedDevices(what, {config.name: config.node_id for config in bus.nodes})
+
+
+def _positions(node: Node, bus: BusConfig) -> dict[str, float]:
+    read = ParameterReader(node, 'positions.')
+    return {
+        axis.name: read.number(
+            axis.name,
+            axis.offset_pos_from_dev,  # of 0 increments
+            None,
+            'position at power-on in the units of bus.yml [rad or m]',
+        )
+        for config in bus.nodes
+        if config.is_drive
+        for axis in config.axes
+    }
 
 
 if __name__ == '__main__':
