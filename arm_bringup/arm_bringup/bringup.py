@@ -23,6 +23,7 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import apply_network
 
+from .bus import in_namespace_of_bus, read_bus
 from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
@@ -30,10 +31,8 @@ from .groups import moved_groups, MovedGroups
 from .motion import choose_master, motion_files
 from .session import (
     add_arguments,
-    in_namespace_of_bus,
     locate,
     no_files,
-    read_bus,
     REAL_BUS,
     robots_epilog,
     session,
@@ -118,6 +117,8 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
         offered = f'no motion ({no_motion})' if no_motion else 'trajectories and jogging'
         place = f' in namespace /{arm.ros.namespace}' if arm.ros.namespace else ''
         _say(f'{arm.robot.name} on CAN bus {arm.bus}{place}: {offered}')
+        if arm.start:
+            _say(arm.start)
         with contextlib.ExitStack() as stack:
             if arguments.enable:
                 stack.enter_context(

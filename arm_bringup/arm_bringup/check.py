@@ -14,13 +14,15 @@ from urdf_reader import KinematicTree, read_urdf
 
 from process_supervisor import RosOptions, USAGE_ERROR
 
+from .bus import in_namespace_of_bus, read_bus
 from .description import read_description
 from .exceptions import BringupError, DescriptionError, RobotError
 from .findings import error, Finding, Severity, warning
 from .motion_check import check_motion
 from .robots import Robot
 from .semantic_check import check_semantic
-from .session import add_robot, in_namespace_of_bus, locate, read_bus, robots_epilog
+from .session import add_robot, locate, robots_epilog
+from .start_positions import check_given
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -73,6 +75,7 @@ def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
     try:
         bus = read_bus(robot)
         in_namespace_of_bus(RosOptions(), bus)
+        check_given(robot, bus.joints)
     except RobotError as problem:
         return [*findings, error('bus.yml', str(problem), 'see README of arm_bringup')], []
     return findings, list(bus.joints)

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import urdf_reader
 from urdf_reader import find_group, KinematicTree, parse_srdf, read_urdf, SemanticDescription
 
+from .bus import read_bus
 from .description import read_description, read_semantic
 from .exceptions import DescriptionError, RobotError
 from .robots import Robot, SETTINGS
-from .session import read_bus
 
 
 @dataclass(frozen=True, slots=True)

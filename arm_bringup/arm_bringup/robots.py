@@ -42,9 +42,13 @@ FILES: Mapping[str, Sequence[str]] = {
 }
 """Names of each file of a robot folder; the first that exists is taken."""
 TABLES, WORDS = ('xacro_args', 'packages'), ('tip_link',)
-"""Keys of :data:`SETTINGS` beside those of :data:`FILES` and :data:`GROUP`."""
+"""Keys of :data:`SETTINGS` that are tables of text, and those that are text."""
 GROUP = 'group'
 """Key of one group, or of a list."""
+START_POSITIONS = 'start_positions'
+"""Key of the positions of simulated drives at power-on."""
+KEYS = (*FILES, *TABLES, *WORDS, GROUP, START_POSITIONS)
+"""All keys of :data:`SETTINGS`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +66,7 @@ class Robot:
         packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
         groups: Groups of the SRDF that are moved; empty takes all arms of it.
         tip_link: Link that is moved; empty takes the end of the first group.
+        start_positions: Where simulated drives stand at power-on, by name, in [rad or m].
     """
 
     name: str
@@ -74,6 +79,7 @@ class Robot:
     packages: Mapping[str, Path] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     tip_link: str = ''
+    start_positions: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -186,10 +192,11 @@ def _settings(path: Path) -> dict[str, Any]:
         raise RobotError(f'{path}: it is no table of keys')
     settings: dict[str, Any] = {}
     for key, value in (document or {}).items():
-        if key not in (*FILES, *TABLES, *WORDS, GROUP):
-            known = ', '.join((*FILES, *TABLES, *WORDS, GROUP))
-            raise RobotError(f'{path}: unknown key {key!r}; keys: {known}')
-        if key in TABLES and isinstance(value, dict):
+        if key not in KEYS:
+            raise RobotError(f'{path}: unknown key {key!r}; keys: {", ".join(KEYS)}')
+        if key == START_POSITIONS:
+            settings[key] = _positions(path, value)
+        elif key in TABLES and isinstance(value, dict):
             settings[key] = {str(name): _word(path, key, word) for name, word in value.items()}
         elif key == GROUP:
             names = value if isinstance(value, list) else [value]
@@ -199,6 +206,15 @@ def _settings(path: Path) -> dict[str, Any]:
         else:
             settings[key] = _word(path, key, value)
     return settings
+
+
+def _positions(path: Path, value: object) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise RobotError(f'{path}: {START_POSITIONS}: a table of drives and numbers is needed')
+    for name, number in value.items():
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            raise RobotError(f'{path}: {START_POSITIONS}: {name}: {number!r} is no number')
+    return {str(name): float(number) for name, number in value.items()}
 
 
 def _word(path: Path, key: str, value: object) -> str:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import os
 from pathlib import Path
 import tempfile
-from typing import TYPE_CHECKING
 
 from process_supervisor import (
     add_namespace,
@@ -26,13 +25,12 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import add_network, add_timeout, apply_network
 
+from .bus import in_namespace_of_bus, read_bus, stream_mode_service
 from .description import read_description
 from .exceptions import RobotError
 from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Stack
-
-if TYPE_CHECKING:
-    from arm_canopen import BusConfig, NodeConfig
+from .start_positions import start_positions, StartPositions
 
 REAL_BUS = 'can0'
 """Bus without --can on hardware: never one on which only simulated drives could be."""
@@ -42,8 +40,6 @@ BUS_REMEDY = 'another bus with --can'
 """What a second bring-up on a bus is advised to take."""
 NAMESPACE_REMEDY = 'another --namespace'
 """What a second bring-up in a namespace is advised to take."""
-INTERPOLATED_POSITION = 7
-"""Mode of operation (CiA 402-2, 0x6060)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +53,7 @@ class Session:
         ros: Options of all nodes.
         mode_service: Service that selects the mode in which all of them follow a stream.
         urdf: Its description.
+        start: Where the simulated drives stand at power-on, and why, for the log.
         processes: What is to be run.
     """
 
@@ -66,6 +63,7 @@ class Session:
     ros: RosOptions
     mode_service: str
     urdf: str
+    start: str
     processes: list[ProcessSpec]
 
 
@@ -152,61 +150,6 @@ def locate(arguments: argparse.Namespace) -> Robot:
     )
 
 
-def read_bus(robot: Robot) -> BusConfig:
-    """Read the bus.yml of a robot, and so find its mistakes before anything is started.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        Its bus, with one drive at least.
-
-    Raises:
-        RobotError: The file, or an EDS that it names, is wrong; the message says where and what.
-    """
-    from arm_canopen import CanopenError, load_bus
-
-    try:
-        bus = load_bus(robot.bus_config)
-    except CanopenError as error:
-        raise RobotError(str(error)) from error
-    if not bus.joints:
-        raise RobotError(f'{robot.bus_config} has no drive (a node with a Cia402 driver)')
-    return bus
-
-
-def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
-    """Take over the namespace of bus.yml, unless the command line has one: all nodes share it.
-
-    Args:
-        ros: Options of all nodes.
-        bus: The bus of the robot.
-
-    Raises:
-        RobotError: Its nodes are in several.
-    """
-    named = [bus.master.namespace, *(node.namespace for node in bus.nodes)]
-    given = {namespace.strip('/') for namespace in named} - {''}
-    if len(given) > 1 and not ros.namespace:
-        raise RobotError(
-            f'bus.yml puts its nodes into several namespaces ({", ".join(sorted(given))}); '
-            'choose one for all with --namespace'
-        )
-    return ros.within(next(iter(given), ''))
-
-
-def stream_mode_service(bus: BusConfig) -> str:
-    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position.
-
-    Args:
-        bus: The bus of the robot.
-    """
-    drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
-    if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
-        return 'interpolated_position_mode'
-    return 'cyclic_position_mode'
-
-
 def no_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
     """Make no parameter files; for :func:`session`.
 
@@ -290,10 +233,12 @@ def session(
         urdf = read_description(robot)
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, urdf)
+        start = start_positions(robot, urdf, config.joints) if simulate else StartPositions()
         wanted = Stack(
             robot,
             bus,
             simulate,
+            start.positions,
             arguments.timeout,
             master,
             dict(master_parameters or {}),
@@ -302,4 +247,6 @@ def session(
         )
         processes = arm_processes(wanted, parameters, find_executable)
         mode_service = stream_mode_service(config)
-        yield Session(robot, bus, list(config.joints), ros, mode_service, urdf, processes)
+        yield Session(
+            robot, bus, list(config.joints), ros, mode_service, urdf, f'{start}', processes
+        )

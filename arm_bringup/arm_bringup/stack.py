@@ -41,6 +41,7 @@ class Stack:
         robot: The robot.
         bus: Name of the CAN bus.
         simulate: With simulated slaves for all devices of the bus.
+        start_positions: Where simulated drives stand at power-on that do not at 0 [rad or m].
         ready_timeout: How long each process may take to be ready in [s].
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
@@ -51,6 +52,7 @@ class Stack:
     robot: Robot
     bus: str
     simulate: bool
+    start_positions: Mapping[str, float] = field(default_factory=dict)
     ready_timeout: float = 30.0
     master: Executable = MASTER
     master_parameters: Mapping[str, str] = field(default_factory=dict)
@@ -84,9 +86,11 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
 def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> ProcessSpec | None:
     if not stack.simulate:
         return None
+    places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
+    executable = Executable('canopen_sim', 'fake_slaves')
     return ProcessSpec(
         name='slaves',
-        argv=node_argv(Executable('canopen_sim', 'fake_slaves'), find, bus, ros=stack.ros),
+        argv=node_argv(executable, find, {**bus, **places}, ros=stack.ros),
         environment=LOG_FORMAT,
         notifies_ready=True,
         ready_timeout=stack.ready_timeout,

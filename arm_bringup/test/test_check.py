@@ -10,13 +10,13 @@ import shutil
 import pytest
 import yaml
 
+from arm_bringup.bus import in_namespace_of_bus, read_bus
 from arm_bringup.check import check_robot, main
 from arm_bringup.exceptions import RobotError
 from arm_bringup.findings import Severity
 from arm_bringup.groups import moved_groups
 from arm_bringup.motion import controller_name
 from arm_bringup.robots import find_robot, Robot
-from arm_bringup.session import in_namespace_of_bus, read_bus
 from process_supervisor import RosOptions
 
 ROBOTS = Path(__file__).parents[1] / 'robots'

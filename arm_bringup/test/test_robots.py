@@ -11,9 +11,9 @@ import runpy
 
 import pytest
 
+from arm_bringup.bus import read_bus, stream_mode_service
 from arm_bringup.exceptions import RobotError
 from arm_bringup.robots import find_robot, robot_names
-from arm_bringup.session import read_bus, stream_mode_service
 from arm_canopen import load_bus
 
 ROBOTS = Path(__file__).parents[1] / 'robots'

@@ -140,6 +140,8 @@ def run(arm: Session, groups: MovedGroups, duration: float | None) -> int:
     period = load_bus(arm.robot.bus_config).master.sync_period
     controller = controller_name(arm.robot, groups)
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
+    if arm.start:
+        sys.stdout.write(f'{arm.start}\n')
     title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}'
 
     return run_demo(

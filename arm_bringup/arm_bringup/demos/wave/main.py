@@ -107,6 +107,8 @@ def run(arm: Session, duration: float | None) -> int:
         sys.stdout.write(
             f'warning: no joint of the description is called {name!r}; its drive stands still\n'
         )
+    if arm.start:
+        sys.stdout.write(f'{arm.start}\n')
     bus_config = os.path.relpath(arm.robot.bus_config)
     view = ArmView(
         f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
