@@ -25,6 +25,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.xdist_group('without-ros')]
 
 CHECKOUT = Path(__file__).parents[1]
 INSTALLED = (
+    'arm_planning',
     'arm_servo',
     'canopen_sim',
     'canopen_tools',
@@ -39,6 +40,7 @@ IMPORTED = [
     'arm_bringup',
     'arm_canopen',
     'arm_model',
+    'arm_planning',
     'arm_servo',
     'arm_trajectory',
     'canopen_sim',

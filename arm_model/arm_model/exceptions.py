@@ -22,7 +22,7 @@ from urdf_reader import DescriptionError
 
 
 class ArmError(Exception):
-    """Root of all errors of arm_model, arm_trajectory and arm_servo."""
+    """Root of all errors of arm_model and of the packages above it."""
 
 
 class ModelError(ArmError, ValueError):

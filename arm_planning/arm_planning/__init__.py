@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motion planning of an arm among obstacles; no ROS.
+
+A :class:`MotionRequest` goes in, a :class:`MotionPlan` comes out, or a :class:`PlanningError`
+with MoveIt's code and the reason in words.
+"""
+
+from __future__ import annotations
+
+from .exceptions import PlanningCode, PlanningError
+from .requests import (
+    CircPoint,
+    CircPointKind,
+    Goal,
+    JointGoal,
+    MotionPlan,
+    MotionRequest,
+    OrientationConstraint,
+    PathConstraints,
+    PoseGoal,
+    PositionConstraint,
+)
+
+__all__ = [
+    'CircPoint',
+    'CircPointKind',
+    'Goal',
+    'JointGoal',
+    'MotionPlan',
+    'MotionRequest',
+    'OrientationConstraint',
+    'PathConstraints',
+    'PlanningCode',
+    'PlanningError',
+    'PoseGoal',
+    'PositionConstraint',
+]
