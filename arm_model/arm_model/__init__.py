@@ -10,7 +10,15 @@ move; a :class:`PlanningScene` holds what may collide, :class:`Clearances` measu
 from __future__ import annotations
 
 from .arrays import Array, checked, frozen, Mask, Native, Places
-from .exceptions import ArmError, CommandError, LimitsError, ModelError, SceneError
+from .exceptions import (
+    ArmError,
+    CommandError,
+    LimitsError,
+    LinkNameError,
+    ModelError,
+    ObjectNameError,
+    SceneError,
+)
 from .frame_tree import FrameTree
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits
@@ -46,10 +54,12 @@ __all__ = [
     'Kinematics',
     'LeastClearance',
     'LimitsError',
+    'LinkNameError',
     'Mask',
     'Mesh',
     'ModelError',
     'Native',
+    'ObjectNameError',
     'PlacedShape',
     'Places',
     'Plane',

@@ -8,6 +8,8 @@
     ├── ModelError (ValueError)     description, SRDF and limits do not make an arm
     │   └── LimitsError             the limits file is the matter
     ├── SceneError (ValueError)     an object does not fit into a planning scene
+    │   ├── LinkNameError           no such link
+    │   └── ObjectNameError         no such object, or its name is none or taken
     └── CommandError (ValueError)   a request is refused before anything moves
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
@@ -53,6 +55,21 @@ class SceneError(ArmError, ValueError):
 
     Scenarios: a box with a negative edge, an unknown object or link, an object that is attached
     already.
+    """
+
+
+class LinkNameError(SceneError):
+    """A link of a scene is unknown.
+
+    Scenarios: an object is attached to it, or is to touch it.
+    """
+
+
+class ObjectNameError(SceneError):
+    """The name of an object is unknown, empty or taken.
+
+    Scenarios: an object is moved or removed that is not there, a link has its name, it is attached
+    and added to the world, too.
     """
 
 

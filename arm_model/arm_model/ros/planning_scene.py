@@ -30,7 +30,7 @@ from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
 
 from ..arrays import Array, checked
-from ..exceptions import CommandError, SceneError
+from ..exceptions import CommandError, LinkNameError, ObjectNameError, SceneError
 from ..pose import combined, inverse, ORIGIN, Pose, rotation_of
 from ..scene.allowed_collisions import AllowedCollisionMatrix
 from ..scene.objects import AttachedBody, CollisionObject
@@ -262,7 +262,7 @@ class _Draft:
         elif name in self.objects:
             in_world = self.objects[name]
         else:
-            raise SceneError(
+            raise ObjectNameError(
                 f'attached object {name!r} has no shapes, and no object of the world has this name'
             )
         self.objects.pop(name, None)
@@ -284,7 +284,7 @@ class _Draft:
         ]
         if name and not fitting:
             known = ', '.join(self.attached) or 'none'
-            raise SceneError(f'no attached object {name!r} on {link!r}; there are: {known}')
+            raise ObjectNameError(f'no attached object {name!r} on {link!r}; there are: {known}')
         for each in fitting:
             body = self.attached.pop(each)
             place = combined(self._link(each, body.link), body.object.pose)
@@ -313,7 +313,7 @@ class _Draft:
     def _known(self, name: str) -> CollisionObject:
         if name not in self.objects:
             known = ', '.join(self.objects) or 'none'
-            raise SceneError(f'no object {name!r} in the world; there are: {known}')
+            raise ObjectNameError(f'no object {name!r} in the world; there are: {known}')
         return self.objects[name]
 
     def _pose(self, message: ObjectMessage) -> Pose:
@@ -336,7 +336,7 @@ class _Draft:
         """Return where a link is, in the root link."""
         if link not in self.before.kinematics.frames:
             known = ', '.join(self.before.kinematics.frames)
-            raise SceneError(f'attached object {name!r}: no link {link!r}; links: {known}')
+            raise LinkNameError(f'attached object {name!r}: no link {link!r}; links: {known}')
         return self.before.kinematics.link_pose(link, self.positions)
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ..exceptions import SceneError
+from ..exceptions import ObjectNameError, SceneError
 from ..pose import ORIGIN, Pose
 from .shapes import native, PlacedShape, Shape
 
@@ -36,8 +36,10 @@ class CollisionObject:
         Raises:
             SceneError: It has no name or no shape, or a shape is not usable.
         """
-        if not name or not shapes:
-            raise SceneError(f'object {name!r}: it needs a name and a shape at least')
+        if not name:
+            raise ObjectNameError('an object needs a name; give it one')
+        if not shapes:
+            raise SceneError(f'object {name!r}: no shapes; it needs one at least')
         placed = tuple(
             shape if isinstance(shape, PlacedShape) else PlacedShape(shape) for shape in shapes
         )

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array, Native
-from ..exceptions import SceneError
+from ..exceptions import LinkNameError, ObjectNameError, SceneError
 from ..kinematics import Kinematics
 from ..pose import combined, inverse, Pose
 from .allowed_collisions import AllowedCollisionMatrix
@@ -163,7 +163,7 @@ class PlanningScene:
             SceneError: There is no such object in the world, or no such link.
         """
         if name not in self.objects:
-            raise SceneError(f'no object {name!r} in the world; {self._known()}')
+            raise ObjectNameError(f'no object {name!r} in the world; {self._known()}')
         self._check_links(name, link)
         place = inverse(self.kinematics.link_pose(link, positions))
         thing = self.objects[name].at(combined(place, self.objects[name].pose))
@@ -191,7 +191,7 @@ class PlanningScene:
             SceneError: No such body is attached.
         """
         if name not in self.attached_bodies:
-            raise SceneError(f'no attached body {name!r}; {self._known()}')
+            raise ObjectNameError(f'no attached body {name!r}; {self._known()}')
         body = self.attached_bodies[name]
         place = self.kinematics.link_pose(body.link, positions)
         return self.without(name).with_object(body.object.at(combined(place, body.object.pose)))
@@ -267,7 +267,7 @@ class PlanningScene:
             return self.objects[name]
         if name in self.attached_bodies:
             return self.attached_bodies[name].object
-        raise SceneError(f'no object {name!r}; {self._known()}')
+        raise ObjectNameError(f'no object {name!r}; {self._known()}')
 
     def _known(self) -> str:
         world, attached = (
@@ -284,16 +284,20 @@ class PlanningScene:
     def _refuse_names(self) -> None:
         for name in (*self.objects, *self.attached_bodies):
             if name in self.kinematics.frames:
-                raise SceneError(f'object {name!r}: a link has this name')
+                raise ObjectNameError(f'object {name!r}: a link has this name')
         for name, body in self.attached_bodies.items():
             if name in self.objects:
-                raise SceneError(f'object {name!r} is in the world and attached to {body.link}')
+                raise ObjectNameError(
+                    f'object {name!r} is in the world and attached to {body.link}'
+                )
             self._check_links(name, body.link, *body.touch_links)
 
     def _check_links(self, name: str, *links: str) -> None:
         for link in links:
             if link not in self.kinematics.frames:
-                raise SceneError(f'object {name!r}: no link {link!r} to attach it to or to touch')
+                raise LinkNameError(
+                    f'object {name!r}: no link {link!r} to attach it to or to touch'
+                )
 
     def _bodies(self) -> Sequence[_Body]:
         """Put all shapes into the geometry, and return what they belong to."""
