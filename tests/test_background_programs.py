@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Programs without a node end by SIGINT as background jobs of a script, too.
+"""Programs without a node of their own end by SIGINT as background jobs of a script, too.
 
 Shells start those with SIGINT ignored, which a program inherits.
 """
@@ -10,11 +10,16 @@ from __future__ import annotations
 from pathlib import Path
 import signal
 import subprocess
+import time
 
 from isolation import Isolation
 from processes import executable, RunningProcess
 import pytest
+from ros_client import RosClient
+from std_msgs.msg import String
 
+from arm_canopen.can import open_bus
+from canopen_tools.cli.main import INTERRUPTED
 from quad_pty_peer import PtyPeer
 
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
@@ -51,6 +56,34 @@ def test_a_program_ends(command: list[str], begun: str, isolation: Isolation) ->
     program = [*IGNORING, executable(package, name), *arguments]
     with RunningProcess(program, isolation.env) as process:
         process.wait_for(begun, 30.0)
+        process.signal(signal.SIGINT)
+        process.wait(30.0)
+
+
+def test_a_scan_ends(isolation: Isolation) -> None:
+    """While it waits for answers of devices that are not there."""
+    program = [*IGNORING, executable('canopen_tools', 'canopen'), 'scan', '--query']
+    with (
+        open_bus(isolation.bus) as bus,
+        RunningProcess([*program, '--can', isolation.bus], isolation.env) as process,
+    ):
+        deadline = time.monotonic() + 30.0
+        while not bus.receive(1.0):
+            assert time.monotonic() < deadline, process.output
+        process.signal(signal.SIGINT)
+        assert process.wait(30.0) == INTERRUPTED
+
+
+def test_an_echo_ends(isolation: Isolation) -> None:
+    """While messages come."""
+    program = [*IGNORING, 'ros2', 'topic', 'echo', '/words', 'std_msgs/msg/String']
+    with (
+        RosClient(isolation.domain_id) as client,
+        RunningProcess(program, isolation.env) as process,
+    ):
+        publisher = client.node.create_publisher(String, '/words', 1)
+        client.node.create_timer(0.1, lambda: publisher.publish(String(data='here')))
+        client.spin_until(lambda: 'here' in process.output, 30.0, 'echo')
         process.signal(signal.SIGINT)
         process.wait(30.0)
 
