@@ -30,7 +30,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/arm_planning']),
         ('share/arm_planning', ['package.xml']),
     ],
-    install_requires=['numpy>=1.26', sibling('arm_model'), sibling('arm_trajectory')],
+    install_requires=['numpy>=1.26', 'pin>=3.3', sibling('arm_model'), sibling('arm_trajectory')],
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -1,0 +1,292 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Joint positions for a pose: all of them in closed form, or those that starts lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+import math
+import time
+
+import numpy as np
+
+from arm_model import (
+    Array,
+    checked,
+    Clearances,
+    frozen,
+    JointLimits,
+    PlanningScene,
+    Pose,
+    RobotModel,
+)
+
+from ..exceptions import PlanningCode, PlanningError
+from .closed_form import ClosedForm, WristMiss
+from .link_kinematics import LinkKinematics, pose_error
+from .numeric import descend, Descent, random_start
+
+DEFAULT_TIMEOUT = 0.1
+"""Time for numeric inverse kinematics in [s]; several starts of a seven-joint arm."""
+
+MAX_STARTS = 200
+"""Starts of numeric inverse kinematics at most, however much time there is."""
+
+SAME_TOLERANCE = 1e-3
+"""Solutions of which no joint differs by more count as one in [rad]."""
+
+RANGE_TOLERANCE = 1e-9
+"""How far a solution may be beyond a limit for rounding in [rad]; it is put on the limit."""
+
+POLISH_TOLERANCE = 1e-10
+"""Pose error of a closed form in [m] and [rad] beyond which Newton steps follow.
+
+Descriptions whose axes are not quite parallel need them, and solutions that are almost singular.
+"""
+
+RANDOM_SEED = 0
+"""Of the starts: the same question has the same answer each time."""
+
+ORTHOGONAL_TOLERANCE = 1e-6
+"""How far a rotation matrix may be from one."""
+
+TURN = 2.0 * math.pi
+"""A whole turn in [rad]."""
+
+
+class IkSolver:
+    """Inverse kinematics of one link; for one thread.
+
+    Attributes:
+        link: The link that is placed.
+        closed_form: Geometry of an arm with a spherical wrist; None for others.
+    """
+
+    def __init__(
+        self, model: RobotModel, link: str = '', clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            link: The link to place; empty for the tip.
+            clock: Steady time in [s], for time-outs.
+
+        Raises:
+            PlanningError: There is no such link, or no joint moves it.
+        """
+        self.link = LinkKinematics(model, link)
+        self.closed_form = ClosedForm.of(self.link)
+        self._limits: JointLimits = model.limits
+        self._clock = clock
+        self._clearances: Clearances | None = None
+
+    def solve(
+        self,
+        pose: Pose,
+        seed: Sequence[float] | Array,
+        scene: PlanningScene | None = None,
+        timeout: float = DEFAULT_TIMEOUT,
+        count: int = 1,
+    ) -> list[Array]:
+        """Return joint positions for a pose, the nearest to the seed first.
+
+        An arm with a spherical wrist has all solutions, each in the turn that is nearest to the
+        seed. Others have those that random starts lead to within the time.
+
+        Args:
+            pose: Where the link is wanted, in the root link.
+            seed: Joint positions in [rad] (n), of which solutions are wanted near.
+            scene: Where solutions must be free of contact; None does not check.
+            timeout: Time in [s] after which no further start is made.
+            count: How many solutions end the search of an arm without closed form.
+
+        Raises:
+            PlanningError: There is no solution: the pose is out of reach, joints would be beyond
+                their limits, or the arm would be in contact.
+            CommandError: A number is not finite, or there are too few or too many.
+        """
+        seed = checked(seed, len(self._limits), 'seed')
+        check_pose(pose)
+        if self.closed_form is not None:
+            found = self._exact(self.closed_form, pose, seed)
+            return found if scene is None else self._free(found, self._clearances_of(scene))
+        clearances = None if scene is None else self._clearances_of(scene)
+        return self._searched(pose, seed, clearances, timeout, count)
+
+    def _exact(self, form: ClosedForm, pose: Pose, seed: Array) -> list[Array]:
+        answers = form.solutions(pose, seed)
+        if isinstance(answers, WristMiss):
+            raise self._refused(_out_of_reach(self.link.link, answers))
+        limits = self._limits
+        rows = np.array(answers)
+        turned = rows + TURN * np.round((seed - rows) / TURN)
+        turned -= TURN * (turned > limits.upper + RANGE_TOLERANCE)
+        turned += TURN * (turned < limits.lower - RANGE_TOLERANCE)
+        beyond = np.maximum(limits.lower - turned, turned - limits.upper)
+        within = (beyond <= RANGE_TOLERANCE).all(axis=1)
+        if not within.any():
+            nearest = int(beyond.max(axis=1).argmin())
+            raise self._refused(self._at_limits(turned[nearest]))
+        solutions = np.clip(turned[within], limits.lower, limits.upper)
+        return _nearest_first([self._polished(pose, each) for each in solutions], seed)
+
+    def _polished(self, pose: Pose, positions: Array) -> Array:
+        """Return a solution whose pose is met exactly."""
+        error = np.abs(pose_error(pose, self.link.pose(positions))).max()
+        if error < POLISH_TOLERANCE:
+            return positions
+        refined = descend(self.link, pose, positions, self._limits.lower, self._limits.upper)
+        return refined.positions if np.abs(refined.error).max() < error else positions
+
+    def _searched(
+        self,
+        pose: Pose,
+        seed: Array,
+        clearances: Clearances | None,
+        timeout: float,
+        count: int,
+    ) -> list[Array]:
+        """Return the solutions that the seed and random starts lead to."""
+        limits, draw = self._limits, np.random.default_rng(RANDOM_SEED)
+        deadline = self._clock() + timeout
+        best = end = descend(self.link, pose, seed, limits.lower, limits.upper)
+        starts = 1
+        free: list[Array] = []
+        touching: list[Array] = []
+        while True:
+            if end.converged:
+                solution = end.positions + self._whole_turns(end.positions, seed)
+                touches = clearances is not None and _touches(clearances, solution)
+                among = touching if touches else free
+                if not _known(solution, among):
+                    among.append(solution)
+            if len(free) >= count or starts >= MAX_STARTS or self._clock() >= deadline:
+                break
+            start = random_start(limits, seed, draw)
+            end = descend(self.link, pose, start, limits.lower, limits.upper)
+            best = min(best, end, key=_size)
+            starts += 1
+        if free:
+            return _nearest_first(free, seed)
+        if clearances is not None and touching:
+            nearest = _nearest_first(touching, seed)[0]
+            raise self._refused(_in_contact(clearances, nearest))
+        raise self._refused(self._why_none(pose, best, starts))
+
+    def _whole_turns(self, positions: Array, seed: Array) -> Array:
+        """Return the turns that bring joints without end next to the seed in [rad]."""
+        turns = TURN * np.round((seed - positions) / TURN)
+        return np.where(self._limits.continuous, turns, 0.0)
+
+    def _free(self, found: list[Array], clearances: Clearances) -> list[Array]:
+        free = [each for each in found if not _touches(clearances, each)]
+        if not free:
+            raise self._refused(_in_contact(clearances, found[0]))
+        return free
+
+    def _clearances_of(self, scene: PlanningScene) -> Clearances:
+        if self._clearances is None or self._clearances.scene is not scene:
+            self._clearances = Clearances(scene)
+        return self._clearances
+
+    def _at_limits(self, positions: Array) -> str:
+        limits = self._limits
+        beyond = np.maximum(limits.lower - positions, positions - limits.upper)
+        joint = int(beyond.argmax())
+        return (
+            f'every solution is beyond the limits; the nearest has {limits.names[joint]} at'
+            f' {positions[joint]:.3f}, its limits are {limits.lower[joint]:.3f}..'
+            f'{limits.upper[joint]:.3f}'
+        )
+
+    def _why_none(self, pose: Pose, best: Descent, starts: int) -> str:
+        """Say why no start led to the pose: without limits one may."""
+        none = np.full(len(self._limits), np.inf)
+        unlimited = descend(self.link, pose, best.positions, -none, none)
+        if unlimited.converged:
+            turns = TURN * np.round((unlimited.positions - best.positions) / TURN)
+            return f'{self._at_limits(unlimited.positions - turns)} ({starts} starts)'
+        way = min(float(np.linalg.norm(each.error[:3])) for each in (best, unlimited))
+        turn = float(np.linalg.norm(best.error[3:]))
+        return (
+            f'link {self.link.link} comes as near as {1e3 * way:.1f} mm and {turn:.3f} rad in'
+            f' {starts} starts: the pose is out of reach by {way:.3f} m, or singular'
+        )
+
+    def _refused(self, reason: str) -> PlanningError:
+        return PlanningError(
+            PlanningCode.NO_IK_SOLUTION, f'no joint positions for link {self.link.link}: {reason}'
+        )
+
+
+def ik(
+    model: RobotModel,
+    pose: Pose,
+    *,
+    link: str = '',
+    seed: Sequence[float] | Array,
+    scene: PlanningScene | None = None,
+    timeout: float = DEFAULT_TIMEOUT,
+    count: int = 1,
+    clock: Callable[[], float] = time.monotonic,
+) -> list[Array]:
+    """Return joint positions for a pose, the nearest to the seed first.
+
+    Who asks often keeps an :class:`IkSolver`, whose arguments and errors these are.
+    """
+    return IkSolver(model, link, clock).solve(pose, seed, scene, timeout, count)
+
+
+def check_pose(pose: Pose) -> None:
+    """Refuse a pose that is none.
+
+    Args:
+        pose: The pose, from outside.
+
+    Raises:
+        PlanningError: The rotation is none.
+        CommandError: A number is not finite, or there are too few or too many.
+    """
+    checked(pose.position, 3, 'position of the pose')
+    checked(np.ravel(pose.rotation), 9, 'rotation of the pose')
+    rotation = np.asarray(pose.rotation)
+    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if off > ORTHOGONAL_TOLERANCE or np.linalg.det(rotation) < 0.0:
+        raise PlanningError(
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
+            f'rotation of the pose: its axes are off by {off:.2g}; give an orthogonal matrix that'
+            ' does not mirror',
+        )
+
+
+def _touches(clearances: Clearances, positions: Array) -> bool:
+    return bool((clearances.least(positions, 0.0) < 0.0).any())
+
+
+def _in_contact(clearances: Clearances, positions: Array) -> str:
+    contact = clearances.contacts(positions)[0]
+    first, second = contact.bodies
+    return (
+        f'every solution is in contact; in the one next to the seed {first} and {second}'
+        f' overlap by {1e3 * contact.depth:.1f} mm'
+    )
+
+
+def _out_of_reach(link: str, miss: WristMiss) -> str:
+    if miss.too_near:
+        return f'the wrist would be {miss.distance:.3f} m too near to the shoulder'
+    return f'{link} is out of reach by {miss.distance:.3f} m'
+
+
+def _size(end: Descent) -> float:
+    return float(end.error @ end.error)
+
+
+def _known(solution: Array, among: Sequence[Array]) -> bool:
+    return any(np.abs(solution - other).max() < SAME_TOLERANCE for other in among)
+
+
+def _nearest_first(solutions: Sequence[Array], seed: Array) -> list[Array]:
+    ordered = sorted(solutions, key=lambda each: float(np.linalg.norm(each - seed)))
+    return [frozen(each) for each in ordered]

@@ -1,0 +1,256 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Inverse kinematics: what it finds, in which order, and why it finds nothing."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import count
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from model_robots import chain_texts, ready, robot, ROBOTS, STRAIGHT, table, texts
+import numpy as np
+import pytest
+
+from arm_model import (
+    Array,
+    Clearances,
+    CollisionObject,
+    CommandError,
+    frozen,
+    JointLimits,
+    Plane,
+    Pose,
+    RobotModel,
+    Sphere,
+)
+from arm_planning import PlanningCode, PlanningError
+from arm_planning.ik.link_kinematics import pose_error
+from arm_planning.ik.numeric import random_start
+from arm_planning.ik.solver import ik, IkSolver
+
+SPHERICAL = ('prbt', 'gp110')
+
+seeds = st.integers(0, 10**6)
+
+
+@cache
+def solver(name: str) -> IkSolver:
+    """Return the solver of a robot's tip."""
+    return IkSolver(robot(name))
+
+
+@cache
+def chain(kinds: str) -> RobotModel:
+    """Return a chain of joints."""
+    return RobotModel(*chain_texts(kinds))
+
+
+def drawn(limits: JointLimits, seed: int) -> Array:
+    """Return random positions within limits."""
+    return random_start(limits, np.zeros(len(limits)), np.random.default_rng(seed))
+
+
+def meets(inverse: IkSolver, pose: Pose, positions: Array, tolerance: float) -> bool:
+    """Whether forward kinematics lead to a pose."""
+    error = pose_error(pose, inverse.link.pose(positions))
+    return bool(np.abs(error).max() <= tolerance)
+
+
+@pytest.mark.parametrize('name', SPHERICAL)
+@settings(max_examples=200, deadline=None)
+@given(seed=seeds)
+def test_closed_form_finds_every_solution(name: str, seed: int) -> None:
+    """All meet the pose within the limits, and the one that made the pose is the first."""
+    inverse, limits = solver(name), robot(name).limits
+    positions = drawn(limits, seed)
+    pose = inverse.link.pose(positions)
+    found = inverse.solve(pose, positions)
+    assert found[0] == pytest.approx(positions, abs=1e-6)
+    assert len(found) <= 8
+    away = [float(np.linalg.norm(each - positions)) for each in found]
+    assert away == sorted(away)
+    for each in found:
+        assert meets(inverse, pose, each, 1e-9)
+        assert (each >= limits.lower).all()
+        assert (each <= limits.upper).all()
+
+
+@pytest.mark.parametrize('name', SPHERICAL)
+@settings(max_examples=50, deadline=None)
+@given(seed=seeds)
+def test_solutions_do_not_depend_on_the_one_that_is_asked_from(name: str, seed: int) -> None:
+    """Each solution, as the seed, finds itself first and the same number of solutions."""
+    inverse = solver(name)
+    positions = drawn(robot(name).limits, seed)
+    pose = inverse.link.pose(positions)
+    found = inverse.solve(pose, positions)
+    for each in found:
+        again = inverse.solve(pose, each)
+        assert again[0] == pytest.approx(each, abs=1e-6)
+        assert len(again) == len(found)
+
+
+@pytest.mark.parametrize('name', SPHERICAL)
+@settings(max_examples=50, deadline=None)
+@given(seed=seeds, joints=st.sets(st.integers(0, 5)))
+def test_singular_poses_keep_the_seed(name: str, seed: int, joints: set[int]) -> None:
+    """With joints at zero (straight elbow, straight wrist, both) the seed is a solution still."""
+    inverse = solver(name)
+    positions = drawn(robot(name).limits, seed)
+    positions[list(joints)] = STRAIGHT[name][list(joints)]
+    pose = inverse.link.pose(positions)
+    found = inverse.solve(pose, positions)
+    assert all(meets(inverse, pose, each, 1e-9) for each in found)
+    assert np.abs(found[0] - positions).max() < 1e-5
+
+
+def test_only_arms_with_a_spherical_wrist_have_a_closed_form() -> None:
+    """Others, with seven joints, sliding ones or axes that do not meet, have none."""
+    assert all(solver(name).closed_form for name in SPHERICAL)
+    assert solver('panda').closed_form is None
+    for kinds in ('zyyzyz', 'pyyxyx', 'zyy', 'zyyzyzc'):
+        assert IkSolver(chain(kinds)).closed_form is None
+
+
+def test_closed_form_places_a_link_behind_the_wrist() -> None:
+    """Not the tip alone: any link that the last joint moves; links before it are searched for."""
+    model = robot('gp110')
+    names = [each for each in model.frames if model.kinematics.parent_joint(each) == 6]
+    for name in names:
+        inverse = IkSolver(model, name)
+        pose = model.kinematics.link_pose(name, ready('gp110'))
+        assert inverse.closed_form is not None
+        assert inverse.solve(pose, ready('gp110'))[0] == pytest.approx(ready('gp110'), abs=1e-9)
+    elbow = next(each for each in model.frames if model.kinematics.parent_joint(each) == 3)
+    assert IkSolver(model, elbow).closed_form is None
+
+
+@pytest.mark.parametrize('kinds', ['zyzyzyz', 'czyzyzy', 'pzyyzxz', 'zyyzyc'])
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds)
+def test_numeric_solutions_meet_the_pose(kinds: str, seed: int) -> None:
+    """Of redundant, continuous and sliding joints: within limits, next to the seed."""
+    model = chain(kinds)
+    inverse = IkSolver(model)
+    positions = drawn(model.limits, seed)
+    start = drawn(model.limits, seed + 1)
+    pose = inverse.link.pose(positions)
+    found = inverse.solve(pose, start, timeout=5.0)
+    for each in found:
+        assert meets(inverse, pose, each, 1e-6)
+        assert (each >= model.limits.lower).all()
+        assert (each <= model.limits.upper).all()
+        turned = np.abs(each - start)[model.limits.continuous]
+        assert (turned <= np.pi + 1e-9).all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds)
+def test_panda_is_solved_from_anywhere(seed: int) -> None:
+    """Seven joints: a pose of random joints, from another random seed."""
+    model, inverse = robot('panda'), solver('panda')
+    pose = inverse.link.pose(drawn(model.limits, seed))
+    found = inverse.solve(pose, drawn(model.limits, seed + 1), timeout=5.0)
+    assert meets(inverse, pose, found[0], 1e-6)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_the_seed_is_its_own_solution(name: str) -> None:
+    """From the joints that made it, a pose has these joints."""
+    found = ik(robot(name), solver(name).link.pose(ready(name)), seed=ready(name))
+    assert found[0] == pytest.approx(ready(name), abs=1e-9)
+
+
+def test_several_solutions_of_a_redundant_arm() -> None:
+    """As many different ones as asked for, nearest first."""
+    pose, seed = solver('panda').link.pose(ready('panda')), ready('panda')
+    found = solver('panda').solve(pose, seed, timeout=10.0, count=4)
+    assert len(found) == 4
+    away = [float(np.linalg.norm(each - seed)) for each in found]
+    assert away == sorted(away)
+    assert len({tuple(np.round(each, 2)) for each in found}) == 4
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_out_of_reach_is_measured(name: str) -> None:
+    """The message says by how much."""
+    pose = solver(name).link.pose(ready(name))
+    far = Pose(pose.rotation, pose.position + np.array([9.0, 0.0, 0.0]))
+    with pytest.raises(PlanningError, match=r'out of reach by [5-9]\.\d{3} m') as refused:
+        solver(name).solve(far, ready(name))
+    assert refused.value.code is PlanningCode.NO_IK_SOLUTION
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_limits_are_named(name: str) -> None:
+    """Where only joints beyond their limits would reach the pose, one is named."""
+    here, limits = ready(name), table(name)
+    for joint, position in zip(robot(name).joints, here.tolist(), strict=True):
+        narrow = {'min_position': position - 0.05, 'max_position': position + 0.05}
+        limits[joint] = {**limits[joint], 'has_position_limits': True, **narrow}
+    moved = here.copy()
+    moved[:2] += 0.3
+    pose, narrowed = solver(name).link.pose(moved), RobotModel(*texts(name), limits)
+    joints = '|'.join(narrowed.joints)
+    with pytest.raises(PlanningError, match=rf'beyond the limits.*({joints}) at') as refused:
+        ik(narrowed, pose, seed=here)
+    assert refused.value.code is PlanningCode.NO_IK_SOLUTION
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_contact_of_all_solutions_names_the_pair(name: str) -> None:
+    """A ball where the flange is wanted touches it in every solution."""
+    inverse, scene = solver(name), robot(name).scene
+    pose = inverse.link.pose(ready(name))
+    blocked = scene.with_object(CollisionObject('ball', Sphere(0.2), pose=pose))
+    with pytest.raises(PlanningError, match=r'ball overlap by \d+') as refused:
+        inverse.solve(pose, ready(name), blocked)
+    assert refused.value.code is PlanningCode.NO_IK_SOLUTION
+
+
+@pytest.mark.parametrize('name', SPHERICAL)
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds)
+def test_solutions_in_contact_are_left_out(name: str, seed: int) -> None:
+    """With a floor, those that are free of contact are left, in the same order."""
+    inverse, model = solver(name), robot(name)
+    positions = drawn(model.limits, seed)
+    pose = inverse.link.pose(positions)
+    floor = model.scene.with_object(CollisionObject('floor', Plane(offset=-0.3)))
+    clearances = Clearances(floor)
+    every = inverse.solve(pose, positions)
+    free = [each for each in every if not clearances.contacts(each)]
+    if free:
+        assert np.array_equal(inverse.solve(pose, positions, floor), free)
+    else:
+        with pytest.raises(PlanningError, match='in contact'):
+            inverse.solve(pose, positions, floor)
+
+
+def test_time_out_is_that_of_the_clock() -> None:
+    """No start is begun after it; one is made however short it is."""
+    ticks = count(0.0, 1.0)
+    inverse = IkSolver(robot('panda'), clock=lambda: next(ticks))
+    pose = inverse.link.pose(ready('panda'))
+    far = Pose(pose.rotation, pose.position + np.array([3.0, 0.0, 0.0]))
+    with pytest.raises(PlanningError, match='in 3 starts'):
+        inverse.solve(far, ready('panda'), timeout=2.5)
+    assert inverse.solve(pose, ready('panda'), timeout=0.0)
+
+
+def test_what_is_no_pose_is_refused() -> None:
+    """A NaN, a mirrored rotation, too few joints, an unknown link."""
+    pose = solver('prbt').link.pose(ready('prbt'))
+    with pytest.raises(CommandError, match='finite'):
+        solver('prbt').solve(Pose(pose.rotation, frozen([0.0, np.nan, 0.0])), ready('prbt'))
+    with pytest.raises(PlanningError, match='mirror'):
+        solver('prbt').solve(Pose(-np.eye(3), pose.position), ready('prbt'))
+    with pytest.raises(CommandError, match='seed'):
+        solver('prbt').solve(pose, [0.0])
+    with pytest.raises(PlanningError, match='choose one of') as refused:
+        IkSolver(robot('prbt'), 'hand')
+    assert refused.value.code is PlanningCode.INVALID_LINK_NAME
+    with pytest.raises(PlanningError, match='no joint of group'):
+        IkSolver(robot('prbt'), robot('prbt').base)
