@@ -43,6 +43,7 @@ setup(
     install_requires=[
         'rich>=13',
         sibling('libraries/demo_runner'),
+        sibling('libraries/node_runner'),
         sibling('libraries/process_supervisor'),
         sibling('quad_controller'),
         sibling('quad_description'),

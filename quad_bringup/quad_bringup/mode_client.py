@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
+from node_runner import LATCHED
 from process_supervisor import CallError
 from process_supervisor.graph_client import GraphClient
 from quad_msgs.srv import SetMode
@@ -20,7 +20,6 @@ RETRY_PERIOD = 0.2
 """Time in [s] between that."""
 STATE_TOPIC = 'controller_node/state'
 """Topic on which the controller publishes what it is doing."""
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class ModeClient(GraphClient):

@@ -13,11 +13,10 @@ from canopen_interfaces.msg import COData
 from canopen_interfaces.srv import CORead, COWrite
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from node_runner import destroyed_when_refused
+from node_runner import destroyed_when_refused, LATCHED
 
 from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
@@ -46,8 +45,6 @@ NMT_SERVICES: dict[str, NmtCommand] = {
     'nmt_reset_communication': NmtCommand.RESET_COMMUNICATION,
 }
 """Services and the NMT commands that they send; ros2_canopen has the first and the fourth."""
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class DeviceNode(Node):

@@ -10,18 +10,17 @@ import time
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+
+from node_runner import LATCHED
 
 from ..cia402.drive_view import DriveView
 from ..exceptions import CanopenError
 from ..joints.aggregator import JointAggregator, JointSample, JointSet
 from ..joints.robot_joints import movable_joints, RobotJoint
 from .output_thread import OutputThread
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class DriveJointStates:

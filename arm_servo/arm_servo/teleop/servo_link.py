@@ -16,13 +16,12 @@ from moveit_msgs.srv import ServoCommandType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 from arm_model import ArmNames, ModelError
-from node_runner import ParameterReader
+from node_runner import LATCHED, ParameterReader
 
 from .jog import Frame, Jog, JointJog, Vector
 from .requests import CommandType
@@ -32,7 +31,6 @@ from .servo_settings import ServoSettings, SettingsClient
 
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 STATUS_TIMEOUT = 1.0  # [s] after which a status is history
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @dataclass(frozen=True, slots=True)

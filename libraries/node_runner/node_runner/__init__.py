@@ -9,12 +9,14 @@ from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
 from .parameter_reader import ParameterReader
 from .program import run_node, run_program
+from .qos import LATCHED
 from .readiness import notify_ready
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .signals import stop_on_signals
 from .spinning import LINGER, make_executor, spin, WAKE_PERIOD
 
 __all__ = [
+    'LATCHED',
     'LINGER',
     'WAKE_PERIOD',
     'ParameterError',

@@ -105,17 +105,26 @@ class ParameterReader:
     def accept_former_name(self, former: str, name: str) -> None:
         """Take what is given under a former name for a parameter, with a warning; then declare it.
 
+        That holds for what a client sets later, too: a parameter that cannot be changed then is
+        refused under its present name.
+
         Args:
             former: Name that the parameter had.
             name: Name that it has.
         """
+        former, name = self._prefix + former, self._prefix + name
+
+        def renamed(parameter: Parameter) -> Parameter:
+            self._warn(f'parameter {former} is called {name} now')
+            return Parameter(name, value=parameter.value)
+
         overrides = self._node._parameter_overrides  # noqa: SLF001  # no public way to read it
-        given = overrides.pop(self._prefix + former, None)
+        given = overrides.pop(former, None)
         if given is not None:
-            self._warn(f'parameter {self._prefix}{former} is called {self._prefix}{name} now')
-            overrides.setdefault(
-                self._prefix + name, Parameter(self._prefix + name, value=given.value)
-            )
+            overrides.setdefault(name, renamed(given))
+        self._node.add_pre_set_parameters_callback(
+            lambda parameters: [renamed(p) if p.name == former else p for p in parameters]
+        )
 
     def _warn(self, text: str) -> None:
         self._node.get_logger().warning(f'{text}; the former name is accepted for a while')

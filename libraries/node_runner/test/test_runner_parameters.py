@@ -164,3 +164,19 @@ def test_former_names_count_and_are_warned_of(isolation: Isolation) -> None:
         read = ParameterReader(node)
         read.accept_former_name('pace', 'speed')
         assert read.number('speed', 1.0, SPAN, 'a ratio') == 0.7
+
+
+@pytest.mark.parametrize(('fixed', 'reason'), [(False, ''), (True, 'read-only')])
+def test_a_former_name_counts_for_what_is_set_later(
+    isolation: Isolation, capfd: pytest.CaptureFixture[str], *, fixed: bool, reason: str
+) -> None:
+    """As at the start; a parameter that is fixed is refused under its present name."""
+    with node_with(isolation) as node:
+        read = ParameterReader(node, 'gait.', fixed=fixed)
+        read.accept_former_name('pace', 'speed')
+        read.number('speed', 1.0, SPAN, 'a ratio')
+        result = node.set_parameters_atomically([Parameter('gait.pace', value=0.7)])
+        assert (result.successful, reason in result.reason) == (not fixed, True)
+        assert node.get_parameter('gait.speed').value == (1.0 if fixed else 0.7)
+        assert not node.has_parameter('gait.pace')
+        assert 'parameter gait.pace is called gait.speed now' in capfd.readouterr().err

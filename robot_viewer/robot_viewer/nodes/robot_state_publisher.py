@@ -12,7 +12,7 @@ import time
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.time import Time
 from rclpy.utilities import remove_ros_args
@@ -21,14 +21,13 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from urdf_reader import DescriptionError, JointKind, read_urdf
 
-from node_runner import destroyed_when_refused, notify_ready, ParameterError, run_node
+from node_runner import destroyed_when_refused, LATCHED, notify_ready, ParameterError, run_node
 
 from ..joint_watch import JointWatch
 from ..state_publisher import FrameTransform, Remark, StatePublisher
 from .parameters import check, declare, DESCRIPTION, read_settings
 
 NAME = 'robot_state_publisher'
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TF_DEPTH = 100
 """Queue of /tf, as tf2_ros has it."""
 WATCH_PERIOD = 1.0

@@ -15,10 +15,10 @@ from geometry_msgs.msg import TwistStamped
 from moveit_msgs.msg import ServoStatus
 import numpy as np
 from rclpy.action.client import ActionClient
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import Array, RobotModel
+from node_runner import LATCHED
 from process_supervisor import CallError
 
 from ..client import ArmClient
@@ -26,7 +26,6 @@ from ..figures import AxisFigures
 from .figures import MotionFigures
 from .samples import cycles_between, peak_jerk, Sample
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ANSWER_TIMEOUT = 15.0
 """Longest time for an answer in [s]."""
 

@@ -15,12 +15,12 @@ from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
 from control_msgs.srv import QueryTrajectoryState
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import ArmError
 from arm_model.ros import seconds
 from arm_trajectory import TrajectoryGoal
+from node_runner import LATCHED
 
 from ...core.execution import Execution
 from ...core.gateway import CommandGateway, MotionCommand
@@ -31,9 +31,6 @@ from .action import TrajectoryAction
 from .messages import difference, goal_of_action, goal_of_trajectory, point_of
 from .parameters import TrajectoryParameters
 from .pause import TrajectoryPause
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-"""For a value that counts until the next one."""
 
 
 class TrajectoryController:
