@@ -12,6 +12,7 @@ from arm_canopen import BusConfig, CanopenError, load_bus, open_bus
 from arm_canopen.config.drive_units import reported_increments
 
 from .host import DeviceHost
+from .node_id_check import NodeIdCheck
 from .objects.parameter_memory import ParameterMemory
 from .runner import DeviceRunner
 
@@ -73,12 +74,14 @@ def simulated_devices(
     Raises:
         ConfigError: The bus.yml or an EDS is wrong.
         BusError: The bus cannot be opened.
-        CanopenError: The bus has no such drive, or it cannot report such a position.
+        CanopenError: The bus has no such drive, or it cannot report such a position; or devices
+            with these node ids are on it already.
     """
     config = load_bus(bus_config)
     with open_bus(bus) as can:
         runner = DeviceRunner(can)
         add_devices(runner.host, config, positions)
+        NodeIdCheck(can, [device.node_id for device in runner.host.devices]).finish()
         runner.start()
         try:
             yield runner

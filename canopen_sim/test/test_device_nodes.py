@@ -102,6 +102,28 @@ def test_all_slaves_of_the_article(
 
 
 @pytest.mark.scenario
+def test_node_ids_that_are_on_the_bus_are_refused(
+    folder: Path, processes: list[subprocess.Popen[str]]
+) -> None:
+    """A second set of drives ends with words; the first goes on."""
+    name = free_multicast()
+    with open_bus(name) as bus:
+        first = start('fake_slave', node_id=2, slave_config=str(EDS), can_interface_name=name)
+        processes.append(first)
+        deadline = time.monotonic() + ARRIVAL
+        while not any(frame.can_id == 0x702 for frame in bus.receive(0.5)):
+            assert time.monotonic() < deadline
+            assert first.poll() is None, output(first)
+    second = start('fake_slaves', bus_config=str(folder / 'bus.yml'), can_interface_name=name)
+    processes.append(second)
+    text = output(second)
+    assert second.returncode == 1, text
+    assert f'{name} has devices with these node ids already' in text
+    assert 'of node id 2. End the other' in text
+    assert first.poll() is None, output(first)
+
+
+@pytest.mark.scenario
 def test_one_slave(processes: list[subprocess.Popen[str]]) -> None:
     """One drive with the given id, made from an EDS."""
     name = free_multicast()

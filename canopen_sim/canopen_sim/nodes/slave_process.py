@@ -28,6 +28,7 @@ from node_runner import (
 from ..faults.scenario import ScenarioPlayer
 from ..faults.scenario_file import load_scenario
 from ..host import DeviceHost
+from ..node_id_check import NodeIdCheck
 from ..objects.parameter_memory import ParameterFile, ParameterMemory
 from ..runner import DeviceRunner
 from .fault_services import FaultServices
@@ -112,11 +113,13 @@ def _run(node: Node, populate: Populate, stop: threading.Event) -> None:
     with open_bus(interface) as bus:
         runner = DeviceRunner(bus)
         population = populate(node, runner.host)
+        check = NodeIdCheck(bus, [device.node_id for device in runner.host.devices])
         _play_scenario(node, runner.host, population)
         priority = declare_thread_priority(ParameterReader(node), THREAD_PRIORITY)
         refuse_misspelt(node)
         FaultServices(node, runner, population.names)
         settle_process_memory(node)
+        check.finish()
         runner.start(
             lambda: raise_thread_priority(node, priority, 'the loop of the simulated devices')
         )
