@@ -65,9 +65,9 @@ class NodeIdCheck:
         Raises:
             CanopenError: There are such devices; the message names their frames and the remedy.
         """
-        while not self.found and (left := self._until - self._clock()) > 0.0:
-            if not self._receive(left):
-                break
+        readable = self._receive(0.0)  # what came beside other work, however long that took
+        while readable and not self.found and (left := self._until - self._clock()) > 0.0:
+            readable = self._receive(left)
         if self.found:
             raise CanopenError(
                 f'{self._bus.name} has devices with these node ids already; received: '

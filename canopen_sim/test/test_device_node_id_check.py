@@ -52,6 +52,16 @@ def test_a_device_that_answers_is_found() -> None:
             devices.stop()
 
 
+def test_an_answer_counts_after_other_work_that_took_long() -> None:
+    """It has been received meanwhile."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as other:
+        check = NodeIdCheck(bus, [NODE_ID], StoppedClock(10.0))
+        other.send(Frame(0x585, bytes(8)))
+        with pytest.raises(CanopenError, match='0x585'):
+            check.finish()
+
+
 @pytest.mark.parametrize(
     ('frame', 'found'),
     [
