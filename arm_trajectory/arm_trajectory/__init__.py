@@ -17,12 +17,16 @@ from .execution.speed_scaling import TimerState, TrajectoryTimer
 from .execution.tolerances import merge_tolerances, Tolerances
 from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
+from .paths.bounds import Excess, farthest_beyond
 from .paths.goal_path import build_path
-from .paths.path import Path
+from .paths.path import Path, PathPoint, quintics, Segment
 from .paths.path_check import PathCheck, PathContact
+from .paths.time_scaling import Demand, Timing
 
 __all__ = [
     'CatchUpInterpolator',
+    'Demand',
+    'Excess',
     'GoalCode',
     'GoalError',
     'GoalPoint',
@@ -32,15 +36,20 @@ __all__ = [
     'Path',
     'PathCheck',
     'PathContact',
+    'PathPoint',
     'Plan',
+    'Segment',
     'StateMovedError',
     'TimerState',
+    'Timing',
     'Tolerances',
     'TrajectoryGoal',
     'TrajectoryTimer',
     'brakeable',
     'brakeable_velocity',
     'build_path',
+    'farthest_beyond',
     'hard_brake',
     'merge_tolerances',
+    'quintics',
 ]

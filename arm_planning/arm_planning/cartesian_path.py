@@ -1,0 +1,218 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Straight lines through way-points, as MoveIt's compute_cartesian_path has them.
+
+Joint positions are found at places at most ``max_step`` apart, each next to those before. The path
+ends in front of the first place that has none, that is in contact, or to which joints would jump;
+the fraction says how far it goes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+import math
+
+import numpy as np
+
+from arm_model import (
+    Array,
+    checked,
+    Clearances,
+    frozen,
+    JointLimits,
+    Mask,
+    PlanningScene,
+    Pose,
+    RobotModel,
+)
+
+from .curves import Line
+from .exceptions import PlanningCode, PlanningError
+from .ik.link_kinematics import LinkKinematics
+from .ik.numeric import descend
+from .ik.solver import check_pose
+
+MIN_STEPS_FOR_JUMPS = 10
+"""Steps of a path at least for which a jump is judged by the mean step, as in MoveIt."""
+
+MAX_STEPS = 100_000
+"""Places on a path at most."""
+
+ROTATION_STEP = 0.05
+"""Greatest rotation between two places in [rad], where the way says less."""
+
+
+@dataclass(frozen=True, slots=True)
+class JumpThresholds:
+    """What counts as a jump of the joints between two places; 0 does not look.
+
+    Attributes:
+        relative: Times the mean step of the path, in joint space.
+        revolute: Greatest step of a joint that turns in [rad].
+        prismatic: Greatest step of a joint that slides in [m].
+    """
+
+    relative: float = 0.0
+    revolute: float = 0.0
+    prismatic: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse thresholds that are none."""
+        for name in ('relative', 'revolute', 'prismatic'):
+            value = getattr(self, name)
+            if not value >= 0.0:
+                raise PlanningError(
+                    PlanningCode.INVALID_GOAL_CONSTRAINTS,
+                    f'{name} jump threshold is {value}; give 0, or more',
+                )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CartesianPath:
+    """Joint positions along way-points.
+
+    Attributes:
+        positions: Joint positions in [rad] (k, n), the start among them.
+        fraction: Share of the way that they lead, from 0 to 1.
+        reason: Why they end there, in words; empty where they lead to the end.
+    """
+
+    positions: Array
+    fraction: float
+    reason: str
+
+
+def cartesian_path(
+    model: RobotModel,
+    start: Sequence[float] | Array,
+    waypoints: Sequence[Pose],
+    max_step: float,
+    *,
+    link: str = '',
+    jumps: JumpThresholds | None = None,
+    scene: PlanningScene | None = None,
+    is_valid: Callable[[Array], bool] | None = None,
+) -> CartesianPath:
+    """Return joint positions along straight lines through way-points.
+
+    Args:
+        model: The arm.
+        start: Joint positions to begin at in [rad] (n).
+        waypoints: Poses of the link in the root link.
+        max_step: Greatest way of the link between two places in [m].
+        link: The link; empty for the tip.
+        jumps: What counts as a jump; None does not look.
+        scene: Where the arm must be free of contact; None does not look.
+        is_valid: What else must hold at each place, such as path constraints.
+
+    Raises:
+        PlanningError: There is no way-point, no step, or no such link.
+        CommandError: A number is not finite, or there are too few or too many.
+    """
+    here = checked(start, len(model), 'start')
+    follower = _Follower(model, link, scene, is_valid)
+    lines = _lines(follower.link, here, waypoints)
+    counts = _counts(lines, max_step)
+    rows, reason = [here], ''
+    for line, count in zip(lines, counts, strict=True):
+        for number in range(1, count + 1):
+            row, reason = follower.step(line.at(number / count), rows[-1])
+            if reason:
+                break
+            rows.append(row)
+        if reason:
+            break
+    positions = np.array(rows)
+    if jumps is not None:
+        turning = model.kinematics.projected(follower.link.axes(here))[3:]
+        slides = np.abs(turning).max(axis=0) == 0.0
+        kept = _first_jump(positions, jumps, slides)
+        if kept < len(positions):
+            positions, reason = positions[:kept], _jump_reason(positions, kept, model.limits)
+    total = sum(counts)
+    fraction = 1.0 if total == 0 else (len(positions) - 1) / total
+    if reason:
+        reason = f'the path ends at {fraction:.1%}: {reason}'
+    return CartesianPath(frozen(positions), fraction, reason)
+
+
+class _Follower:
+    """Finds the joint positions of the next place."""
+
+    def __init__(
+        self,
+        model: RobotModel,
+        link: str,
+        scene: PlanningScene | None,
+        is_valid: Callable[[Array], bool] | None,
+    ) -> None:
+        self.link = LinkKinematics(model, link)
+        self._limits = model.limits
+        self._clearances = None if scene is None else Clearances(scene)
+        self._is_valid = is_valid
+
+    def step(self, pose: Pose, before: Array) -> tuple[Array, str]:
+        """Return positions for a pose next to others, or why there are none."""
+        end = descend(self.link, pose, before, self._limits.lower, self._limits.upper)
+        if not end.converged:
+            way, turn = np.linalg.norm(end.error[:3]), np.linalg.norm(end.error[3:])
+            return before, (
+                f'no joint positions within the limits next to it; {1e3 * way:.1f} mm and'
+                f' {turn:.3f} rad are left'
+            )
+        if self._clearances is not None:
+            contacts = self._clearances.contacts(end.positions)
+            if contacts:
+                first, second = contacts[0].bodies
+                depth = 1e3 * contacts[0].depth
+                return before, f'{first} and {second} overlap by {depth:.1f} mm next to it'
+        if self._is_valid is not None and not self._is_valid(end.positions):
+            return before, 'a constraint is violated next to it'
+        return end.positions, ''
+
+
+def _lines(link: LinkKinematics, start: Array, waypoints: Sequence[Pose]) -> list[Line]:
+    if not waypoints:
+        raise PlanningError(
+            PlanningCode.INVALID_GOAL_CONSTRAINTS, 'no way-points; give one at least'
+        )
+    lines, begin = [], link.pose(start)
+    for pose in waypoints:
+        check_pose(pose)
+        lines.append(Line(begin, pose))
+        begin = pose
+    return lines
+
+
+def _counts(lines: Sequence[Line], max_step: float) -> list[int]:
+    """Return the number of steps of each line."""
+    if not max_step > 0.0:
+        raise PlanningError(
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
+            f'max_step is {max_step} m; give a positive one, such as 0.01',
+        )
+    counts = [math.ceil(max(line.length / max_step, line.angle / ROTATION_STEP)) for line in lines]
+    if sum(counts) > MAX_STEPS:
+        raise PlanningError(
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
+            f'{sum(counts)} steps of {max_step} m; {MAX_STEPS} are allowed: give a greater step',
+        )
+    return counts
+
+
+def _first_jump(positions: Array, jumps: JumpThresholds, slides: Mask) -> int:
+    """Return how many rows come before the first jump."""
+    steps = np.abs(np.diff(positions, axis=0))
+    most = np.where(slides, jumps.prismatic or np.inf, jumps.revolute or np.inf)
+    jumped = (steps > most).any(axis=1)
+    if jumps.relative and len(steps) >= MIN_STEPS_FOR_JUMPS:
+        lengths = np.linalg.norm(steps, axis=1)
+        jumped |= lengths > jumps.relative * lengths.mean()
+    return int(jumped.argmax()) + 1 if jumped.any() else len(positions)
+
+
+def _jump_reason(positions: Array, kept: int, limits: JointLimits) -> str:
+    step = np.abs(positions[kept] - positions[kept - 1])
+    joint = int(step.argmax())
+    return f'{limits.names[joint]} would jump by {step[joint]:.3f}'

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Curves that a link follows: lines and arcs, turning about one axis on the way."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from arm_model import Array, Pose
+
+from .exceptions import PlanningCode, PlanningError
+
+MAX_RADIUS_DIFFERENCE = 1e-2
+"""Greatest difference of the radii at start and goal of an arc in [m], as in Pilz' planner."""
+
+COLLINEAR_TOLERANCE = 1e-5
+"""Length of the cross product below which points are on a line, as in Pilz' planner."""
+
+
+class Curve(Protocol):
+    """A way of a link, by a parameter from 0 to 1."""
+
+    @property
+    def length(self) -> float:
+        """Length of the way of its origin in [m]."""
+
+    @property
+    def angle(self) -> float:
+        """Angle by which it turns in [rad]."""
+
+    def at(self, share: float) -> Pose:
+        """Return the pose at a share of the way, in the root link."""
+
+    def twist(self, share: float) -> Array:
+        """Return the derivative by the share (6), linear before angular, in the root link."""
+
+    def nearest(self, position: Array) -> float:
+        """Return the share of the way that is nearest to a position."""
+
+
+class _Turning:
+    """A rotation about one axis that is fixed in the root link."""
+
+    def __init__(self, start: Array, end: Array) -> None:
+        self._start = start
+        self._vector: Array = pin.log3(end @ start.T)
+        self.angle = float(np.linalg.norm(self._vector))
+
+    def at(self, share: float) -> Array:
+        turned: Array = pin.exp3(share * self._vector) @ self._start
+        return turned
+
+    @property
+    def rate(self) -> Array:
+        return self._vector
+
+
+class Line:
+    """A straight line between two poses."""
+
+    def __init__(self, start: Pose, end: Pose) -> None:
+        """Draw.
+
+        Args:
+            start: Where it begins, in the root link.
+            end: Where it ends.
+        """
+        self._turning = _Turning(start.rotation, end.rotation)
+        self._start, self._way = start.position, end.position - start.position
+        self._twist = np.concatenate((self._way, self._turning.rate))
+        self.length = float(np.linalg.norm(self._way))
+        self.angle = self._turning.angle
+
+    def at(self, share: float) -> Pose:
+        """Return the pose at a share of the way."""
+        return Pose(self._turning.at(share), self._start + share * self._way)
+
+    def twist(self, share: float) -> Array:
+        """Return the derivative by the share, which is the same everywhere."""
+        del share
+        return self._twist
+
+    def nearest(self, position: Array) -> float:
+        """Return the share of the way that is nearest to a position."""
+        return float((position - self._start) @ self._way) / max(self.length**2, 1e-18)
+
+
+class Arc:
+    """A part of a circle between two poses."""
+
+    def __init__(self, start: Pose, end: Pose, center: Array, normal: Array, sweep: float) -> None:
+        """Draw; :func:`arc_through` and :func:`arc_around` find the circle.
+
+        Args:
+            start: Where it begins, in the root link.
+            end: Where it ends.
+            center: Center of the circle in [m].
+            normal: Unit vector about which it turns.
+            sweep: Angle of the arc in [rad].
+        """
+        self._turning = _Turning(start.rotation, end.rotation)
+        self._center, self._sweep = center, sweep
+        self._first = start.position - center
+        self._second = np.cross(normal, self._first)
+        self.length = float(np.linalg.norm(self._first)) * sweep
+        self.angle = self._turning.angle
+
+    def at(self, share: float) -> Pose:
+        """Return the pose at a share of the way."""
+        turn = share * self._sweep
+        around = math.cos(turn) * self._first + math.sin(turn) * self._second
+        return Pose(self._turning.at(share), self._center + around)
+
+    def twist(self, share: float) -> Array:
+        """Return the derivative by the share."""
+        turn = share * self._sweep
+        along = math.cos(turn) * self._second - math.sin(turn) * self._first
+        return np.concatenate((self._sweep * along, self._turning.rate))
+
+    def nearest(self, position: Array) -> float:
+        """Return the share of the way that is nearest to a position."""
+        off = position - self._center
+        turn = math.atan2(float(off @ self._second), float(off @ self._first))
+        middle = 0.5 * self._sweep  # the turn that is nearest to the middle of the arc
+        return (turn + 2.0 * math.pi * round((middle - turn) / (2.0 * math.pi))) / self._sweep
+
+
+def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
+    """Return the arc through a point.
+
+    Args:
+        start: Where it begins, in the root link.
+        interim: A point on it in [m].
+        end: Where it ends.
+
+    Raises:
+        PlanningError: The three are on a line, or two of them are one.
+    """
+    first, second = interim - start.position, end.position - start.position
+    across = np.cross(first, second)
+    size = float(np.linalg.norm(across))
+    if size < COLLINEAR_TOLERANCE:
+        raise _no_circle(
+            'start, interim point and goal are on a line; move the interim point off it, or use'
+            ' LIN'
+        )
+    # of the circle about a triangle
+    center = start.position + np.cross(
+        (first @ first) * second - (second @ second) * first, across
+    ) / (2.0 * size**2)
+    normal = across / size
+    return Arc(start, end, center, normal, _sweep(start.position, end.position, center, normal))
+
+
+def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
+    """Return the shorter arc about a center.
+
+    Args:
+        start: Where it begins, in the root link.
+        center: Center of the circle in [m].
+        end: Where it ends.
+
+    Raises:
+        PlanningError: The radii differ, or the three are on a line, as with half a circle.
+    """
+    first, last = start.position - center, end.position - center
+    radii = float(np.linalg.norm(first)), float(np.linalg.norm(last))
+    if abs(radii[0] - radii[1]) > MAX_RADIUS_DIFFERENCE:
+        raise _no_circle(
+            f'the start is {radii[0]:.4f} m from the center, the goal {radii[1]:.4f} m; they may'
+            f' differ by {MAX_RADIUS_DIFFERENCE:g} m'
+        )
+    across = np.cross(first, last)
+    size = float(np.linalg.norm(across))
+    if size < COLLINEAR_TOLERANCE:
+        raise _no_circle(
+            'start, center and goal are on a line, which makes no plane (half a circle, or none);'
+            ' give an interim point'
+        )
+    # through start and goal exactly: the center on the plane between them that is nearest
+    chord = end.position - start.position
+    middle = 0.5 * (start.position + end.position)
+    chord /= np.linalg.norm(chord)
+    center = center - ((center - middle) @ chord) * chord
+    normal = across / size
+    return Arc(start, end, center, normal, _sweep(start.position, end.position, center, normal))
+
+
+def _sweep(start: Array, end: Array, center: Array, normal: Array) -> float:
+    """Return the angle from start to end about a normal in [rad], from 0 to a whole turn."""
+    first, last = start - center, end - center
+    turn = math.atan2(float(np.cross(first, last) @ normal), float(first @ last))
+    return turn % (2.0 * math.pi)
+
+
+def _no_circle(reason: str) -> PlanningError:
+    return PlanningError(PlanningCode.INVALID_MOTION_PLAN, f'CIRC: {reason}')

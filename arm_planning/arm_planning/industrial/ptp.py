@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""PTP: all joints straight to the goal, in phase.
+
+Each joint keeps its own limits: the profile is that of the joint that needs longest, and the
+others have shares of it. Pilz' planner gives every joint the strictest limits of all, which is
+never quicker, and keeps no limit better.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arm_model import Array, JointLimits
+from arm_trajectory import brakeable, Path, Segment
+
+from .timing import FullSpeedPath
+
+STANDSTILL = 1e-3
+"""How long a motion takes that has no way in [s]."""
+
+NO_WAY = 1e-9
+"""Greatest way of a joint that counts as none in [rad]."""
+
+
+def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
+    """Return the path at full speed.
+
+    Args:
+        start: Joint positions at its begin in [rad].
+        goal: Joint positions at its end in [rad].
+        limits: Limits of the joints, with the factors of the request.
+    """
+    way = goal - start
+    size = np.abs(way)
+    if size.max() < NO_WAY:
+        return standstill(goal)
+    sizes = np.maximum(size, np.finfo(float).tiny)
+    speed, acceleration, jerk = (  # of the share of the way
+        float((limit / sizes).min())
+        for limit in (limits.velocity, limits.acceleration, limits.jerk)
+    )
+    # a short way ends before the full speed
+    peak = float(brakeable(np.array(0.5), np.array(acceleration), np.array(jerk)))
+    speed = min(speed, peak)
+    coefficients = np.zeros((6, len(way)))
+    coefficients[0], coefficients[1] = start, way * speed
+    path = Path([Segment(0.0, 1.0 / speed, coefficients)])
+    return FullSpeedPath(path, acceleration / speed, jerk / speed, straight=True)
+
+
+def standstill(positions: Array) -> FullSpeedPath:
+    """Return a path that stays where it is.
+
+    Args:
+        positions: Joint positions in [rad].
+    """
+    coefficients = np.zeros((6, len(positions)))
+    coefficients[0] = positions
+    return FullSpeedPath(
+        Path([Segment(0.0, STANDSTILL, coefficients)]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
+    )

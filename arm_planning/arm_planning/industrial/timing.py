@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a path at full speed to one from rest to rest within the limits of the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from arm_model import Array, frozen, JointLimits, RobotState
+from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Segment, Timing
+
+MAX_SPACING = 0.02
+"""Greatest length of a segment of a path that is not straight in [s]."""
+
+MIN_SPACING = 1e-4
+"""Places that are nearer than this in time count as one in [s]."""
+
+SPEEDS = (0.75, 0.55, 0.4, 0.3, 0.2)
+"""Shares of the full speed that are tried one after the other, while they make a path quicker.
+
+A path that slows down at many places is quicker at an even speed.
+"""
+
+SLOW = 1.15
+"""How much longer a path may take for its joints before an even speed is tried."""
+
+QUANTITIES = ('speed', 'acceleration', 'jerk')
+"""Names of what is limited."""
+
+SLOWER_MARGIN = 1.001
+"""Factor for rounding where a whole path is followed slower."""
+
+NEGLIGIBLE_SLOWDOWN = 1.01
+"""Factor by which a path may take longer without a note."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FullSpeedPath:
+    """A path by the time that it takes at full speed, and how it begins and ends.
+
+    Attributes:
+        path: The joints by time at full speed; its velocity and acceleration do not jump.
+        acceleration: Greatest change of the speed, as a share of the full one, in [1/s].
+        jerk: Greatest change of that in [1/s2].
+        straight: Whether joints keep the limits by these two alone, all in phase.
+        notes: What a person should know of it.
+    """
+
+    path: Path
+    acceleration: float
+    jerk: float
+    straight: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ...]]:
+    """Return a path from rest to rest within the limits, and where it is slower for them.
+
+    Args:
+        full: The path at full speed.
+        limits: Limits of the joints, with the factors of the request.
+    """
+    if not full.path.coefficients[:, 1:].any():  # it stands still
+        return full.path, full.notes
+    path = _from_rest_to_rest(full)
+    if full.straight:
+        return path, full.notes
+    scaled, demand = _within(path, limits)
+    for speed in SPEEDS:
+        if scaled.duration < SLOW * path.duration:
+            break
+        steady = replace(
+            full,
+            path=slower(full.path, 1.0 / speed),
+            acceleration=full.acceleration / speed,
+            jerk=full.jerk / speed,
+        )
+        other, _ = _within(_from_rest_to_rest(steady), limits)
+        if other.duration > scaled.duration:
+            break
+        scaled = other
+    if scaled.duration < NEGLIGIBLE_SLOWDOWN * path.duration:
+        return scaled, full.notes
+    note = (
+        f'takes {scaled.duration:.2f} s instead of {path.duration:.2f} s: slowed to'
+        f' {1.0 / max(demand.time_factor, 1.0):.0%} where {limits.names[demand.joint]} meets its'
+        f' limit of {QUANTITIES[demand.quantity]}'
+    )
+    return scaled, (*full.notes, note)
+
+
+def _within(path: Path, limits: JointLimits) -> tuple[Path, Demand]:
+    """Return a path as quick as its time scaling makes it, and what asked most of it."""
+    timing = Timing(path, limits)
+    scaled = timing.time_scaled()
+    if scaled is None:
+        scaled = slower(path, timing.demand.time_factor * SLOWER_MARGIN)
+    return scaled, timing.plainest
+
+
+def slower(path: Path, factor: float) -> Path:
+    """Return the same path with more time everywhere.
+
+    Args:
+        path: The path.
+        factor: How many times the time.
+    """
+    powers = (factor ** -np.arange(6.0))[:, None]
+    return Path(
+        [
+            replace(
+                each,
+                start=each.start * factor,
+                duration=each.duration * factor,
+                coefficients=each.coefficients * powers,
+            )
+            for each in path.segments
+        ]
+    )
+
+
+def _from_rest_to_rest(full: FullSpeedPath) -> Path:
+    """Return the path with one jerk-limited profile from its begin to its end."""
+    path = full.path
+    profile, lasts = _profile(path.duration, full)
+    begins = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
+    end = float(lasts.sum())
+    times = np.append(begins, end)
+    if not full.straight:
+        grid = np.linspace(0.0, end, int(np.ceil(end / MAX_SPACING)) + 1)
+        fine = np.linspace(0.0, end, 4 * len(grid))
+        along, _, _ = _evaluated(profile, begins, fine)
+        crossings = np.interp(path.starts[1:], along, fine)
+        times = np.unique(np.concatenate((times, grid, crossings)))
+        keep = np.diff(times, prepend=-1.0) > MIN_SPACING
+        keep[-1] = True
+        times = times[keep]
+        if len(times) > 2 and times[-1] - times[-2] <= MIN_SPACING:
+            times = np.delete(times, -2)
+    along, rate, bend = _evaluated(profile, begins, times)
+    along = np.clip(along, 0.0, path.duration)
+    numbers = np.maximum(np.searchsorted(path.starts, along, side='right') - 1, 0)
+    q, first, second = (
+        path.derived(order, numbers, along - path.starts[numbers]) for order in range(3)
+    )
+    velocity = first * rate[:, None]
+    acceleration = second * (rate**2)[:, None] + first * bend[:, None]
+    lengths = np.diff(times)
+    pieces = quintics(lengths, q, velocity, acceleration)
+    return Path(
+        [
+            Segment(*each)
+            for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
+        ]
+    )
+
+
+def _profile(
+    length: float, full: FullSpeedPath
+) -> tuple[tuple[Array, Array, Array, Array], Array]:
+    """Return the phases of the profile: place, speed, acceleration and jerk at their begin."""
+    one, endless = frozen([1.0]), frozen([np.inf])
+    bounds = JointLimits(
+        ('path',), -endless, endless, one, frozen([full.acceleration]), frozen([full.jerk])
+    )
+    begin, end = RobotState.at_rest([0.0]), RobotState.at_rest([length])
+    plan = OnlineTrajectoryGenerator(bounds).to_state(begin, end)
+    if plan is None:
+        raise ArithmeticError(f'no profile over {length} s with {full.acceleration}, {full.jerk}')
+    switches = np.concatenate(((0.0,), plan.switches))
+    states = [plan.at(float(time)) for time in switches]
+    place, rate, bend = (
+        np.array([getattr(each, name)[0] for each in states])
+        for name in ('position', 'velocity', 'acceleration')
+    )
+    lasts = np.diff(switches)
+    real = lasts > 0.0
+    jerk = np.divide(np.diff(bend), lasts, out=np.zeros_like(lasts), where=real)
+    return (place[:-1][real], rate[:-1][real], bend[:-1][real], jerk[real]), lasts[real]
+
+
+def _evaluated(
+    profile: tuple[Array, Array, Array, Array], begins: Array, times: Array
+) -> tuple[Array, Array, Array]:
+    """Return place, speed and acceleration of the profile at times."""
+    number = np.maximum(np.searchsorted(begins, times, side='right') - 1, 0)
+    place, rate, bend, jerk = (each[number] for each in profile)
+    t = times - begins[number]
+    return (
+        place + t * (rate + t * (bend / 2.0 + t * jerk / 6.0)),
+        rate + t * (bend + t * jerk / 2.0),
+        bend + t * jerk,
+    )

@@ -1,0 +1,298 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+r"""Joint positions along a curve of a link.
+
+Joints follow the curve with :math:`q' = J^+ \nu`, where :math:`\nu` is the derivative of the
+curve. From place to place a polynomial of fifth degree meets positions and two derivatives of the
+joints; the places are so dense that the link stays at the curve between them, which is measured.
+
+The parameter of the result is time at the full speed along the curve, stretched where a joint
+would be too fast: by :math:`(1 + \sum_i |q'_i / v_i|^p)^{1/p}`, a smooth maximum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+
+from arm_model import Array, JointLimits
+from arm_trajectory import Path, quintics, Segment
+
+from ..curves import Curve
+from ..exceptions import PlanningCode, PlanningError
+from ..ik.link_kinematics import LinkKinematics, pose_error
+
+POSITION_TOLERANCE = 2e-5
+"""Greatest way off the curve between two places in [m]; a fifth of what is promised."""
+
+ROTATION_TOLERANCE = 1e-4
+"""Greatest angle off the curve in [rad]."""
+
+FIRST_STEP, MIN_STEP, MAX_STEP = 1 / 16, 1e-5, 1 / 6
+"""Shares of a curve from one place to the next."""
+
+EASY = 1 / 60
+"""Share of the tolerance below which the next step is twice as long."""
+
+ON_CURVE = 1e-11
+"""Pose error that counts as none in [m] and [rad]."""
+
+MAX_NEWTON = 6
+"""Newton steps to a place at most; from a good guess two suffice."""
+
+MAX_CORRECTION = 0.3
+"""Greatest motion of a joint in a Newton step in [rad]: more leads to another configuration."""
+
+DIFFERENCE = 1e-5
+"""Share of a curve between the places of a difference quotient."""
+
+SHARPNESS = 16
+"""Exponent of the smooth maximum."""
+
+MAX_SLOWDOWN = 200.0
+"""How many times slower than the full speed a curve is followed before it counts as singular."""
+
+RANGE_TOLERANCE = 1e-9
+"""Rounding beyond a limit that is let pass in [rad]."""
+
+POSE = 6
+"""Numbers that a pose has: with more joints, an arm is redundant."""
+
+_FIELDS = ('positions', 'first', 'second')
+
+BETWEEN = (0.5, 0.2, 0.8)
+"""Where between two places the link is looked for, as shares."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Joint positions along a curve.
+
+    Attributes:
+        path: The joints by time at the full speed.
+        slowdown: How many times slower the joints make it at the worst place.
+        joint: Number of the joint that does.
+    """
+
+    path: Path
+    slowdown: float
+    joint: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Joints at a share of the curve, and their derivatives by it."""
+
+    share: float
+    positions: Array
+    first: Array
+    second: Array
+
+
+def trace(
+    link: LinkKinematics,
+    curve: Curve,
+    start: Array,
+    limits: JointLimits,
+    *,
+    duration: float,
+    name: str,
+) -> Trace:
+    """Follow a curve from a start.
+
+    Args:
+        link: The link that follows it.
+        curve: The curve; it begins where the link is.
+        start: Joint positions in [rad].
+        limits: Limits of the joints.
+        duration: How long the curve takes at the full speed in [s].
+        name: What the motion is called in messages.
+
+    Raises:
+        PlanningError: A joint would leave its range, the arm would become singular, or the curve
+            leads out of reach.
+    """
+    tracer = _Tracer(link, curve, limits, duration=duration, name=name)
+    return tracer.timed(tracer.places(start))
+
+
+class _Tracer:
+    def __init__(
+        self,
+        link: LinkKinematics,
+        curve: Curve,
+        limits: JointLimits,
+        *,
+        duration: float,
+        name: str,
+    ) -> None:
+        self._link, self._curve, self._limits = link, curve, limits
+        self._duration, self._name = duration, name
+        self._speed = limits.velocity * duration  # by the share
+
+    def places(self, start: Array) -> list[_Place]:
+        """Return places that are dense enough."""
+        place = self._place(0.0, start)
+        places, step = [place], FIRST_STEP
+        while place.share < 1.0:
+            step = min(step, 1.0 - place.share)
+            if 1.0 - place.share - step < MIN_STEP:
+                step = 1.0 - place.share
+            following = self._next(place, step)
+            error = np.inf if following is None else self._error(place, following)
+            if following is None or error > 1.0:
+                if step <= MIN_STEP:
+                    self._refuse_place(place)
+                step = max(0.5 * step, MIN_STEP)
+                continue
+            self._check_range(following)
+            places.append(following)
+            place = following
+            step = min(2.0 * step, MAX_STEP) if error < EASY else step
+        return places
+
+    def timed(self, places: Sequence[_Place]) -> Trace:
+        """Return the path through places, stretched where joints would be too fast."""
+        q, first, second = (np.array([getattr(each, name) for each in places]) for name in _FIELDS)
+        shares = np.array([each.share for each in places])
+        ratio = np.abs(first) / self._speed
+        power = (ratio**SHARPNESS).sum(axis=1)
+        stretch = (1.0 + power) ** (1.0 / SHARPNESS)
+        slope = (
+            (ratio ** (SHARPNESS - 1) * np.sign(first) * second / self._speed).sum(axis=1)
+            * stretch
+            / (1.0 + power)
+        )
+        worst = int(stretch.argmax())
+        steps = np.diff(shares)
+        lasts = self._duration * (
+            0.5 * steps * (stretch[1:] + stretch[:-1]) - steps**2 * np.diff(slope) / 12.0
+        )
+        lasts = np.maximum(lasts, self._duration * steps)  # never faster than the curve allows
+        scale = self._duration * stretch[:, None]
+        velocity = first / scale
+        acceleration = (second - first * (slope / stretch)[:, None]) / scale**2
+        starts = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
+        pieces = quintics(lasts, q, velocity, acceleration)
+        path = Path(
+            [Segment(*each) for each in zip(starts.tolist(), lasts.tolist(), pieces, strict=True)]
+        )
+        return Trace(path, float(ratio[worst].max()), int(ratio[worst].argmax()))
+
+    def _place(self, share: float, positions: Array) -> _Place:
+        first = self._field(share, positions)
+        before, after = (
+            self._field(share + by, positions + by * first) for by in (-DIFFERENCE, DIFFERENCE)
+        )
+        return _Place(share, positions, first, (after - before) / (2.0 * DIFFERENCE))
+
+    def _field(self, share: float, positions: Array) -> Array:
+        """Return how joints follow the curve: derivatives by the share."""
+        _, jacobian = self._link.pose_and_jacobian(positions)
+        return self._solved(jacobian, self._curve.twist(share), share)
+
+    def _solved(self, jacobian: Array, twist: Array, share: float) -> Array:
+        try:
+            if jacobian.shape[1] == len(twist):
+                solved = np.linalg.solve(jacobian, twist)
+            elif jacobian.shape[1] > len(twist):
+                solved = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T, twist)
+            else:
+                solved = np.linalg.lstsq(jacobian, twist, rcond=None)[0]
+        except np.linalg.LinAlgError:
+            self._refuse_singular(share, '')
+        return np.asarray(solved, dtype=float)
+
+    def _next(self, place: _Place, step: float) -> _Place | None:
+        """Return the place a step on; None where Newton's method does not lead there."""
+        share = place.share + step
+        guess = place.positions + step * place.first + 0.5 * step**2 * place.second
+        positions = self._on_curve(share, guess)
+        if positions is None:
+            return None
+        following = self._place(share, positions)
+        if len(positions) <= POSE:
+            return following
+        # joints more than the pose needs: an implicit step of fourth order, put on the curve
+        better = (
+            place.positions
+            + 0.5 * step * (place.first + following.first)
+            + step**2 / 12.0 * (place.second - following.second)
+        )
+        positions = self._on_curve(share, better)
+        return None if positions is None else self._place(share, positions)
+
+    def _on_curve(self, share: float, guess: Array) -> Array | None:
+        target, positions = self._curve.at(share), guess
+        for _ in range(MAX_NEWTON):
+            actual, jacobian = self._link.pose_and_jacobian(positions)
+            error = pose_error(target, actual)
+            if np.abs(error).max() < ON_CURVE:
+                return positions
+            change = self._solved(jacobian, error, share)
+            if np.abs(change).max() > MAX_CORRECTION:
+                return None
+            positions = positions + change
+        return None
+
+    def _error(self, place: _Place, following: _Place) -> float:
+        """Return how far the link leaves the curve between two places, over the tolerance."""
+        step = following.share - place.share
+        ends = [np.array([getattr(place, name), getattr(following, name)]) for name in _FIELDS]
+        piece = quintics(np.array([step]), *ends)[0]
+        worst = 0.0
+        for part in BETWEEN:
+            positions = (part * step) ** np.arange(6.0) @ piece
+            error = pose_error(
+                self._curve.at(place.share + part * step), self._link.pose(positions)
+            )
+            worst = max(
+                worst,
+                float(np.linalg.norm(error[:3])) / POSITION_TOLERANCE,
+                float(np.linalg.norm(error[3:])) / ROTATION_TOLERANCE,
+            )
+            if worst > 1.0:
+                break
+        return worst
+
+    def _check_range(self, place: _Place) -> None:
+        limits, positions = self._limits, place.positions
+        beyond = np.maximum(limits.lower - positions, positions - limits.upper)
+        joint = int(beyond.argmax())
+        if beyond[joint] > RANGE_TOLERANCE:
+            raise self._refused(
+                f'at {place.share:.0%} of the way {limits.names[joint]} would be at'
+                f' {positions[joint]:.3f}, beyond its limits {limits.lower[joint]:.3f}..'
+                f'{limits.upper[joint]:.3f}; start in another configuration'
+            )
+        ratio = np.abs(place.first) / self._speed
+        joint = int(ratio.argmax())
+        if ratio[joint] > MAX_SLOWDOWN:
+            speed = place.first[joint] / self._duration
+            self._refuse_singular(
+                place.share, f': {limits.names[joint]} would need {abs(speed):.0f} rad/s'
+            )
+
+    def _refuse_singular(self, share: float, words: str) -> NoReturn:
+        x, y, z = self._curve.at(share).position
+        raise self._refused(
+            f'the arm is singular at {max(share, 0.0):.0%} of the way, at ({x:.3f}, {y:.3f},'
+            f' {z:.3f}){words}; use PTP, or lead it past that place'
+        )
+
+    def _refuse_place(self, place: _Place) -> NoReturn:
+        """Refuse a curve that cannot be followed beyond a place."""
+        _, jacobian = self._link.pose_and_jacobian(place.positions)
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        x, y, z = self._curve.at(place.share).position
+        raise self._refused(
+            f'it cannot be followed beyond {place.share:.0%} of the way, at ({x:.3f}, {y:.3f},'
+            f' {z:.3f}): there it leads out of reach, or the arm is singular (least singular value'
+            f' {values[-1]:.1e}); use PTP, or lead it past that place'
+        )
+
+    def _refused(self, reason: str) -> PlanningError:
+        return PlanningError(PlanningCode.PLANNING_FAILED, f'{self._name}: {reason}')

@@ -1,0 +1,423 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Industrial motion: on its line or arc, within limits between samples, refused in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from math import pi
+
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from model_robots import ready, robot, ROBOTS
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from arm_model import Array, CollisionObject, CommandError, frozen, Pose, RobotModel, Sphere
+from arm_planning import (
+    CircPoint,
+    CircPointKind,
+    Goal,
+    JointGoal,
+    MotionPlan,
+    MotionRequest,
+    PlanningCode,
+    PlanningError,
+    PoseGoal,
+)
+from arm_planning.curves import arc_around, arc_through, Curve, Line
+from arm_planning.ik.link_kinematics import LinkKinematics
+from arm_planning.ik.solver import IkSolver
+from arm_planning.industrial.limits import CartesianLimits
+from arm_planning.industrial.planner import IndustrialPlanner
+from arm_planning.industrial.sequence import SequenceItem
+from arm_trajectory import Path
+
+STRAIGHT = 1e-4
+"""How far a link may be off its line or arc in [m]."""
+
+TURNED = 1e-3
+"""How far it may be turned off it in [rad]."""
+
+seeds = st.integers(0, 10**6)
+
+
+@cache
+def planner(name: str) -> IndustrialPlanner:
+    """Return the planner of a robot."""
+    return IndustrialPlanner(robot(name))
+
+
+@cache
+def tip(name: str) -> LinkKinematics:
+    """Return the kinematics of a robot's tip."""
+    return LinkKinematics(robot(name))
+
+
+def moved(name: str, way: Array, turn: Array | None = None) -> Pose:
+    """Return the pose of the tip at the ready pose, moved and turned."""
+    pose = tip(name).pose(ready(name))
+    rotation = pose.rotation if turn is None else pin.exp3(turn) @ pose.rotation
+    return Pose(rotation, pose.position + way)
+
+
+def request(name: str, kind: str, goal: Goal | Pose, **others: object) -> MotionRequest:
+    """Return a request that begins at the ready pose."""
+    goals = [PoseGoal(goal) if isinstance(goal, Pose) else goal]
+    return replace(MotionRequest(ready(name), goals, kind), **others)  # type: ignore[arg-type]
+
+
+def places(path: Path, count: int) -> Array:
+    """Return positions at times that are no multiples of those of the segments."""
+    return path.positions(np.sort(np.random.default_rng(0).uniform(0.0, path.duration, count)))
+
+
+def off(curve: Curve, link: LinkKinematics, positions: Array) -> tuple[float, float]:
+    """Return how far a link is off a curve in [m] and [rad]."""
+    pose = link.pose(positions)
+    wanted = curve.at(min(max(curve.nearest(pose.position), 0.0), 1.0))
+    turn = np.linalg.norm(pin.log3(wanted.rotation @ pose.rotation.T))
+    return float(np.linalg.norm(pose.position - wanted.position)), float(turn)
+
+
+def check_limits(model: RobotModel, path: Path, factor: float = 1.0) -> None:
+    """Look at position, velocity, acceleration and jerk at and between all places."""
+    limits = model.limits
+    numbers = np.repeat(np.arange(len(path.segments)), 7)
+    times = path.durations[numbers] * np.tile(np.linspace(0.0, 1.0, 7), len(path.segments))
+    q, *rates = (path.derived(order, numbers, times) for order in range(4))
+    assert (q >= limits.lower - 1e-6).all()
+    assert (q <= limits.upper + 1e-6).all()
+    most = (limits.velocity, limits.acceleration, limits.jerk)
+    for rate, limit in zip(rates, most, strict=True):
+        assert np.abs(rate / limit).max() < factor * 1.03
+    ends = [path.at(time) for time in (0.0, path.duration)]
+    for end in ends:
+        assert np.abs(end.velocity).max() < 1e-6
+        assert np.abs(end.acceleration).max() < 1e-4
+    before = [path.derived(order, numbers[6::7], times[6::7])[:-1] for order in range(3)]
+    after = [path.derived(order, numbers[::7], times[::7])[1:] for order in range(3)]
+    for left, right, tolerance in zip(before, after, (1e-9, 1e-6, 1e-4), strict=True):
+        assert np.abs(left - right).max(initial=0.0) < tolerance
+
+
+def planned(name: str, wanted: MotionRequest) -> MotionPlan | None:
+    """Return a plan; None where it was refused in words that name the place or the joint."""
+    try:
+        return planner(name).plan(wanted)
+    except PlanningError as error:
+        if error.code is not PlanningCode.PLANNING_FAILED or 'of the way' not in str(error):
+            raise
+        return None
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, factor=st.sampled_from([0.1, 0.5, 1.0]))
+def test_lin_stays_on_its_line(name: str, seed: int, factor: float) -> None:
+    """To 0.1 mm, turning about one axis, within all limits, and ends at the goal."""
+    rng = np.random.default_rng(seed)
+    goal = moved(name, rng.uniform(-0.2, 0.2, 3), rng.uniform(-0.5, 0.5, 3))
+    plan = planned(name, request(name, 'LIN', goal, velocity_scaling=factor))
+    assume(plan is not None)
+    assert plan is not None
+    line = Line(tip(name).pose(ready(name)), goal)
+    for positions in places(plan.path, 300):
+        way, turn = off(line, tip(name), positions)
+        assert way < STRAIGHT
+        assert turn < TURNED
+    check_limits(robot(name), plan.path)
+    end = tip(name).pose(plan.path.end.position)
+    assert end.position == pytest.approx(goal.position, abs=1e-8)
+    assert end.rotation == pytest.approx(goal.rotation, abs=1e-8)
+    speed = CartesianLimits().max_trans_vel * factor
+    step = plan.path.duration / 400
+    ways = [tip(name).pose(each).position for each in plan.path.positions(step * np.arange(401.0))]
+    assert np.linalg.norm(np.diff(ways, axis=0), axis=1).max() < 1.01 * speed * step
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds, center=st.booleans())
+def test_circ_stays_on_its_arc(name: str, seed: int, center: bool) -> None:
+    """To 0.1 mm, through its point or about its center, within all limits."""
+    rng = np.random.default_rng(seed)
+    begin = tip(name).pose(ready(name))
+    first, second = np.linalg.qr(rng.normal(size=(3, 3)))[0][:2]
+    radius, sweep = rng.uniform(0.03, 0.1), rng.uniform(0.3, 2.8)
+    middle = begin.position - radius * first
+
+    def on_circle(angle: float) -> Array:
+        place: Array = middle + radius * (np.cos(angle) * first + np.sin(angle) * second)
+        return place
+
+    goal = Pose(begin.rotation, on_circle(sweep))
+    via = CircPoint(CircPointKind.CENTER, middle)
+    arc = arc_around(begin, middle, goal)
+    if not center:
+        via = CircPoint(CircPointKind.INTERIM, on_circle(0.4 * sweep))
+        arc = arc_through(begin, via.position, goal)
+    plan = planned(name, request(name, 'CIRC', goal, via=via))
+    assume(plan is not None)
+    assert plan is not None
+    assert arc.length == pytest.approx(radius * sweep, rel=1e-6)
+    for positions in places(plan.path, 200):
+        way, turn = off(arc, tip(name), positions)
+        assert way < STRAIGHT
+        assert turn < TURNED
+        distance = np.linalg.norm(tip(name).pose(positions).position - middle)
+        assert distance == pytest.approx(radius, abs=STRAIGHT)
+    check_limits(robot(name), plan.path)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds, factor=st.sampled_from([0.01, 0.3, 1.0]))
+def test_ptp_is_straight_and_in_phase(name: str, seed: int, factor: float) -> None:
+    """Joints share one profile; one of them is at a limit of it."""
+    rng, limits = np.random.default_rng(seed), robot(name).limits
+    goal = rng.uniform(limits.lower, limits.upper)
+    wanted = request(name, 'PTP', JointGoal(goal), velocity_scaling=factor)
+    path = planner(name).plan(wanted).path
+    way = goal - ready(name)
+    for positions in places(path, 50):
+        shares = (positions - ready(name)) / way
+        assert np.ptp(shares) < 1e-6 / np.abs(way).min()
+    assert path.end.position == pytest.approx(goal, abs=1e-9)
+    check_limits(robot(name), path)
+    speeds = [np.abs(path.at(each).velocity) for each in np.linspace(0, path.duration, 99)]
+    assert np.max(speeds / limits.velocity) <= factor * (1 + 1e-6)
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_motion_to_where_the_arm_is(name: str) -> None:
+    """It is allowed, short, and moves nothing."""
+    for kind in ('PTP', 'LIN'):
+        for goal in (JointGoal(ready(name)), moved(name, np.zeros(3))):
+            path = planner(name).plan(request(name, kind, goal)).path
+            assert path.duration < 0.1
+            assert np.abs(places(path, 10) - ready(name)).max() < 1e-6
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_lin_turns_on_the_spot(name: str) -> None:
+    """With the limit of rotation."""
+    goal = moved(name, np.zeros(3), np.array([0.0, 0.0, 0.4]))
+    path = planner(name).plan(request(name, 'LIN', goal)).path
+    assert path.duration > 0.4 / CartesianLimits().max_rot_vel
+    start = tip(name).pose(ready(name)).position
+    for positions in places(path, 100):
+        assert tip(name).pose(positions).position == pytest.approx(start, abs=STRAIGHT)
+
+
+def test_a_line_gets_slower_instead_of_failing() -> None:
+    """Next to a singularity a joint meets its limit; the note names it."""
+    name = 'prbt'
+    start = frozen([0.0, 0.3, 1.6, 0.0, 0.05, 0.0])  # the wrist is almost straight
+    pose = tip(name).pose(start)
+    goal = PoseGoal(Pose(pose.rotation, pose.position + np.array([0.0, 0.12, 0.0])))
+    plan = planner(name).plan(MotionRequest(start, [goal], 'LIN'))
+    assert any('slowed to' in note and 'prbt_joint_' in note for note in plan.notes)
+    check_limits(robot(name), plan.path)
+    line = Line(pose, goal.pose)
+    assert max(off(line, tip(name), each)[0] for each in places(plan.path, 300)) < STRAIGHT
+
+
+def test_a_line_through_a_singularity_is_refused_with_its_place() -> None:
+    """As is one out of reach, and one that ends in another configuration."""
+    straight = frozen([0.0] * 6)
+    pose = tip('prbt').pose(straight)
+    goal = PoseGoal(Pose(pose.rotation, pose.position - np.array([0.0, 0.0, 0.2])))
+    with pytest.raises(PlanningError, match=r'LIN: .* 0% of the way.*PTP') as refused:
+        planner('prbt').plan(MotionRequest(straight, [goal], 'LIN'))
+    assert refused.value.code is PlanningCode.PLANNING_FAILED
+    far = moved('prbt', np.array([0.0, 2.0, 0.0]))
+    with pytest.raises(PlanningError, match=r'of the way'):
+        planner('prbt').plan(request('prbt', 'LIN', far))
+    here = frozen([0.0, 0.5, 1.2, 0.3, 1.0, 0.2])
+    pose = tip('prbt').pose(here)
+    near = Pose(pose.rotation, pose.position + np.array([0.0, 0.03, 0.0]))
+    same, other = IkSolver(robot('prbt')).solve(near, here)[:2]
+    assert planner('prbt').plan(MotionRequest(here, [JointGoal(same)], 'LIN'))
+    with pytest.raises(PlanningError, match='another configuration; use PTP') as refused:
+        planner('prbt').plan(MotionRequest(here, [JointGoal(other)], 'LIN'))
+    assert refused.value.code is PlanningCode.GOAL_CONSTRAINTS_VIOLATED
+
+
+def test_contact_on_the_way_names_pair_and_place() -> None:
+    """A ball on the line, which start and goal do not touch."""
+    name = 'gp110'
+    way = np.array([0.0, -0.6, 0.0])
+    ball = CollisionObject('ball', Sphere(0.03), pose=moved(name, 0.5 * way))
+    scene = robot(name).scene.with_object(ball)
+    for kind in ('LIN', 'PTP'):
+        with pytest.raises(PlanningError, match=r'ball.* would touch \d+%.* at \(') as refused:
+            planner(name).plan(request(name, kind, moved(name, way)), scene)
+        assert refused.value.code is PlanningCode.INVALID_MOTION_PLAN
+    assert planner(name).plan(request(name, 'LIN', moved(name, -0.5 * way)), scene)
+
+
+def test_a_second_goal_is_taken_when_the_first_is_refused() -> None:
+    """Alternatives: the first that is reached."""
+    far, near = (PoseGoal(moved('prbt', np.array([0.0, y, 0.0]))) for y in (2.0, 0.05))
+    plan = planner('prbt').plan(MotionRequest(ready('prbt'), [far, near], 'LIN'))
+    end = tip('prbt').pose(plan.path.end.position)
+    assert end.position == pytest.approx(near.pose.position, abs=1e-8)
+    with pytest.raises(PlanningError, match=r'goal 0: .*goal 1: '):
+        planner('prbt').plan(MotionRequest(ready('prbt'), [far, far], 'LIN'))
+
+
+def test_the_speed_of_a_link_is_limited() -> None:
+    """max_cartesian_speed of any link holds for every kind."""
+    name, most = 'panda', 0.05
+    for kind in ('LIN', 'PTP'):
+        wanted = request(name, kind, moved(name, np.array([0.0, 0.1, 0.0])))
+        plan = planner(name).plan(replace(wanted, max_cartesian_speed=most))
+        assert any('0.05 m/s' in note for note in plan.notes)
+        rows = plan.path.positions(np.linspace(0.0, plan.path.duration, 300))
+        ways = np.diff([tip(name).pose(row).position for row in rows], axis=0)
+        speed = np.linalg.norm(ways, axis=1).max() * 299 / plan.path.duration
+        assert speed == pytest.approx(most, rel=0.01)
+
+
+CORNERS = ((0.0, 0.12, 0.0), (0.0, 0.12, -0.12), (0.0, 0.0, -0.12))
+
+
+def items(name: str, kinds: str, radius: float) -> list[SequenceItem]:
+    """Return a sequence around a square, blended at its inner corners."""
+    names = {'L': 'LIN', 'P': 'PTP'}
+    return [
+        SequenceItem(
+            request(name, names[kind], moved(name, np.array(corner))),
+            radius if number < len(kinds) - 1 else 0.0,
+        )
+        for number, (kind, corner) in enumerate(zip(kinds, CORNERS, strict=True))
+    ]
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('kinds', ['LLL', 'PLP', 'LPL'])
+def test_blends_stay_in_their_spheres(name: str, kinds: str) -> None:
+    """Outside of the spheres lines are lines; inside, nothing stops and no limit is broken."""
+    radius = 0.03
+    plan = planner(name).plan_sequence(items(name, kinds, radius))
+    stops = planner(name).plan_sequence(items(name, kinds, 0.0))
+    if kinds == 'LLL':
+        assert plan.path.duration < stops.path.duration
+    check_limits(robot(name), plan.path)
+    check_limits(robot(name), stops.path)
+    start = tip(name).pose(ready(name)).position
+    corners = [start, *(start + np.array(corner) for corner in CORNERS)]
+    lines = [
+        Line(Pose(np.eye(3), corners[k]), Pose(np.eye(3), corners[k + 1]))
+        for k, kind in enumerate(kinds)
+        if kind == 'L'
+    ]
+    if kinds == 'LLL':
+        for row in places(plan.path, 500):
+            place = tip(name).pose(row).position
+            ways = [
+                np.linalg.norm(place - line.at(min(max(line.nearest(place), 0.0), 1.0)).position)
+                for line in lines
+            ]
+            inside = min(np.linalg.norm(place - corner) for corner in corners[1:-1]) <= radius
+            assert inside or min(ways) < STRAIGHT
+    inner = plan.path.positions(np.linspace(0.0, plan.path.duration, 800))
+    positions = np.array([tip(name).pose(row).position for row in inner])
+    for corner in corners[1:-1]:
+        assert np.linalg.norm(positions - corner, axis=1).min() < radius
+    speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1)[20:-20]
+    assert speeds.min() > 0.0
+    assert tip(name).pose(plan.path.end.position).position == pytest.approx(corners[-1], abs=1e-7)
+
+
+def test_sequences_by_the_rules_of_pilz() -> None:
+    """No items, a negative radius, a last one, overlaps, several goals: refused with the item."""
+    good = items('prbt', 'LLL', 0.03)
+    check = planner('prbt').plan_sequence
+    with pytest.raises(PlanningError, match='no items'):
+        check([])
+    with pytest.raises(PlanningError, match='item 0: blend radius -1'):
+        check([replace(good[0], blend_radius=-1.0), *good[1:]])
+    with pytest.raises(PlanningError, match='last item') as refused:
+        check([*good[:2], replace(good[2], blend_radius=0.01)])
+    assert refused.value.code is PlanningCode.INVALID_MOTION_PLAN
+    with pytest.raises(PlanningError, match='items 0 and 1 overlap'):
+        check(items('prbt', 'LLL', 0.07))
+    with pytest.raises(PlanningError, match='holds all of item 0'):
+        check([replace(good[0], blend_radius=0.13), replace(good[2])])
+    far = request('prbt', 'LIN', moved('prbt', np.array([0.0, 2.0, 0.0])))
+    with pytest.raises(PlanningError, match=r'item 1: LIN: .*of the way') as refused:
+        check([good[0], SequenceItem(far)])
+    assert refused.value.code is PlanningCode.PLANNING_FAILED
+
+
+def test_circles_that_are_none_have_the_codes_of_pilz() -> None:
+    """No point, radii that differ, points on a line."""
+    begin = tip('prbt').pose(ready('prbt')).position
+    goal = moved('prbt', np.array([0.0, 0.1, 0.0]))
+
+    def refused(words: str, kind: CircPointKind, way: tuple[float, float, float]) -> None:
+        via = CircPoint(kind, begin + np.array(way))
+        with pytest.raises(PlanningError, match=words) as error:
+            planner('prbt').plan(request('prbt', 'CIRC', goal, via=via))
+        assert error.value.code is PlanningCode.INVALID_MOTION_PLAN
+
+    refused('on a line', CircPointKind.INTERIM, (0.0, 0.05, 0.0))
+    refused('half a circle', CircPointKind.CENTER, (0.0, 0.05, 0.0))
+    refused('may differ', CircPointKind.CENTER, (0.05, 0.0, 0.0))
+    with pytest.raises(PlanningError, match='no interim or center point'):
+        planner('prbt').plan(request('prbt', 'CIRC', goal))
+
+
+def test_what_is_no_request_is_refused() -> None:
+    """Start and goal beyond limits, no goal, a scaling of 0, an unknown planner, a NaN."""
+    name, goal = 'prbt', JointGoal(ready('prbt'))
+    good = request(name, 'PTP', goal)
+    cases = (
+        (replace(good, start=frozen([3.1, 0, 0, 0, 0, 0])), PlanningCode.START_STATE_INVALID),
+        (
+            replace(good, goals=[JointGoal(frozen([3.1, 0, 0, 0, 0, 0]))]),
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
+        ),
+        (replace(good, goals=[]), PlanningCode.INVALID_GOAL_CONSTRAINTS),
+        (replace(good, velocity_scaling=0.0), PlanningCode.INVALID_MOTION_PLAN),
+        (replace(good, acceleration_scaling=1.5), PlanningCode.INVALID_MOTION_PLAN),
+        (replace(good, planner_id='SPLINE'), PlanningCode.PLANNING_FAILED),
+    )
+    for wanted, code in cases:
+        with pytest.raises(PlanningError) as refused:
+            planner(name).plan(wanted)
+        assert refused.value.code is code
+    with pytest.raises(CommandError, match='finite'):
+        planner(name).plan(replace(good, start=frozen([np.nan, 0, 0, 0, 0, 0])))
+
+
+def test_cartesian_limits_are_checked() -> None:
+    """Of a file of Pilz: other keys are passed over, what is wrong is named."""
+    table = {'max_trans_vel': 0.5, 'max_trans_dec': -1, 'max_rot_acc': 9.0}
+    limits = CartesianLimits.of_table(table)
+    assert limits == CartesianLimits(max_trans_vel=0.5, max_trans_dec=-1.0)
+    for wrong in ({'max_rot_vel': 0.0}, {'max_trans_dec': 5.0}, {'max_trans_acc': 'fast'}):
+        with pytest.raises(PlanningError, match='cartesian_limits'):
+            CartesianLimits.of_table(wrong)
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=seeds, sweep=st.floats(0.1, 2 * pi - 0.1), share=st.floats(0.1, 0.9))
+def test_arcs_pass_their_points(seed: int, sweep: float, share: float) -> None:
+    """Of any size: the interim point is on it, and its derivative is its difference."""
+    axes = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    points = [np.cos(a) * axes[0] + np.sin(a) * axes[1] for a in (0.0, share * sweep, sweep)]
+    begin, end = Pose(np.eye(3), points[0]), Pose(pin.exp3(axes[2]), points[2])
+    arc = arc_through(begin, points[1], end)
+    assert arc.at(share).position == pytest.approx(points[1], abs=1e-6)
+    assert arc.nearest(points[1]) == pytest.approx(share, abs=1e-6)
+    assert arc.length == pytest.approx(sweep, abs=1e-6)
+    step = 1e-6
+    before, after = arc.at(share - step), arc.at(share + step)
+    along = (after.position - before.position) / (2 * step)
+    turn = pin.log3(after.rotation @ before.rotation.T) / (2 * step)
+    assert arc.twist(share) == pytest.approx(np.concatenate((along, turn)), abs=1e-6)
