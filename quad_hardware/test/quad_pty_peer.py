@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
@@ -108,6 +109,7 @@ class PtyPeer:
     def plug(self) -> None:
         """Appear at the link, on a new terminal."""
         self._master, slave = pty.openpty()
+        os.set_blocking(self._master, False)
         tty.setraw(self._master)
         tty.setraw(slave)
         self._slave = slave
@@ -209,7 +211,8 @@ class PtyPeer:
         full = len(self._adapter) - len(self._adapter) % PACKET
         size = len(self._adapter) if now - self._sent_at >= latency else full
         if size:
-            os.write(self._master, bytes(self._adapter[:size]))
+            with suppress(BlockingIOError):  # a serial line does not wait for whoever reads
+                os.write(self._master, bytes(self._adapter[:size]))
             del self._adapter[:size]
             self._sent_at = now
 
