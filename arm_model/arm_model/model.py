@@ -269,10 +269,21 @@ class RobotModel:
         Raises:
             SceneError: The scene is of another group or robot.
         """
-        if clearances.scene.kinematics.joints != self.joints:
-            joints = ', '.join(clearances.scene.kinematics.joints)
-            raise SceneError(f'the scene is not that of {self.group}: its joints are {joints}')
+        self.check_scene(clearances.scene)
         self.scene, self._clearances = clearances.scene, clearances
+
+    def check_scene(self, scene: PlanningScene) -> None:
+        """Make sure that a scene is of this group.
+
+        Args:
+            scene: The scene.
+
+        Raises:
+            SceneError: It is of another group or robot.
+        """
+        if scene.kinematics.joints != self.joints:
+            joints = ', '.join(scene.kinematics.joints)
+            raise SceneError(f'the scene is not that of {self.group}: its joints are {joints}')
 
     def check_link(self, link: str | None) -> None:
         """Make sure that a link can be asked for.

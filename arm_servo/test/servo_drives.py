@@ -14,7 +14,7 @@ from servo_commands import InlineWorker
 
 from arm_canopen import AxisFeedback, MotionSource, Setpoint
 from arm_canopen.standard.drive import DriveState
-from arm_model import Array
+from arm_model import Array, RobotModel
 from arm_servo import MotionCore
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.io.drive_source import DriveSource
@@ -32,11 +32,16 @@ class Drives:
         path: Positions commanded so far, a row for each cycle.
     """
 
-    def __init__(self, name: str = 'panda', worker: Executor | None = None) -> None:
-        """Let the drives be ready to follow."""
+    def __init__(
+        self,
+        name: str = 'panda',
+        worker: Executor | None = None,
+        model: RobotModel | None = None,
+    ) -> None:
+        """Let the drives be ready to follow; a test that changes the scene has its own model."""
         self.now = 100.0
         self.gateway = CommandGateway(
-            MotionCore(robot(name)), worker or InlineWorker(), lambda: self.now
+            MotionCore(model or robot(name)), worker or InlineWorker(), lambda: self.now
         )
         self.source = DriveSource(self.gateway)
         self.axes = [

@@ -88,7 +88,7 @@ def test_a_trajectory_is_void_where_the_arm_is_elsewhere() -> None:
     goal = TrajectoryGoal(core.model.joints, [GoalPoint(2.0, (ready('panda') + 0.2).tolist())])
     aside = core.basis.foreseen(0.0)
     state = RobotState.at_rest(aside.state.position + 0.02)
-    prepared = core.prepare(goal, type(aside)(state, aside.sequence))
+    prepared = core.prepare(goal, replace(aside, state=state))
     with pytest.raises(StateMovedError) as refused:
         core.commit(prepared, 0.0)
     assert refused.value.code is GoalCode.INVALID_GOAL

@@ -8,6 +8,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import replace
 from itertools import pairwise
 import threading
+from typing import Any
 
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -18,9 +19,11 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError
-from arm_servo import NotReadyError, Source
+from arm_servo import MotionCore, NotReadyError, Source
 from arm_servo.core.commands import by_joint
-from arm_servo.core.gateway import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand, start_worker
+from arm_servo.core.gateway import start_worker
+from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
+from arm_servo.core.preparation import CommandBasis, Prepared
 from arm_servo.core.requests import JogRequest, PauseRequest, SpeedRequest
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.single_target import SingleTarget
@@ -537,3 +540,55 @@ def test_a_trajectory_takes_over_while_the_speed_override_changes(
     assert command.execution is not None, command.future.exception(0.0)
     drives.run(60)
     assert (rates(drives, begin) <= 1.02 * drives.gateway.model.limits.acceleration).all()
+
+
+def test_a_long_goal_that_is_refused_at_rest_does_not_end_a_jog(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The jog is held for it, and goes on: where it has come to rest, there is no way any more."""
+    drives = ready()
+    prepare, attempts = MotionCore.prepare, 0
+
+    def prepare_once(
+        core: MotionCore, request: Any, basis: CommandBasis | None = None
+    ) -> Prepared:
+        nonlocal attempts
+        attempts += isinstance(request, TrajectoryGoal)
+        if attempts > 1:
+            raise GoalError(GoalCode.INVALID_GOAL, 'the elbow would collide')
+        return prepare(core, request, basis)
+
+    monkeypatch.setattr(MotionCore, 'prepare', prepare_once)
+    goal = wave(drives, 300)
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
+    drives.run(40)
+    command = drives.gateway.request(goal)
+    begun(drives, command)
+    assert isinstance(command.future.exception(0.0), GoalError)
+    assert attempts == 2
+    drives.run(40)
+    assert drives.gateway.snapshot.source is Source.JOG
+    assert (drives.path[-1][0] - drives.path[-2][0]) / PERIOD == pytest.approx(0.4, abs=1e-3)
+
+
+@pytest.mark.parametrize('is_wrong', [False, True])
+def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> None:
+    """Others move the arm: it is tried from where the arm stands before they are thrown out."""
+    drives = ready()
+    goal = wave(drives, 20)
+    if is_wrong:
+        beyond = replace(goal.points[-1], positions=[9.0] * 7)
+        goal = replace(goal, points=[*goal.points[:-1], beyond])
+    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
+    drives.run(3)
+    assert drives.gateway.snapshot.blocked
+    before = len(drives.attachments)
+    command = drives.gateway.request(goal, drives.attach)
+    begun(drives, command)
+    if is_wrong:
+        assert isinstance(command.future.exception(0.0), GoalError)
+        assert len(drives.attachments) == before
+        assert drives.gateway.snapshot.blocked
+    else:
+        assert command.future.result(0.0) is not None
+        assert len(drives.attachments) == before + 1

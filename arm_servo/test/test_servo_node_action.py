@@ -11,7 +11,7 @@ import pytest
 from servo_commands import SteppedWorker
 from servo_drives import Drives
 
-from arm_servo.core.gateway import MotionCommand
+from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.ros.trajectory.action import TrajectoryAction
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 import time
 from typing import Any
@@ -59,7 +59,8 @@ class Topics:
     def _prepare(self) -> None:
         self.prepared += 1
 
-    def _jog(self, request: JogRequest) -> Future[None]:
+    def _jog(self, request: JogRequest, get_ready: Callable[[], None]) -> Future[None]:
+        get_ready()
         self.requests.append(request)
         return Future()
 

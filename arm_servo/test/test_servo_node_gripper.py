@@ -47,7 +47,7 @@ class Gripper:
         self._made._parameters = GripperParameters(0.002, 0.001, 1.0, allow_stalling)
         self._made._joints = self.drives.gateway.model.joints
         self._made._goals = {}
-        self._made._prepare = lambda: None
+        self._made._prepare = self._made._check_active = lambda: None
         conclude: Any = SimpleNamespace(
             notify_execute=lambda handle, _: self._made._conclude(handle)
         )
@@ -194,7 +194,7 @@ def test_a_deactivated_controller_moves_no_gripper() -> None:
     tool.drives = SimpleNamespace(gateway=drives.gateway, prepare=lambda: None)
     tool._controller = object.__new__(TrajectoryController)
     vars(tool._controller).update(_node=node, _gateway=drives.gateway, active=True)
-    tool._get_ready()
+    tool._controller.check_active()
     command = drives.gateway.request(TargetRequest({JOINT: 1.0}, 0.1))
     drives.run(20)
     assert not command.ended.done()
@@ -202,4 +202,4 @@ def test_a_deactivated_controller_moves_no_gripper() -> None:
     drives.run(20)
     assert command.ended.result().canceled
     with pytest.raises(NotReadyError, match='hand_controller is inactive'):
-        tool._get_ready()
+        tool._controller.check_active()

@@ -14,8 +14,8 @@ from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
-from arm_servo.core.gateway import MOTIONS
 from arm_servo.core.requests import PauseRequest, SpeedRequest, StopRequest
+from arm_servo.core.set_point import MOTIONS
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

@@ -32,6 +32,7 @@ class CommandArbiter:
         execution: The trajectory that was followed last; None before the first.
         target: The single target that was aimed at last; None before the first.
         jogger: Who has jogged last.
+        held: Whether a jog or a single target comes to rest, and goes on after that.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class CommandArbiter:
         self.execution: Execution | None = None
         self.target: SingleTarget | None = None
         self.jogger: Hashable = None
+        self.held = False
 
     @property
     def motion(self) -> Motion | None:
@@ -127,7 +129,7 @@ class CommandArbiter:
         """
         self.end(Outcome(GoalCode.INVALID_GOAL, reason))
         self._jogging.end()
-        self.active = Source.NONE
+        self.active, self.held = Source.NONE, False
 
     def end(self, outcome: Outcome) -> None:
         """End the trajectory or the single target that moves the arm.
@@ -160,12 +162,12 @@ class CommandArbiter:
         """
         report, wanted = MotionReport(), None
         if self.active is Source.JOG:
-            velocity, report = self._jogging.step(state, now, period, held=paused)
+            velocity, report = self._jogging.step(state, now, period, held=paused or self.held)
             wanted = None if velocity is None else self._toward(state, velocity, period)
         elif self.active is Source.TRAJECTORY and self.execution is not None:
             wanted = self.execution.step(state, measured, speed_scaling, period)
         elif self.active is Source.TARGET and self.target is not None:
-            wanted = self.target.step(state, speed_scaling, period)
+            wanted = self.target.step(state, 0.0 if self.held else speed_scaling, period)
         if wanted is None:
             wanted = self._toward(state, np.zeros(len(self._limits)), period)
         return wanted, report

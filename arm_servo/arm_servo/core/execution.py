@@ -20,6 +20,8 @@ from arm_trajectory import (
     merge_tolerances,
     OnlineTrajectoryGenerator,
     Path,
+    PathCheck,
+    PathContact,
     TimerState,
     TrajectoryGoal,
     TrajectoryTimer,
@@ -161,6 +163,18 @@ class Execution:
     def duration(self) -> float:
         """How long its path lasts at full speed in [s]."""
         return self._path.duration
+
+    def contact(self, check: PathCheck, begin: float = 0.0) -> PathContact | None:
+        """Return the first contact on its path; for any thread.
+
+        Args:
+            check: Looks for it.
+            begin: Time of the path from which on it is looked for in [s].
+        """
+        found = check.contact(
+            lambda times: self._path.positions(times + begin), max(self.duration - begin, 0.0)
+        )
+        return found and replace(found, time=found.time + begin)
 
     def foreseen(self, ahead: float, timer: TimerState | None = None) -> RobotState:
         """Return where it will be when nothing comes in between; for any thread.

@@ -17,7 +17,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from arm_model import Array, checked, CommandError, ModelError, RobotModel, RobotState
+from arm_model import (
+    Array,
+    checked,
+    CommandError,
+    ModelError,
+    PlanningScene,
+    RobotModel,
+    RobotState,
+)
 from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, StateMovedError
 
 from ..exceptions import NotReadyError
@@ -27,6 +35,7 @@ from .commands import in_base
 from .execution import Execution, Feedback
 from .outcome import Outcome
 from .preparation import CommandBasis, Preparation, Prepared
+from .prepared_scene import PreparedScene
 from .requests import (
     ImmediateRequest,
     JogRequest,
@@ -67,7 +76,8 @@ class MotionCore:
     """Set-points for an arm, cycle by cycle.
 
     Times are steady times in [s] that the owner hands over; it reads no clock. All methods are for
-    the thread of the cycle but :meth:`prepare`, which is for any one other thread.
+    the thread of the cycle but :meth:`prepare`, which is for any one other thread, and
+    :meth:`prepare_scene`, for any.
     """
 
     def __init__(self, model: RobotModel, settings: CoreSettings | None = None) -> None:
@@ -93,6 +103,8 @@ class MotionCore:
         self._sequence = 0
         self._last_change = ''
         self._loose = False
+        self._unchecked: Execution | None = None  # in the present scene
+        self._scene = self.prepare_scene(model.scene, 0, None)
 
     @property
     def model(self) -> RobotModel:
@@ -114,6 +126,11 @@ class MotionCore:
     def source(self) -> Source:
         """What moves the arm."""
         return self._arbiter.active
+
+    @property
+    def scene(self) -> PreparedScene:
+        """What may collide."""
+        return self._scene
 
     @property
     def execution(self) -> Execution | None:
@@ -147,11 +164,14 @@ class MotionCore:
         Raises:
             NotReadyError: The position of the arm is not known yet.
         """
-        target = self._arbiter.target if self.source is Source.TARGET else None
+        is_at_rest = self._arbiter.held and not self.state.moving
+        source = Source.NONE if is_at_rest else self.source
+        target = self._arbiter.target if source is Source.TARGET else None
         return CommandBasis(
             self.state,
+            self._scene,
             self._sequence,
-            self.source,
+            source,
             self.speed_scaling,
             None if target is None else target.target,
             self.execution,
@@ -173,6 +193,64 @@ class MotionCore:
         self._arbiter.release(reason)
         self._state = RobotState.at_rest(where)
         self._filter.reset(self._state)
+
+    def prepare_scene(
+        self, scene: PlanningScene, version: int, near: Array | None
+    ) -> PreparedScene:
+        """Measure a scene beside the cycle.
+
+        Args:
+            scene: The scene.
+            version: Its number.
+            near: Where the arm is in [rad]; None while that is not known.
+
+        Raises:
+            SceneError: It is of another arm.
+        """
+        self._model.check_scene(scene)
+        checks_paths = self._settings.check_self_collision
+        return PreparedScene.of(scene, version, near=near, checks_paths=checks_paths)
+
+    def use_scene(self, scene: PreparedScene) -> Execution | None:
+        """Let another scene count from now on, for jogs, targets and trajectories.
+
+        Args:
+            scene: What :meth:`prepare_scene` returned.
+
+        Returns:
+            The trajectory under way, whose path is to be checked again beside the cycle; see
+            :meth:`conclude_check`. The safety filter keeps it from contact until then. None where
+            there is nothing to check.
+        """
+        self._model.use_scene(scene.clearances)
+        self._scene = scene
+        self._filter.forget()
+        is_checked = self.source is Source.TRAJECTORY and scene.check is not None
+        self._unchecked = self.execution if is_checked else None
+        return self._unchecked
+
+    def conclude_check(self, execution: Execution, scene: PreparedScene, problem: str) -> None:
+        """Go on with a trajectory whose path is clear in a scene, or end it on its path.
+
+        Args:
+            execution: The trajectory.
+            scene: The scene; nothing is done when it does not count any more.
+            problem: What is in the way; empty when nothing is.
+        """
+        if scene is not self._scene or execution is not self._unchecked:
+            return
+        if not problem:
+            self._unchecked = None
+        elif self.motion is execution and execution.ending is None:
+            self._end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, problem))
+
+    def hold(self, *, is_held: bool = True) -> None:
+        """Bring a jog or a single target to rest for what is prepared, or let it go on.
+
+        Args:
+            is_held: Whether it comes to rest.
+        """
+        self._arbiter.held = is_held
 
     def prepare(
         self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None = None
@@ -283,7 +361,8 @@ class MotionCore:
         self._loose = jogged or (self._loose and state.moving and self._arbiter.brakes)
         if self._loose:
             return self._settings.clearance
-        if self._arbiter.on_path or not self._settings.check_self_collision:
+        is_clear = self._arbiter.on_path and self._unchecked is not self.execution
+        if is_clear or not self._settings.check_self_collision:
             return None
         return 0.0
 
@@ -291,12 +370,15 @@ class MotionCore:
         """End a motion that the safety filter does not let go on; the arm comes to rest."""
         is_target, code = self.source is Source.TARGET, GoalCode.PATH_TOLERANCE_VIOLATED
         if limiter.cause is Cause.COLLISION:
-            where = (
-                'on the way to the target from where the arm is; go around that'
-                if is_target
-                else 'while the arm catches up with the path; begin at rest, or give the first'
-                ' point more time'
-            )
+            if is_target:
+                where = 'on the way to the target from where the arm is; go around that'
+            elif self._unchecked is self.execution:
+                where = 'on the trajectory: the scene changed; lead it around that'
+            else:
+                where = (
+                    'while the arm catches up with the path; begin at rest, or give the first'
+                    ' point more time'
+                )
             self._arbiter.end(Outcome(code, f'{limiter.name} would collide {where}'))
         elif is_target and is_at_rest:
             self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
@@ -324,6 +406,12 @@ class MotionCore:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'{self._last_change} before this command had begun; send it again',
+            )
+        if basis.scene is not self._scene:
+            raise StateMovedError(
+                GoalCode.INVALID_GOAL,
+                f'the scene changed (version {basis.scene.version} to {self._scene.version}) while'
+                ' this motion was prepared; send it again',
             )
         if isinstance(motion, Execution):
             self._check_place(basis.state, state)

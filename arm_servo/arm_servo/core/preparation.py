@@ -20,7 +20,6 @@ from arm_trajectory import (
     GoalCode,
     GoalError,
     OnlineTrajectoryGenerator,
-    PathCheck,
     Plan,
     TimerState,
     TrajectoryGoal,
@@ -29,6 +28,7 @@ from arm_trajectory import (
 from .arbiter import Motion
 from .commands import by_joint, check_command
 from .execution import Execution
+from .prepared_scene import PreparedScene
 from .requests import (
     DisplacementRequest,
     ImmediateRequest,
@@ -47,6 +47,7 @@ class CommandBasis:
 
     Attributes:
         state: Commanded state where the motion begins.
+        scene: What may collide.
         sequence: Number of commands and stops so far.
         source: What moves the arm.
         speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
@@ -56,7 +57,8 @@ class CommandBasis:
     """
 
     state: RobotState
-    sequence: int
+    scene: PreparedScene
+    sequence: int = 0
     source: Source = Source.NONE
     speed_scaling: float = 1.0
     target: Array | None = None
@@ -115,7 +117,6 @@ class Preparation:
         self._generator = OnlineTrajectoryGenerator(
             model.limits
         )  # that of the cycle is for the cycle
-        self._check = PathCheck(model.scene) if settings.check_self_collision else None
 
     def prepare(
         self, request: MotionRequest | ImmediateRequest, basis: CommandBasis | None
@@ -183,18 +184,19 @@ class Preparation:
                 f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
             )
         motion = SingleTarget(target, max_speed, self._generator)
-        self._check_single_target(motion.plan(basis.state, basis.speed_scaling))
+        self._check_single_target(motion.plan(basis.state, basis.speed_scaling), basis)
         return motion
 
-    def _check_single_target(self, plan: Plan | None) -> None:
+    def _check_single_target(self, plan: Plan | None, basis: CommandBasis) -> None:
         """Make sure that no links meet on the way to a single target, as it is driven."""
-        if self._check is None or plan is None:
+        check = basis.scene.check
+        if check is None or plan is None:
             return
 
         def positions(times: Array) -> Array:
             return np.array([plan.at(time).position for time in times.tolist()])
 
-        found = self._check.contact(positions, plan.duration)
+        found = check.contact(positions, plan.duration)
         if found:
             raise CommandError(
                 f'{" and ".join(found.links)} would collide after {found.time:.2f} s on the way'
@@ -217,8 +219,8 @@ class Preparation:
             settings=self._settings.execution,
             wait=wait,
         )
-        path = execution.path
-        found = self._check and self._check.contact(path.positions, path.duration)
+        check = basis.scene.check
+        found = check and execution.contact(check)
         if found:
             raise GoalError(
                 GoalCode.INVALID_GOAL,

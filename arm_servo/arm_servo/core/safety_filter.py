@@ -61,6 +61,10 @@ class SafetyFilter:
         if stop is not None:
             self._remember(stop)
 
+    def forget(self) -> None:
+        """Measure anew how near links may be: what may collide has changed."""
+        self._floor = None
+
     def step(
         self, state: RobotState, wanted: RobotState, period: float, clearance: float | None
     ) -> tuple[RobotState, Limiter | None]:

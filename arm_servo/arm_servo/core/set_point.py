@@ -21,6 +21,13 @@ class Source(Enum):
     TARGET = 'target'
 
 
+JOGGING = (Source.JOG, Source.TARGET)
+"""What the servo commands."""
+
+MOTIONS = (*JOGGING, Source.TRAJECTORY)
+"""What moves the arm."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SetPoint:
     """What to command in a cycle.

@@ -158,7 +158,9 @@ class ToolMotion(Generic[AnyDrives]):
         self._controller = TrajectoryController(
             controller, drives.gateway, trajectory, drives.prepare
         )
-        self._gripper = GripperController(controller, drives.gateway, gripper, self._get_ready)
+        self._gripper = GripperController(
+            controller, drives.gateway, gripper, self._controller.check_active, drives.prepare
+        )
 
     def entries(self, period: float) -> list[Controller]:
         """Return the controller as the manager shows it.
@@ -167,11 +169,6 @@ class ToolMotion(Generic[AnyDrives]):
             period: Period of the cycle in [s].
         """
         return [_entry(self.nodes[0], self.drives, period, self._set_active)]
-
-    def _get_ready(self) -> None:
-        """Get the drives back for the gripper, which shares the controller's node and state."""
-        self._controller.check_active()
-        self.drives.prepare()
 
     def _set_active(self, active: bool) -> None:  # a callback of the manager
         self._controller.set_active(active)

@@ -19,7 +19,8 @@ from arm_model import ArmError, RobotState
 from arm_trajectory import GoalCode
 from node_runner.action_goals import serve_goals
 
-from ...core.gateway import CommandGateway, MotionCommand
+from ...core.gateway import CommandGateway
+from ...core.motion_queue import MotionCommand
 from ...core.outcome import CONTINUED
 from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
 from .parameters import GripperParameters
@@ -56,6 +57,7 @@ class GripperController:
         node: Node,
         gateway: CommandGateway,
         parameters: GripperParameters,
+        check_active: Callable[[], None],
         prepare: Callable[[], None],
     ) -> None:
         """Offer them; the first only for a gripper of one joint.
@@ -64,11 +66,12 @@ class GripperController:
             node: The controller's node.
             gateway: Commands to the core.
             parameters: How it behaves.
-            prepare: Called before a motion, to get the drives back; raises an ArmError where
-                no motion may begin.
+            check_active: Raises an ArmError where no motion may begin.
+            prepare: Called before a motion that is not refused, to get the drives back.
         """
         self._node, self._gateway = node, gateway
-        self._parameters, self._prepare = parameters, prepare
+        self._parameters = parameters
+        self._check_active, self._prepare = check_active, prepare
         self._joints = gateway.model.joints
         self._goals: dict[bytes, _Goal] = {}
         interfaces: list[GripperInterface] = [ParallelGripper()]
@@ -91,8 +94,8 @@ class GripperController:
         goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, interface)
         try:
             request = interface.request(handle.request, self._joints)
-            self._prepare()
-            goal.command = self._gateway.request(request)
+            self._check_active()
+            goal.command = self._gateway.request(request, self._prepare)
         except ArmError as error:
             goal.problem = str(error)
         except Exception as error:  # noqa: BLE001  # a goal must not end the program

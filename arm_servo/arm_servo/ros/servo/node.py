@@ -23,9 +23,10 @@ from arm_model import ArmError, ModelError
 from arm_model.ros import seconds, TfListener
 from arm_trajectory import GoalCode
 
-from ...core.gateway import CommandGateway, JOGGING
+from ...core.gateway import CommandGateway
 from ...core.outcome import Outcome
 from ...core.requests import DisplacementRequest, JogRequest, StopRequest
+from ...core.set_point import JOGGING
 from ...exceptions import NotReadyError
 from ..refusals import Refusals
 from .command_converter import CommandConverter
@@ -89,27 +90,34 @@ class Servo:
             age = self._checked_age(message)
             self._modes.admit(kind)
             request = convert(message, begin - age)
-            if not request.is_zero and begin - self._last > NEW_MOTION_SILENCE:
-                self._prepare()
+            self._send(request, (kind, message.header.frame_id), begin)
         except ArmError as error:
             self._refuse(str(error))
-            return
         except Exception as error:  # noqa: BLE001  # a message must not end the program
             self._refuse(f'{type(error).__name__}: {error}')
             self._node.get_logger().error(
                 f'a {kind.name} command raised {traceback.format_exc()}', throttle_duration_sec=5.0
             )
-            return
-        if not request.is_zero:
-            self._last = begin
+
+    def _send(
+        self,
+        request: JogRequest | DisplacementRequest,
+        client: tuple[CommandKind, str],
+        now: float,
+    ) -> None:
+        """Command a motion; what begins after a silence gets back drives that others have."""
+        begins = not request.is_zero and now - self._last > NEW_MOTION_SILENCE
+        get_ready = self._prepare if begins else _do_nothing
         if isinstance(request, JogRequest):
             # the events executor hands out no publisher, so topic and frame stand for the client
-            request = replace(request, client=(kind, message.header.frame_id))
-            self._gateway.command(request).add_done_callback(self._note)
-            return
-        command = self._gateway.request(request)
-        command.future.add_done_callback(self._note)
-        command.ended.add_done_callback(self._note_end)
+            request = replace(request, client=client)
+            self._gateway.command(request, get_ready).add_done_callback(self._note)
+        else:
+            command = self._gateway.request(request, get_ready)
+            command.future.add_done_callback(self._note)
+            command.ended.add_done_callback(self._note_end)
+        if not request.is_zero:
+            self._last = now
 
     def _checked_age(self, message: Any) -> float:  # noqa: ANN401
         """Return how long ago a message was sent in [s]."""
@@ -175,3 +183,7 @@ class Servo:
         if reason := self._refusals.to_log(now):
             self._node.get_logger().warning(f'refused: {reason}')
         self._status.publish(ServoStatus(code=code, message=words))
+
+
+def _do_nothing() -> None:
+    """Leave the drives to who has them."""

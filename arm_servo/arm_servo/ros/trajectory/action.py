@@ -19,7 +19,8 @@ from arm_trajectory import GoalCode, TrajectoryGoal
 from node_runner.action_goals import serve_goals
 
 from ...core.execution import Execution
-from ...core.gateway import CommandGateway, MotionCommand
+from ...core.gateway import CommandGateway
+from ...core.motion_queue import MotionCommand
 from ...core.outcome import Outcome, refused
 from .messages import difference, point_of
 

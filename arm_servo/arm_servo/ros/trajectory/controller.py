@@ -23,7 +23,8 @@ from arm_trajectory import TrajectoryGoal
 from node_runner import LATCHED
 
 from ...core.execution import Execution
-from ...core.gateway import CommandGateway, MotionCommand
+from ...core.gateway import CommandGateway
+from ...core.motion_queue import MotionCommand
 from ...core.requests import SpeedRequest, StopRequest
 from ...core.set_point import Source
 from ...exceptions import NotReadyError
@@ -53,7 +54,7 @@ class TrajectoryController:
             node: The controller's node.
             gateway: Commands to the core.
             parameters: How it behaves.
-            prepare: Called before a trajectory, to get the drives back.
+            prepare: Called before a trajectory that is not refused, to get the drives back.
         """
         self.active = True
         self._node = node
@@ -93,8 +94,7 @@ class TrajectoryController:
 
     def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
         self.check_active()
-        self._prepare()
-        command = self._gateway.request(goal)
+        command = self._gateway.request(goal, self._prepare)
         command.future.add_done_callback(self._remember)
         return command
 

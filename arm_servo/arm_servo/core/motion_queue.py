@@ -1,0 +1,375 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motions from their request to their end: prepared one after the other, begun in the cycle."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Executor, Future, InvalidStateError
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+import math
+import threading
+from typing import Any
+
+from arm_model import RobotState
+from arm_trajectory import GoalCode, StateMovedError, TrajectoryGoal
+
+from ..exceptions import NotReadyError
+from .arbiter import Motion
+from .execution import Execution
+from .motion_core import MotionCore
+from .orders import CommandOrder, Cycle, OrderQueue
+from .outcome import Outcome, refused
+from .preparation import CommandBasis, Prepared
+from .requests import MotionRequest, StopRequest
+from .set_point import Source
+
+MAX_QUEUED_MOTIONS = 50
+"""Motions that may wait to be prepared."""
+
+PREPARATION_TIME = 5e-3
+"""Time that preparing may take for any trajectory in [s]; see Preparation for the figures."""
+
+PREPARATION_TIME_PER_POINT = 5e-4
+"""Time that preparing may take for each point in [s]."""
+
+PREPARATION_TIME_PER_SECOND = 5e-3
+"""Time that looking for collisions may take for each second of the path in [s]."""
+
+MAX_CHECKED_DURATION = 100.0
+"""Part of a trajectory for whose check a begin in motion waits in [s]."""
+
+MAX_FORESIGHT = 0.03
+"""Time over which a jog or a single target is foreseen in [s]; later it may have turned."""
+
+MIN_CYCLES_AHEAD = 3
+"""Least cycles from the basis to the begin of a motion that is foreseen."""
+
+MAX_ATTEMPTS = 3
+"""How often a trajectory is prepared where others move the arm meanwhile."""
+
+REST_TIMEOUT = 1.0
+"""Time in which a jogged arm must come to rest for a trajectory in [s]."""
+
+CANCELED = Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
+NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
+
+
+@dataclass(slots=True, eq=False)
+class MotionCommand:
+    """A motion from its request to its end.
+
+    Attributes:
+        request: What is asked.
+        number: Its place among all commands and stops.
+        requested: Steady time of the request in [s].
+        rest: Where the arm stands while others have its drives: from there the motion is tried
+            before the drives are taken from them. None where the arm follows.
+        get_ready: Gets the drives back.
+        future: Its execution, or None for a single target, once it began; else why it is refused.
+        ended: How it ended, whatever became of it; set once, at the latest when the cycle fails.
+        motion: What moves the arm for it, once it began.
+        attempts: How often it may still be prepared.
+        is_canceled: Whether it is to begin no more.
+        holds: Whether a jog or a target is held for it.
+    """
+
+    request: MotionRequest
+    number: int
+    requested: float
+    rest: RobotState | None = None
+    get_ready: Callable[[], None] = lambda: None
+    future: Future[Execution | None] = field(default_factory=Future)
+    ended: Future[Outcome] = field(default_factory=Future)
+    motion: Motion | None = None
+    attempts: int = MAX_ATTEMPTS
+    is_canceled: bool = False
+    holds: bool = False
+
+    @property
+    def execution(self) -> Execution | None:
+        """The execution once a trajectory began."""
+        return self.motion if isinstance(self.motion, Execution) else None
+
+    def end(self, outcome: Outcome) -> None:
+        """Note how it ended, unless that is known."""
+        with suppress(InvalidStateError):
+            self.ended.set_result(outcome)
+
+    @property
+    def source(self) -> Source:
+        """What moves the arm then."""
+        is_trajectory = isinstance(self.request, TrajectoryGoal)
+        return Source.TRAJECTORY if is_trajectory else Source.TARGET
+
+
+class MotionQueue:
+    """Prepares motions in the worker, and has them begin in the cycle.
+
+    :meth:`request` and :meth:`cancel` are for any thread, :meth:`report_ends` and :meth:`clear`
+    for the cycle.
+    """
+
+    def __init__(
+        self,
+        core: MotionCore,
+        orders: OrderQueue,
+        order: CommandOrder,
+        worker: Executor,
+        clock: Callable[[], float],
+    ) -> None:
+        """Begin empty.
+
+        Args:
+            core: The core.
+            orders: What the cycle carries out.
+            order: Which command counts.
+            worker: Prepares motions, one after the other.
+            clock: Steady time, the one of the cycle.
+        """
+        self._core, self._orders, self._order = core, orders, order
+        self._worker, self._clock = worker, clock
+        self._begun: list[MotionCommand] = []  # of the cycle
+        self._lock = threading.Lock()  # of the two below; held for a few instructions only
+        self._waiting: deque[MotionCommand] = deque()
+        self._preparing: MotionCommand | None = None
+
+    def request(
+        self, request: MotionRequest, rest: RobotState | None, get_ready: Callable[[], None]
+    ) -> MotionCommand:
+        """Have a motion prepared, and begun when it is found to be clear.
+
+        Args:
+            request: What is asked.
+            rest: Where the arm stands while others have its drives; None where it follows.
+            get_ready: Gets the drives back.
+        """
+        with self._lock:
+            command = MotionCommand(request, *self._order.number(), rest, get_ready)
+            is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
+            if not is_full:
+                self._waiting.append(command)
+        if is_full:
+            error = NotReadyError(
+                f'{MAX_QUEUED_MOTIONS} motions wait already; send them more slowly'
+            )
+            self._refuse(command, error)
+        self._prepare_next()
+        return command
+
+    def cancel(self, command: MotionCommand, reason: str) -> None:
+        """End a motion: before its begin it does not begin, later the arm comes to rest.
+
+        Args:
+            command: The motion.
+            reason: Why, for the outcome of a trajectory.
+        """
+
+        def stop(cycle: Cycle) -> bool:
+            if command.motion is not None:
+                request = StopRequest(reason, motion=command.motion)
+                self._core.commit(self._core.prepare(request), cycle.now)
+            return True
+
+        # the mark first: a commit that has missed it comes before the order
+        command.is_canceled = True
+        if command.future.cancel():
+            command.end(CANCELED)
+        self._orders.append(stop)
+
+    def clear(self, reason: str) -> None:
+        """Refuse all that waits, for a cycle that has failed: its turn does not come.
+
+        Args:
+            reason: What has failed, with the remedy.
+        """
+        with self._lock:
+            waiting, self._waiting = self._waiting, deque()
+        for command in waiting:
+            self._refuse(command, NotReadyError(reason))
+
+    def report_ends(self) -> None:
+        """Report how motions have ended."""
+        for command in self._begun.copy():
+            if command.motion is None or command.motion.outcome is not None:
+                self._begun.remove(command)
+                command.end((command.motion and command.motion.outcome) or NOTHING)
+
+    def _prepare_next(self) -> None:
+        """Begin with the next motion, once the one before has begun or was refused."""
+        with self._lock:
+            if self._preparing is not None or not self._waiting:
+                return
+            command = self._preparing = self._waiting.popleft()
+        if command.rest is None:
+            self._get_ready(command)
+        else:
+            basis = CommandBasis(command.rest, self._core.scene)
+            self._submit(command, lambda: self._try_out(command, basis))
+
+    def _submit(self, command: MotionCommand, step: Callable[[], None]) -> None:
+        self._worker.submit(lambda: self._guarded(command, step))
+
+    def _try_out(self, command: MotionCommand, basis: CommandBasis) -> None:
+        """Prepare a motion from where the arm stands: one that is refused takes no drives."""
+        self._core.prepare(command.request, basis)
+        self._get_ready(command)
+
+    def _get_ready(self, command: MotionCommand) -> None:
+        if self._guarded(command, command.get_ready):
+            self._order_basis(command)
+
+    def _order_basis(self, command: MotionCommand) -> None:
+        ordered = self._clock()
+
+        def hand_out(cycle: Cycle) -> bool:
+            self._guarded(command, lambda: self._hand_out(command, ordered, cycle))
+            return True
+
+        self._orders.append(hand_out)
+
+    def _hand_out(self, command: MotionCommand, since: float, cycle: Cycle) -> None:
+        """Have a motion prepared from the state of this cycle."""
+        self._order.admit(command.source, command.number, since, cycle)
+        basis = self._core.basis
+        self._submit(command, lambda: self._prepare(command, basis, cycle))
+
+    def _prepare(self, command: MotionCommand, basis: CommandBasis, cycle: Cycle) -> None:
+        """Plan and check a motion; in the worker's thread."""
+        request = command.request
+        if not isinstance(request, TrajectoryGoal):
+            self._order_commit(command, self._core.prepare(request, basis), cycle.now)
+            return
+        elapsed = cycle.now - command.requested
+        at_rest = not basis.state.moving and basis.source is Source.NONE
+        if at_rest and not request.age:  # it begins whenever it begins
+            self._order_commit(command, self._core.prepare(request, basis), cycle.now)
+            return
+        needed = _preparation_time(request)
+        if not at_rest and basis.source is not Source.TRAJECTORY and needed > MAX_FORESIGHT:
+            # nobody can foresee a jog for so long; a goal that is refused does not stop it
+            rest = replace(basis, state=RobotState.at_rest(basis.state.position))
+            self._core.prepare(_aged(request, elapsed), rest)
+            self._order_rest(command)
+            return
+        cycles = max(MIN_CYCLES_AHEAD, math.ceil(needed / cycle.period) + 1)
+        ahead = cycles * cycle.period
+        prepared = self._core.prepare(_aged(request, elapsed + ahead), basis.foreseen(ahead))
+        self._order_commit(command, prepared, cycle.now + ahead)
+
+    def _order_rest(self, command: MotionCommand) -> None:
+        """Bring the arm to rest for a trajectory, and prepare it from there.
+
+        A jog is held, not ended: it goes on where the trajectory is refused after all.
+        """
+        ordered = self._clock()
+
+        def rest(cycle: Cycle) -> bool:
+            since = cycle.now if command.holds else ordered
+            if not self._guarded(
+                command,
+                lambda: self._order.admit(command.source, command.number, since, cycle),
+            ):
+                return True
+            if not command.holds:
+                self._core.hold()
+                command.holds = True
+            if self._core.basis.source is Source.NONE and not self._core.state.moving:
+                self._guarded(command, lambda: self._hand_out(command, cycle.now, cycle))
+                return True
+            if cycle.now - ordered <= REST_TIMEOUT:
+                return False
+            self._refuse(
+                command,
+                NotReadyError(
+                    'the arm does not come to rest for the trajectory; end the commands that'
+                    ' jog it'
+                ),
+            )
+            return True
+
+        self._orders.append(rest)
+
+    def _order_commit(self, command: MotionCommand, prepared: Prepared, planned: float) -> None:
+        """Have a motion begin at the time for which it was planned, or as soon as can be."""
+        self._order.check(command.source, command.number)  # no cycle may come that does
+        ordered = max(self._clock(), planned)
+
+        def begin(cycle: Cycle) -> None:
+            self._order.admit(command.source, command.number, ordered, cycle)
+            self._core.commit(prepared, cycle.now, cycle.now - planned)
+            command.motion = prepared.motion
+            self._begun.append(command)
+            # canceled in this moment: the order behind it stops it
+            with suppress(InvalidStateError):
+                command.future.set_result(command.execution)
+
+        def commit(cycle: Cycle) -> bool:
+            if planned > cycle.now + 0.5 * cycle.period and not cycle.blocked:
+                return False
+            if self._guarded(command, lambda: begin(cycle)):
+                self._end(command)
+            return True
+
+        self._orders.append(commit)
+
+    def _guarded(self, command: MotionCommand, step: Callable[[], Any]) -> bool:
+        """Take a step of a motion; return whether it was not refused."""
+        try:
+            if command.is_canceled:
+                raise CancelledError  # noqa: TRY301
+            step()
+        except StateMovedError as error:
+            command.attempts -= 1
+            if command.attempts > 0:
+                self._order_basis(command)
+            else:
+                self._refuse(command, error)
+            return False
+        except (Exception, CancelledError) as error:  # noqa: BLE001  # its future carries it
+            self._refuse(command, error)
+            return False
+        return True
+
+    def _refuse(self, command: MotionCommand, error: BaseException) -> None:
+        """End a motion that does not begin; a jog that was held for it goes on."""
+
+        def go_on(_cycle: Cycle) -> bool:
+            self._core.hold(is_held=False)
+            return True
+
+        if command.holds:
+            self._orders.append(go_on)
+        with suppress(InvalidStateError):  # canceled already
+            if isinstance(error, CancelledError):
+                command.future.cancel()
+            else:
+                command.future.set_exception(error)
+        command.end(CANCELED if isinstance(error, CancelledError) else refused(error))
+        self._end(command)
+
+    def _end(self, command: MotionCommand) -> None:
+        """Go on to the next motion."""
+        with self._lock:
+            if self._preparing is command:
+                self._preparing = None
+        self._prepare_next()
+
+
+def _aged(goal: TrajectoryGoal, elapsed: float) -> TrajectoryGoal:
+    """Return a goal some time later; one without a stamp begins whenever it begins."""
+    return replace(goal, age=goal.age + elapsed) if goal.age else goal
+
+
+def _preparation_time(goal: TrajectoryGoal) -> float:
+    """Return how long it takes at most to prepare a goal in [s]; it is not checked yet."""
+    last = goal.points[-1].time if goal.points else 0.0
+    duration = last - goal.age if math.isfinite(last) else 0.0
+    checked = min(max(duration, 0.0), MAX_CHECKED_DURATION)
+    return (
+        PREPARATION_TIME
+        + PREPARATION_TIME_PER_POINT * len(goal.points)
+        + PREPARATION_TIME_PER_SECOND * checked
+    )

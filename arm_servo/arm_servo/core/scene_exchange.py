@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes from any thread for the cycle; a trajectory under way is checked again in each."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor, Future
+from itertools import count
+
+from arm_model import Array, PlanningScene
+
+from .execution import Execution
+from .motion_core import MotionCore
+from .orders import Cycle, OrderQueue
+from .prepared_scene import PreparedScene
+
+
+class SceneExchange:
+    """Has scenes prepared by who brings them, taken by the cycle, and paths checked in them."""
+
+    def __init__(self, core: MotionCore, orders: OrderQueue, worker: Executor) -> None:
+        """Begin with the scene of the core.
+
+        Args:
+            core: The core.
+            orders: What the cycle carries out.
+            worker: The thread that prepares motions; it looks for collisions, too.
+        """
+        self._core, self._orders, self._worker = core, orders, worker
+        self._versions = count(1)
+
+    def use(self, scene: PlanningScene, near: Array | None) -> Future[int]:
+        """Have a scene count from the next cycle on; measured here, in the thread of the caller.
+
+        Args:
+            scene: The scene.
+            near: Where the arm is in [rad]; None while that is not known.
+
+        Returns:
+            The version of the scene once it counts.
+
+        Raises:
+            SceneError: The scene is of another arm.
+        """
+        version = next(self._versions)
+        prepared = self._core.prepare_scene(scene, version, near)
+        future: Future[int] = Future()
+
+        def take(_cycle: Cycle) -> bool:
+            execution = self._core.use_scene(prepared)
+            if execution is not None:
+                begin = execution.feedback.time
+                self._worker.submit(lambda: self._check(execution, begin, prepared))
+            future.set_result(version)
+            return True
+
+        self._orders.append(take)
+        return future
+
+    def _check(self, execution: Execution, begin: float, scene: PreparedScene) -> None:
+        """Look for contact on the rest of a path; in the worker's thread."""
+        try:
+            found = None if scene.check is None else execution.contact(scene.check, begin)
+            problem = found and (
+                f'{" and ".join(found.links)} would collide at {found.time:.2f} s of the'
+                ' trajectory: the scene changed; lead it around that'
+            )
+        except Exception as error:  # noqa: BLE001  # what is not known to be clear ends
+            problem = (
+                'the scene changed, and the rest of the trajectory could not be checked:'
+                f' {type(error).__name__}: {error}'
+            )
+
+        def conclude(_cycle: Cycle) -> bool:
+            self._core.conclude_check(execution, scene, problem or '')
+            return True
+
+        self._orders.append(conclude)
