@@ -88,9 +88,19 @@ class DeviceRunner:
 
     def _receive(self, timeout: float) -> list[Frame]:
         frames = self._thread.receive(timeout)
-        if frames and time.monotonic() - (frames[0].timestamp or math.inf) > STALL:
-            return newest_process_data(frames)
-        return frames
+        stall = time.monotonic() - (frames[0].timestamp or math.inf) if frames else 0.0
+        if stall <= STALL:
+            return frames
+        kept = newest_process_data(frames)
+        syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
+        logger.warning(
+            'the simulated devices got no processor for %.2f s: %d SYNC and %d other frames of '
+            'process data are passed over, as by the mailboxes of a CAN controller',
+            stall,
+            max(0, syncs - 1),
+            len(frames) - len(kept) - max(0, syncs - 1),
+        )
+        return kept
 
     def _send(self, frame: Frame) -> None:
         try:

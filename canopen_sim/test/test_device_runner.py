@@ -31,9 +31,9 @@ def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
 
 
 def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """It answers one SYNC and not all of the past, as a burst of positions that are long over."""
+    """It answers one SYNC and not all of the past, and its log says how many it passed over."""
     monkeypatch.setattr(runner, 'STALL', 0.0)
     name = free_virtual()
     with open_bus(name) as bus, open_bus(name) as master:
@@ -56,3 +56,4 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
             devices.stop()
         answers = [f for f in master.receive(0.0) if f.can_id == tpdo_default(1, NODE_ID)]
     assert len(answers) == 1
+    assert any(isinstance(record.args, tuple) and 19 in record.args for record in caplog.records)
