@@ -17,6 +17,7 @@ CHECKOUT = Path(__file__).parents[1]
 READMES = (
     'arm_canopen',
     'arm_model',
+    'arm_planning',
     'arm_servo',
     'arm_trajectory',
     'canopen_sim',

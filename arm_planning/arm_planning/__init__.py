@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion planning of an arm among obstacles; no ROS.
 
-A :class:`MotionRequest` goes in, a :class:`MotionPlan` comes out, or a :class:`PlanningError`
-with MoveIt's code and the reason in words.
+A :class:`Planner` plans: a :class:`MotionRequest` goes in, a :class:`MotionPlan` comes out, or a
+:class:`PlanningError` with MoveIt's code and the reason in words.
 """
 
 from __future__ import annotations
 
 from .exceptions import PlanningCode, PlanningError
+from .planner import Planner
 from .requests import (
     CircPoint,
     CircPointKind,
@@ -21,6 +22,7 @@ from .requests import (
     PoseGoal,
     PositionConstraint,
 )
+from .validity import ValidityCheck, Violation
 
 __all__ = [
     'CircPoint',
@@ -31,8 +33,11 @@ __all__ = [
     'MotionRequest',
     'OrientationConstraint',
     'PathConstraints',
+    'Planner',
     'PlanningCode',
     'PlanningError',
     'PoseGoal',
     'PositionConstraint',
+    'ValidityCheck',
+    'Violation',
 ]

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether straight motions look free, quickly: the search asks it thousands of times.
+
+It answers yes or no, by pinocchio's broad phase over the geometry of the scene, at places between
+which no shape moves by more than a resolution. What it lets pass is measured afterwards by
+:class:`arm_planning.validity.ValidityCheck`, which has the last word.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+import math
+
+import numpy as np
+import pinocchio as pin
+
+from arm_model import Array, PlanningScene
+
+from ..validity import MARGIN
+
+RESOLUTION = 0.03
+"""Greatest motion of a shape against another between two places in [m]."""
+
+MIN_RESOLUTION = 0.002
+"""Finest resolution: from there on the places are those of the validity check."""
+
+
+class MotionCheck:
+    """Collision checks of one search; belongs to one thread.
+
+    Attributes:
+        resolution: Greatest motion of a shape against another between two places in [m].
+    """
+
+    def __init__(self, scene: PlanningScene, margin: float = MARGIN) -> None:
+        """Prepare.
+
+        Args:
+            scene: What may collide.
+            margin: Distance that every pair keeps in [m].
+        """
+        self.resolution = RESOLUTION
+        self._kinematics = scene.kinematics
+        self._model, self._data = scene.kinematics.native, scene.kinematics.native.createData()
+        self._rates = scene.distance_rate_bounds
+        results = scene.geometry.createData()
+        for request in results.collisionRequests:
+            request.security_margin = margin
+        self._scene, self._results = scene, results  # the broad phase refers to them
+        self._broad_phase = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._model, scene.geometry, results
+        )
+        self._exact = False
+
+    def free(self, positions: Array) -> bool:
+        """Whether no pair is nearer than the margin.
+
+        Args:
+            positions: Joint positions in [rad] (n).
+        """
+        expanded = self._kinematics.expanded(positions)
+        if self._exact:
+            return not pin.computeCollisions(
+                self._model, self._data, self._scene.geometry, self._results, expanded, True
+            )
+        return not pin.computeCollisions(
+            self._model, self._data, self._broad_phase, expanded, True
+        )
+
+    def clear(self, begin: Array, end: Array) -> bool:
+        """Whether all places looked at behind the begin of a straight motion are free.
+
+        Args:
+            begin: Joint positions in [rad] (n), known to be free.
+            end: Joint positions in [rad] (n).
+        """
+        way = end - begin
+        motion = float((self._rates @ np.abs(way)).max(initial=0.0))
+        shares = _coarse_first(math.ceil(motion / self.resolution) + 1)
+        places = begin + shares[:, None] * way
+        return all(map(self.free, places))
+
+    def refine(self) -> None:
+        """Look twice as densely from now on, and without the broad phase.
+
+        That passes over pairs which are nearer than the margin while their boxes do not touch.
+        """
+        self.resolution = max(0.5 * self.resolution, MIN_RESOLUTION)
+        self._exact = True
+
+
+@lru_cache(maxsize=1024)
+def _coarse_first(count: int) -> Array:
+    """Return the shares 1/count .. 1 so that early ones are far apart: a contact is found soon."""
+    bits = max(count - 1, 1).bit_length()
+    numbers = np.arange(1 << bits)
+    reversed_bits = np.zeros_like(numbers)
+    for bit in range(bits):
+        reversed_bits |= ((numbers >> bit) & 1) << (bits - 1 - bit)
+    order = reversed_bits[reversed_bits < count]
+    shares: Array = (count - order) / count
+    return shares

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""RRT-Connect: two trees, from start and goals, grow towards each other.
+
+Kuffner, LaValle, "RRT-Connect: An efficient approach to single-query path planning", ICRA 2000;
+with the balancing of the trees that OMPL has. One is ours because the collision check decides
+over its speed, and that of the scene is quicker here than a library's that calls back for each
+state; the bench has the comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from arm_model import Array
+
+from .motion_check import MotionCheck
+
+MAX_EXTENSION = 1.2
+"""Greatest length of an edge in [rad]."""
+
+FIRST_NODES = 256
+"""Nodes that a tree has room for at first."""
+
+SAME = 1e-9
+"""Distance of states that are one in [rad]."""
+
+
+class _Tree:
+    """States, and the state from which each was reached."""
+
+    def __init__(self, roots: Sequence[Array]) -> None:
+        self.count = 0
+        self._states: Array = np.zeros((max(FIRST_NODES, 2 * len(roots)), len(roots[0])))
+        self._parents: list[int] = []
+        for root in roots:
+            self.add(root, -1)
+
+    def add(self, state: Array, parent: int) -> int:
+        """Add a state, and return its number."""
+        if self.count == len(self._states):
+            self._states = np.concatenate((self._states, np.zeros_like(self._states)))
+        self._states[self.count] = state
+        self._parents.append(parent)
+        self.count += 1
+        return self.count - 1
+
+    def state(self, node: int) -> Array:
+        """Return the state of a node."""
+        state: Array = self._states[node]
+        return state
+
+    def nearest(self, state: Array) -> int:
+        """Return the node that is nearest to a state."""
+        apart = self._states[: self.count] - state
+        return int(np.einsum('mn,mn->m', apart, apart).argmin())
+
+    def branch(self, node: int) -> list[Array]:
+        """Return the states from a root to a node."""
+        found = []
+        while node >= 0:
+            found.append(self._states[node].copy())
+            node = self._parents[node]
+        return found[::-1]
+
+
+def rrt_connect(
+    start: Array,
+    goals: Sequence[Array],
+    sample: Callable[[], Array],
+    check: MotionCheck,
+    expired: Callable[[], bool],
+) -> Array | None:
+    """Return the places of a path that looks free (m, n); None where the time is over.
+
+    Args:
+        start: Joint positions in [rad] (n), free.
+        goals: Joint positions in [rad] (n), free; one of them is reached.
+        sample: Draws joint positions.
+        check: Checks states and motions.
+        expired: Whether the time is over.
+    """
+    for goal in goals:
+        if check.clear(start, goal):
+            return np.array((start, goal))
+    from_start, from_goal = _Tree([start]), _Tree(goals)
+    growing, other = from_start, from_goal
+    while not expired():
+        if growing.count > other.count:
+            growing, other = other, growing
+        reached = _extend(growing, sample(), check)
+        if reached is None:
+            continue
+        target = growing.state(reached).copy()
+        met = _connect(other, target, check)
+        if met is not None:
+            here, there = growing.branch(reached), other.branch(met)
+            if growing is from_goal:
+                here, there = there, here
+            return np.array([*here, *there[-2::-1]])
+        growing, other = other, growing
+    return None
+
+
+def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
+    """Grow a tree by an edge towards a target, and return its end; None where it is blocked."""
+    near = tree.nearest(target)
+    begin = tree.state(near)
+    way = target - begin
+    length = float(np.linalg.norm(way))
+    if length < SAME:
+        return near
+    end = target if length <= MAX_EXTENSION else begin + way * (MAX_EXTENSION / length)
+    return tree.add(end, near) if check.clear(begin, end) else None
+
+
+def _connect(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
+    """Grow a tree until it reaches a target, and return the node there; None where blocked."""
+    while True:
+        end = _extend(tree, target, check)
+        if end is None:
+            return None
+        if float(np.abs(tree.state(end) - target).max()) < SAME:
+            return end

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Straight motions between places become a path with times: quick, jerk-limited and valid.
+
+Corners are rounded where that is valid, and the arm stops at those where it is not; stopping at
+every corner follows the straight motions exactly. The quickest that is valid counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from arm_model import Array, JointLimits, RobotState
+from arm_trajectory import build_path, GoalError, GoalPoint, GoalRules, Path, TrajectoryGoal
+
+from ..validity import ValidityCheck
+
+ROUNDING_ROOM = 1.02
+"""Factor of the least times, so that rounding errors break no limit."""
+
+RULES = GoalRules()
+"""Of the trajectories that are made here."""
+
+MAX_ITERATIONS = 30
+"""How often the times of the motions are improved."""
+
+STEP_UP = 1.01
+"""Factor of a time that is improved, so that the search for it ends."""
+
+MIN_SEGMENT = 1e-3
+"""Least time of a part of a path in [s]."""
+
+MIN_DURATION = 0.01
+"""Time for a motion between two places at least in [s]."""
+
+
+def scaled_limits(limits: JointLimits, velocity: float, acceleration: float) -> JointLimits:
+    """Return limits with the factors of a request; jerk goes with the acceleration.
+
+    Args:
+        limits: Limits of the joints.
+        velocity: Factor of the velocities.
+        acceleration: Factor of the accelerations and jerks.
+    """
+    return replace(
+        limits,
+        velocity=limits.velocity * velocity,
+        acceleration=limits.acceleration * acceleration,
+        jerk=limits.jerk * acceleration,
+    )
+
+
+def timed_path(places: Array, limits: JointLimits, check: ValidityCheck) -> Path | None:
+    """Return a valid path along places; None where none is found.
+
+    Args:
+        places: Joint positions in [rad] (m, n), with straight motions between them.
+        limits: Limits of the joints, scaled.
+        check: Checks the path as it is after timing.
+    """
+    stops: set[int] = set()
+    corners = set(range(1, len(places) - 1))
+    while True:
+        ends = [0, *sorted(stops), len(places) - 1]
+        pieces = [_rounded(places[begin : end + 1], limits) for begin, end in pairwise(ends)]
+        found = [piece for piece in pieces if piece is not None]
+        path = _joined(found) if len(found) == len(pieces) else None
+        violation = None if path is None else check.path(path)
+        if path is not None and violation is None:
+            return path
+        left = sorted(corners - stops)
+        if not left or (not stops and check.waypoints(places) is not None):
+            return None
+        if violation is None:
+            stops.update(left)
+        else:
+            apart = np.abs(places[left] - violation.positions).max(axis=1)
+            stops.add(left[int(apart.argmin())])
+
+
+def _rounded(places: Array, limits: JointLimits) -> Path | None:
+    """Return the path along places with its corners rounded, from rest to rest."""
+    durations = _durations(places, limits)
+    velocities = np.diff(places, axis=0) / durations[:, None]
+    halves = _half_times(velocities, limits)
+    corners = halves[0] + np.concatenate(((0.0,), np.cumsum(durations)))
+    begins, ends = np.maximum(corners - halves, 0.0), corners + halves
+    still = np.zeros((1, places.shape[1]))
+    before, after = np.concatenate((still, velocities)), np.concatenate((velocities, still))
+    times = np.stack((begins, ends), axis=1).ravel()
+    positions = np.stack(
+        (places - before * halves[:, None], places + after * halves[:, None]), axis=1
+    ).reshape(len(times), -1)
+    speeds = np.stack((before, after), axis=1).reshape(len(times), -1)
+    rest = [0.0] * places.shape[1]
+    apart = np.diff(times, prepend=-1.0) > MIN_SEGMENT  # corners that touch share a point
+    points = [
+        GoalPoint(time, position, speed, rest)
+        for time, position, speed in zip(
+            times[apart].tolist(), positions[apart].tolist(), speeds[apart].tolist(), strict=True
+        )
+    ]
+    goal, state = TrajectoryGoal(limits.names, points), RobotState.at_rest(places[0])
+    try:
+        return build_path(goal, limits, state, RULES).path
+    except GoalError:
+        return None
+
+
+def _durations(places: Array, limits: JointLimits) -> Array:
+    """Return times for the motions (m - 1) in [s] in which there is room to round the corners."""
+    steps = np.diff(places, axis=0)
+    durations: Array = (np.abs(steps) / limits.velocity).max(axis=1) * ROUNDING_ROOM
+    durations = np.maximum(durations, MIN_DURATION)
+    for _ in range(MAX_ITERATIONS):
+        halves = _half_times(steps / durations[:, None], limits)
+        least = 2.0 * np.maximum(halves[:-1], halves[1:])
+        if (least <= durations).all():
+            break
+        durations = np.where(least > durations, STEP_UP * np.sqrt(least * durations), durations)
+    return durations
+
+
+def _half_times(velocities: Array, limits: JointLimits) -> Array:
+    """Return half the time of the rounding at begin, corners and end (m) in [s].
+
+    A rounding is the quintic that meets the straight motions with the acceleration 0 as long
+    before a corner as behind it. Its acceleration is 0.75 of the change of velocity over that
+    time at most, its jerk 1.5 of it over the time squared.
+
+    Args:
+        velocities: Velocities of the straight motions in [rad/s] (m - 1, n).
+        limits: Limits of the joints.
+    """
+    still = np.zeros((1, velocities.shape[1]))
+    jumps = np.abs(np.diff(np.concatenate((still, velocities, still)), axis=0))
+    by_acceleration = 0.75 * jumps / limits.acceleration
+    by_jerk = np.sqrt(1.5 * jumps / limits.jerk)
+    halves: Array = ROUNDING_ROOM * np.maximum(by_acceleration, by_jerk).max(axis=1)
+    return np.maximum(halves, MIN_SEGMENT)
+
+
+def _joined(pieces: Sequence[Path]) -> Path:
+    path = pieces[0]
+    for piece in pieces[1:]:
+        path = path.followed_by(piece.segments)
+    return path

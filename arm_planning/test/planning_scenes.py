@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes and independent checks for the tests of planners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arm_model import (
+    Array,
+    Box,
+    Clearances,
+    CollisionObject,
+    frozen,
+    JointLimits,
+    ORIGIN,
+    PlanningScene,
+    Pose,
+    RobotModel,
+)
+from arm_trajectory import Path
+
+DENSE = 1e-3
+"""Motion of a joint from one look of the independent sampler to the next in [rad]."""
+
+RATE_TOLERANCE = 1e-6
+"""Share by which a limit may be exceeded, for rounding."""
+
+
+def with_box(
+    scene: PlanningScene, name: str, size: tuple[float, float, float], at: tuple[float, ...]
+) -> PlanningScene:
+    """Return a scene with a box."""
+    place = Pose(ORIGIN.rotation, frozen(at))
+    return scene.with_object(CollisionObject(name, Box(*size), pose=place))
+
+
+def with_random_boxes(model: RobotModel, count: int, seed: int) -> PlanningScene:
+    """Return the scene of an arm with boxes about it."""
+    scene, size = model.scene, max(model.reach, 1.0)
+    draw = np.random.default_rng(seed)
+    for number in range(count):
+        radius, angle = draw.uniform(0.35, 0.8), draw.uniform(-np.pi, np.pi)
+        height = draw.uniform(0.05, 0.9)
+        at = (size * radius * np.cos(angle), size * radius * np.sin(angle), size * height)
+        x, y, z = (size * draw.uniform(0.05, 0.25, 3)).tolist()
+        scene = with_box(scene, f'box_{number}', (x, y, z), at)
+    return scene
+
+
+def dense_times(path: Path) -> Array:
+    """Return times between which no joint moves by more than :data:`DENSE`."""
+    coarse = np.linspace(0.0, path.duration, 2000)
+    turned = np.abs(np.diff(path.positions(coarse), axis=0)).max(axis=1)
+    along = np.concatenate(((0.0,), np.cumsum(turned)))
+    count = int(np.ceil(along[-1] / DENSE)) + 1
+    times: Array = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
+    return times
+
+
+def deepest_overlap(path: Path, scene: PlanningScene) -> float:
+    """Return the least distance of any pair at the places of the independent sampler in [m]."""
+    clearances = Clearances(scene)
+    places = path.positions(dense_times(path))
+    return min(float(clearances.least(place, 0.0).min(initial=np.inf)) for place in places)
+
+
+def broken_limits(path: Path, limits: JointLimits) -> list[str]:
+    """Return what exceeds a limit on a path, looked at from its values alone."""
+    segments = np.repeat(np.arange(len(path.segments)), 200)
+    shares = np.tile(np.linspace(0.0, 1.0, 200), len(path.segments))
+    offsets = shares * path.durations[segments]
+    positions = path.derived(0, segments, offsets)
+    broken = []
+    if (positions < limits.lower - 1e-6).any() or (positions > limits.upper + 1e-6).any():
+        broken.append('position')
+    for order, name in enumerate(('velocity', 'acceleration', 'jerk'), start=1):
+        most = np.abs(path.derived(order, segments, offsets)).max(axis=0)
+        if (most > getattr(limits, name) * (1.0 + RATE_TOLERANCE)).any():
+            broken.append(name)
+    return broken

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Free motions are valid everywhere, and what cannot be planned is refused with the reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import os
+
+from model_robots import ready, robot, ROBOTS
+import numpy as np
+from planning_scenes import broken_limits, deepest_overlap, with_box, with_random_boxes
+import pytest
+
+from arm_model import Array, frozen
+from arm_planning import JointGoal, MotionRequest, Planner, PlanningCode, PlanningError
+
+SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '6')))
+"""Of the random scenes; more of them by the environment."""
+
+OVERLAP_TOLERANCE = 1e-6
+"""Overlap that counts as rounding in [m]."""
+
+TIMEOUT = 60.0
+"""Time for planning in [s]: a busy machine is no failure."""
+
+AROUND = 0.9
+"""How far a goal may be from the ready pose in [rad]."""
+
+
+def request(start: Array, goal: Array) -> MotionRequest:
+    """Return a motion between two states."""
+    return MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT)
+
+
+def refusal(planner: Planner, asked: MotionRequest) -> PlanningError:
+    """Return why a motion is refused."""
+    with pytest.raises(PlanningError) as caught:
+        planner.plan(asked)
+    return caught.value
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('seed', SEEDS)
+def test_a_plan_never_touches_and_never_breaks_a_limit(name: str, seed: int) -> None:
+    """In random scenes, looked at every milliradian, at half the speed of the drives, too."""
+    model = robot(name)
+    scene = with_random_boxes(model, 8, seed)
+    planner, draw = Planner(model, seed=seed), np.random.default_rng(seed)
+    lower = np.maximum(model.limits.lower, ready(name) - AROUND)
+    upper = np.minimum(model.limits.upper, ready(name) + AROUND)
+    states = (frozen(draw.uniform(lower, upper)) for _ in range(2000))
+    free = (each for each in states if planner.is_valid(each, scene) is None)
+    start, goal = next(free), next(free)
+    share = 1.0 if seed % 2 else 0.5
+    asked = replace(request(start, goal), velocity_scaling=share, acceleration_scaling=share)
+    plan = planner.plan(asked, scene)
+    assert deepest_overlap(plan.path, scene) > -OVERLAP_TOLERANCE
+    limits = replace(
+        model.limits,
+        velocity=share * model.limits.velocity,
+        acceleration=share * model.limits.acceleration,
+        jerk=share * model.limits.jerk,
+    )
+    assert broken_limits(plan.path, limits) == []
+    assert np.allclose(plan.path.at(0.0).position, start, atol=1e-9)
+    assert np.allclose(plan.path.end.position, goal, atol=1e-6)
+    assert np.allclose(plan.path.end.velocity, 0.0, atol=1e-6)
+
+
+def test_an_obstacle_is_gone_around() -> None:
+    """The straight motion is blocked, and the plan is longer, but there."""
+    model = robot('panda')
+    start, goal = ready('panda').copy(), ready('panda').copy()
+    start[0], goal[0] = -0.8, 0.8
+    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    planner = Planner(model)
+    alone = planner.plan(request(start, goal))
+    around = planner.plan(request(start, goal), scene)
+    assert deepest_overlap(alone.path, scene) < 0.0
+    assert deepest_overlap(around.path, scene) > -OVERLAP_TOLERANCE
+    assert around.path.duration > alone.path.duration
+
+
+def test_the_same_seed_gives_the_same_plan() -> None:
+    """What went wrong once can be looked at again."""
+    model = robot('panda')
+    start, goal = ready('panda').copy(), ready('panda').copy()
+    start[0], goal[0] = -0.8, 0.8
+    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    one, other = (Planner(model, seed=5).plan(request(start, goal), scene) for _ in range(2))
+    assert np.array_equal(one.path.coefficients, other.path.coefficients)
+
+
+@pytest.mark.parametrize(('at_goal', 'code'), [(False, -10), (True, -12)])
+def test_a_blocked_start_or_goal_names_the_pair(at_goal: bool, code: int) -> None:
+    """With MoveIt's code, and what touches what."""
+    model = robot('panda')
+    here, there = ready('panda').copy(), ready('panda').copy()
+    here[0], there[0] = -0.8, 0.8
+    blocked = there if at_goal else here
+    tip = tuple(model.pose(blocked).position.tolist())
+    scene = with_box(model.scene, 'crate', (0.1, 0.1, 0.1), tip)
+    with pytest.raises(PlanningError, match=r'touches crate|crate touches') as caught:
+        Planner(model).plan(request(here, there), scene)
+    assert caught.value.code == code
+
+
+def test_the_alternative_that_is_free_is_reached() -> None:
+    """One blocked goal of two is no refusal."""
+    model = robot('panda')
+    blocked, free = ready('panda').copy(), ready('panda').copy()
+    blocked[0], free[0] = 0.8, -0.8
+    tip = tuple(model.pose(blocked).position.tolist())
+    scene = with_box(model.scene, 'crate', (0.1, 0.1, 0.1), tip)
+    goals = [JointGoal(blocked), JointGoal(free)]
+    plan = Planner(model).plan(MotionRequest(ready('panda'), goals, timeout=TIMEOUT), scene)
+    assert np.allclose(plan.path.end.position, free, atol=1e-6)
+
+
+def test_what_is_enclosed_is_given_up_in_time() -> None:
+    """The time is over: says so, and does not hang. The clock is that of the test."""
+    model = robot('panda')
+    ticks = iter(range(10_000_000))
+    planner = Planner(model, clock=lambda: 0.001 * next(ticks))
+    start, goal = ready('panda').copy(), ready('panda').copy()
+    start[0], goal[0] = -2.0, 2.0
+    scene = model.scene
+    for number, angle in enumerate((0.0, np.pi)):  # a wall from the ground to beyond the reach
+        at = (1.1 * np.cos(angle), 0.0, 1.0)
+        scene = with_box(scene, f'wall_{number}', (1.7, 0.02, 4.0), at)
+    asked = replace(request(start, goal), timeout=0.1)
+    with pytest.raises(PlanningError, match='no path was found in time') as caught:
+        planner.plan(asked, scene)
+    assert caught.value.code is PlanningCode.TIMED_OUT
+
+
+def test_requests_that_make_no_sense_are_refused() -> None:
+    """Each with what is wrong and what would be right."""
+    planner, here = Planner(robot('panda')), ready('panda')
+    asked = request(here, here + 0.1)
+    nan, beyond = frozen([np.nan, *here[1:]]), here.copy()
+    beyond[1] = 3.0
+    cases = {
+        "unknown planner_id 'STOMP'; choose one of": replace(asked, planner_id='STOMP'),
+        'the request has no goal': replace(asked, goals=[]),
+        'velocity_scaling is 1.5; it must be above 0': replace(asked, velocity_scaling=1.5),
+        'start: 6 numbers, 7 are needed': replace(asked, start=here[:6]),
+        'goal: number 0 is nan': replace(asked, goals=[JointGoal(nan)]),
+        'goal: panda_joint2 at': replace(asked, goals=[JointGoal(beyond)]),
+    }
+    for words, case in cases.items():
+        assert words in str(refusal(planner, case))

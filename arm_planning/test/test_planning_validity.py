@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""States and paths are valid exactly where limits and distances say so."""
+
+from __future__ import annotations
+
+from model_robots import ready, robot
+import numpy as np
+from planning_scenes import with_box, with_random_boxes
+import pytest
+
+from arm_model import Clearances, RobotState
+from arm_planning import ValidityCheck
+from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
+
+THIN = 0.002
+"""Thickness of a sheet in [m], which coarse looks would pass through."""
+
+NEAR = 0.0005
+"""Distance of an arm that nearly touches in [m]."""
+
+
+@pytest.fixture
+def check() -> ValidityCheck:
+    """The panda alone."""
+    model = robot('panda')
+    return ValidityCheck(model.limits, model.scene)
+
+
+def test_a_state_beyond_a_limit_is_named(check: ValidityCheck) -> None:
+    """The joint, where it is and its range."""
+    state = ready('panda').copy()
+    state[1] = 1.9
+    violation = check.state(state)
+    assert violation is not None
+    assert violation.reason.startswith('panda_joint2 at 1.9000 is beyond its range')
+    assert violation.contact is None
+
+
+def test_a_contact_is_named_with_depth_and_place() -> None:
+    """The pair, how deep and where."""
+    model = robot('panda')
+    tip = model.pose(ready('panda')).position
+    scene = with_box(model.scene, 'crate', (0.1, 0.1, 0.1), tuple(tip.tolist()))
+    violation = ValidityCheck(model.limits, scene).state(ready('panda'))
+    assert violation is not None
+    assert violation.contact is not None
+    assert 'crate' in violation.contact.bodies
+    assert f'{1e3 * violation.contact.depth:.1f} mm deep at (' in violation.reason
+    assert 'crate' in violation.reason
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_a_state_is_valid_where_no_pair_overlaps(seed: int) -> None:
+    """The answer is that of the distances, on random states."""
+    model = robot('panda')
+    scene = with_random_boxes(model, 6, seed)
+    check, clearances = ValidityCheck(model.limits, scene), Clearances(scene)
+    draw = np.random.default_rng(seed)
+    for state in draw.uniform(model.limits.lower, model.limits.upper, (40, 7)):
+        touching = bool((clearances.least(state, 0.0) < 0.0).any())
+        assert (check.state(state) is not None) == touching
+
+
+def test_a_thin_sheet_is_not_passed_through() -> None:
+    """However thin it is: there is no place between two looks."""
+    model = robot('panda')
+    begin, end = ready('panda').copy(), ready('panda').copy()
+    begin[0], end[0] = -0.8, 0.8
+    assert ValidityCheck(model.limits, model.scene).waypoints(np.array((begin, end))) is None
+    scene = with_box(model.scene, 'sheet', (2.0, THIN, 2.0), (1.2, 0.0, 0.5))
+    check = ValidityCheck(model.limits, scene)
+    assert check.state(begin) is None
+    assert check.state(end) is None
+    violation = check.waypoints(np.array((begin, end)))
+    assert violation is not None
+    assert 'sheet' in violation.reason
+    points = [GoalPoint(3.0, end.tolist())]
+    goal, state = TrajectoryGoal(model.joints, points), RobotState.at_rest(begin)
+    path = build_path(goal, model.limits, state, GoalRules()).path
+    found = check.path(path)
+    assert found is not None
+    assert 0.0 < found.time < path.duration
+    assert np.allclose(path.at(found.time).position, found.positions)
+
+
+def test_a_path_between_states_in_near_contact_is_found_valid() -> None:
+    """An arm that stands half a millimetre from a wall may leave it."""
+    model = robot('panda')
+    here, away = ready('panda').copy(), ready('panda').copy()
+    away[1] -= 0.5
+    near, far = 0.3, 2.0  # of the wall's middle: halved until the wall is half a millimetre away
+    for _ in range(40):
+        middle = 0.5 * (near + far)
+        scene = with_box(model.scene, 'wall', (0.02, 1.0, 1.0), (middle, 0.0, 0.5))
+        distance = float(Clearances(scene).least(here, 1.0).min())
+        near, far = (near, middle) if distance > NEAR else (middle, far)
+    assert distance == pytest.approx(NEAR, abs=1e-4)
+    assert ValidityCheck(model.limits, scene).waypoints(np.array((here, away))) is None
