@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -195,6 +195,23 @@ def test_a_pause_is_never_overtaken(kind: str, steps: list[str], later: int) -> 
     arm.take(['cycle', 'work'] * 10)
     if command is not None and kind in TRAJECTORIES:
         assert command.execution is not None, command.future.exception()
+
+
+@given(st.sampled_from(sorted(JOGS)), STEPS)
+@example('displacement', ['cycle'])
+@example('displacement', ['cycle', 'work'])
+@settings(max_examples=30, deadline=None)
+def test_a_pause_that_ends_at_once_counts(kind: str, steps: list[str]) -> None:
+    """``~/pause`` and ``~/resume`` before a jog has begun: it does not begin afterwards."""
+    arm = bench()
+    command, _, is_idle = run_to_stop(arm, kind, steps, 0)
+    assume(is_idle)
+    begin = arm.where
+    arm.gateway.command(PauseRequest())
+    arm.gateway.command(PauseRequest(is_paused=False))
+    path = arm.settle()
+    assert np.abs(path[-1] - begin).max() == 0.0
+    assert command is None or command.future.done()
 
 
 @given(st.sampled_from(sorted(JOGS)), STEPS, LATER)
