@@ -65,6 +65,24 @@ def test_a_missing_interface_names_which_exist_and_how_to_make_it() -> None:
 
 
 @pytest.mark.parametrize(
+    ('name', 'meant'),
+    [
+        ('cna0', 'can0'),
+        ('vcna0', 'vcan0'),
+        ('udp_multicats', 'udp_multicast'),
+        ('ato', 'auto'),
+        ('can_amr', 'can_arm'),
+    ],
+)
+def test_a_mistyped_bus_is_no_fault_of_the_kernel(name: str, meant: str) -> None:
+    """What may be meant, and what there is."""
+    text = missing_interface_text(name, {'can_arm': CanInterface('can_arm', True, 1000)})
+    assert f"no bus is called '{name}' (is '{meant}' meant?)" in text
+    assert 'CAN interfaces of this host: can_arm; other buses: udp_multicast' in text
+    assert 'plug' not in text
+
+
+@pytest.mark.parametrize(
     ('code', 'remedy'),
     [
         (errno.ENETDOWN, 'ip link set up can0'),
@@ -94,6 +112,8 @@ def test_a_kernel_without_can_names_the_multicast_bus(monkeypatch: pytest.Monkey
     monkeypatch.setattr(socket, 'socket', no_can)
     with pytest.raises(BusError, match=r'no CAN.*modprobe.*udp_multicast'):
         open_bus('can0')
+    with pytest.raises(BusError, match=r"no bus is called 'cna0' \(is 'can0' meant"):
+        open_bus('cna0')
 
 
 def test_a_full_transmit_queue_is_reported_and_not_waited_for(

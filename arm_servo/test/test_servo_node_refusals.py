@@ -13,10 +13,10 @@ def test_a_stream_with_old_stamps_is_one_line_of_the_log() -> None:
     lines = []
     for number in range(100):
         now = 0.03 * number
-        refusals.note(f'stale by {0.1 + now:.2f} s: are the clocks in step?', now)
-        assert refusals.fresh(now).startswith('stale by')
+        refusals.note(f'stale: {0.1 + now:.2f} s old when it was read', now)
+        assert refusals.fresh(now).startswith('stale')
         lines.append(refusals.to_log(now))
-    assert [line for line in lines if line] == ['stale by 0.10 s: are the clocks in step?']
+    assert [line for line in lines if line] == ['stale: 0.10 s old when it was read']
     refusals.note('there is no joint elbow', 3.0)
     assert refusals.to_log(3.0) == 'there is no joint elbow'
 

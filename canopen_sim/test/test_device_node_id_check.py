@@ -82,7 +82,7 @@ def test_only_what_the_device_itself_sends_counts(frame: Frame, found: bool) -> 
         check = NodeIdCheck(bus, [NODE_ID, UNCONFIGURED], StoppedClock(0.05))
         assert bool(check.found) is found
         requests = [each.can_id for each in other.receive(0.0)]
-        assert requests == ([] if found else [0x605])  # who is heard is not disturbed
+        assert requests == ([] if found else [0x605])  # devices that are there are not disturbed
         if not found:
             check.finish()
 

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import difflib
 import fcntl
+import re
 import socket
 import struct
 
@@ -16,6 +18,8 @@ _SIOCGIFTXQLEN = 0x8942
 _IFF_UP = 0x1
 _ARPHRD_CAN = 280
 _REQUEST = struct.Struct('16s24x')  # struct ifreq: name and a union
+_USUAL_NAME = re.compile(r'[a-z]*can\d+')
+_OTHER_BUSES = ('udp_multicast', 'auto')
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,13 +67,25 @@ def _request(probe: socket.socket, request: int, name: str, layout: str) -> int:
 
 
 def missing_interface_text(name: str, existing: dict[str, CanInterface]) -> str:
-    """Say that an interface does not exist, which do, and how to make it."""
+    """Say that an interface does not exist, which do, and how to make it; or suggest a name."""
     have = ', '.join(sorted(existing)) or 'none'
+    if not is_interface_name(name):
+        close = difflib.get_close_matches(name, (*existing, 'can0', 'vcan0', *_OTHER_BUSES), n=1)
+        meant = f' (is {close[0]!r} meant?)' if close else ''
+        return (
+            f'no bus is called {name!r}{meant}; CAN interfaces of this host: {have}; other buses: '
+            f'{", ".join(_OTHER_BUSES)}, INTERFACE:CHANNEL of python-can'
+        )
     if name.startswith('vcan'):
         remedy = f'`ip link add dev {name} type vcan && ip link set up {name}`'
     else:
         remedy = f'plug the adapter in, then {bring_up_text(name)}'
     return f'there is no CAN interface {name} (this host has: {have}); {remedy}'
+
+
+def is_interface_name(name: str) -> bool:
+    """Whether a name is one that CAN interfaces usually have: can0, vcan1, slcan0."""
+    return bool(_USUAL_NAME.fullmatch(name))
 
 
 def bring_up_text(name: str) -> str:

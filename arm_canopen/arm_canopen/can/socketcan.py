@@ -15,7 +15,12 @@ from threading import Lock
 
 from ..exceptions import BusError
 from .frame import checked, EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
-from .interfaces import bring_up_text, can_interfaces, missing_interface_text
+from .interfaces import (
+    bring_up_text,
+    can_interfaces,
+    is_interface_name,
+    missing_interface_text,
+)
 from .socket_bus import ANCILLARY_SIZE, prepare_receiver, SocketBus
 
 # linux/can.h and linux/can/raw.h
@@ -140,6 +145,8 @@ def _open_socket(name: str) -> socket.socket:
     try:
         raw = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     except OSError as error:
+        if not is_interface_name(name):  # a slip, and no kernel would help
+            raise BusError(missing_interface_text(name, can_interfaces())) from error
         raise BusError(no_can_text(name, error)) from error
     try:
         _check_interface(name)

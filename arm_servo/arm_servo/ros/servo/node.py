@@ -126,9 +126,11 @@ class Servo:
             return 0.0
         age = float(self._node.get_clock().now().nanoseconds) * 1e-9 - stamp
         if age > self._parameters.timeout:
-            late = age - self._parameters.timeout
             raise NotReadyError(
-                f'stale by {late:.2f} s: are the clocks in step? A stamp of 0 is taken as now'
+                f'stale: {age:.2f} s old when it was read, and a command counts for '
+                f'{self._parameters.timeout:g} s (incoming_command_timeout): sender or this '
+                'computer is too busy, or clocks of two computers differ; a stamp of 0 counts as '
+                'now'
             )
         if age < -MAX_STAMP_AHEAD:
             raise NotReadyError(f'stamped {-age:.2f} s in the future: are the clocks in step?')
