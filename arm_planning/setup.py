@@ -3,8 +3,14 @@
 """Build description of arm_planning."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = ['move_group = arm_planning.nodes.move_group:main']
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -30,10 +36,18 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/arm_planning']),
         ('share/arm_planning', ['package.xml']),
     ],
-    install_requires=['numpy>=1.26', 'pin>=3.3', sibling('arm_model'), sibling('arm_trajectory')],
+    install_requires=[
+        'numpy>=1.26',
+        'pin>=3.3',
+        sibling('arm_model'),
+        sibling('arm_trajectory'),
+        sibling('libraries/urdf_reader'),
+    ],
+    extras_require={'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='Motion planning of an arm among obstacles',
     license='Apache-2.0',
+    entry_points={'console_scripts': EXECUTABLES if FOR_ROS else []},
 )

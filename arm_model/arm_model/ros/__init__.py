@@ -9,11 +9,20 @@ from .planning_scene import (
     apply_collision_object,
     apply_planning_scene,
     FrameOf,
+    primitive_shape,
 )
-from .robot_parameters import declare_groups, declare_robot, GroupModels, same_robot
+from .robot_parameters import (
+    declare_description,
+    declare_groups,
+    declare_robot,
+    Description,
+    GroupModels,
+    same_robot,
+)
 from .tf_listener import TfListener
 
 __all__ = [
+    'Description',
     'FrameOf',
     'GroupModels',
     'TfListener',
@@ -21,9 +30,11 @@ __all__ = [
     'apply_attached_object',
     'apply_collision_object',
     'apply_planning_scene',
+    'declare_description',
     'declare_groups',
     'declare_robot',
     'duration_fields',
+    'primitive_shape',
     'same_robot',
     'seconds',
     'xyz',

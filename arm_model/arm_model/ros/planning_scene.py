@@ -354,7 +354,7 @@ def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
     """Yield primitives, meshes and planes; a pose that is not given is the object's origin."""
     name = message.id
     for what, things, poses, shape_of in (
-        ('primitive', message.primitives, message.primitive_poses, _primitive),
+        ('primitive', message.primitives, message.primitive_poses, primitive_shape),
         ('mesh', message.meshes, message.mesh_poses, _mesh),
         ('plane', message.planes, message.plane_poses, _plane),
     ):
@@ -367,7 +367,16 @@ def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
             yield PlacedShape(shape_of(thing, name), pose)
 
 
-def _primitive(message: SolidPrimitive, name: str) -> Shape:
+def primitive_shape(message: SolidPrimitive, name: str) -> Shape:
+    """Return a primitive.
+
+    Args:
+        message: The message.
+        name: The object that it is a part of, for the message of the error.
+
+    Raises:
+        SceneError: Its type is unknown, or it has another number of dimensions.
+    """
     dimensions = [float(each) for each in message.dimensions]
     if message.type == SolidPrimitive.PRISM:
         return _prism(message, dimensions, name)

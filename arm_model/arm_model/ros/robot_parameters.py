@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from rclpy.node import Node
 from urdf_reader import find_group, parse_srdf, read_urdf
@@ -30,6 +31,34 @@ class GroupModels:
 
     arms: Sequence[RobotModel]
     tools: Sequence[RobotModel] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What describes a robot.
+
+    Attributes:
+        urdf: Robot description as XML text.
+        srdf: Semantic description as XML text.
+        limits: The table ``joint_limits`` of the limits file.
+    """
+
+    urdf: str
+    srdf: str
+    limits: Mapping[str, Any]
+
+
+def declare_description(node: Node) -> Description:
+    """Declare what describes a robot, for a node that has all groups.
+
+    Args:
+        node: The node.
+
+    Raises:
+        ModelError: A parameter is missing, or the limits file cannot be read.
+    """
+    urdf, srdf, limits, _group, _tip = _given(node)
+    return Description(urdf, srdf, load_limits(Path(limits)))
 
 
 def declare_robot(node: Node) -> RobotModel:

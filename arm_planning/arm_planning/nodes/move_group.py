@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_planning move_group``: MoveIt's move_group for its clients."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+
+from arm_model import ArmError
+from arm_model.ros import declare_description, Description
+from node_runner import (
+    destroyed_when_refused,
+    LATCHED,
+    notify_ready,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+    spin,
+)
+
+from ..ros.background import Background
+from ..ros.execute_action import ExecuteAction
+from ..ros.execution import ExecutionLimits, TrajectoryExecution
+from ..ros.robot_groups import RobotGroups
+from ..ros.scene_monitor import SceneMonitor
+from ..ros.state_services import StateServices
+
+NAME = 'move_group'
+
+HELP = """\
+The planning scene of a robot, its states and the execution of trajectories: MoveIt's interfaces.
+
+usage: ros2 run arm_planning move_group --ros-args --params-file robot.yaml
+
+parameters:
+  robot_description, robot_description_semantic, joint_limits   what describes the robot
+  trajectory_execution.allowed_start_tolerance                  [rad] (default 0.01)
+  trajectory_execution.allowed_execution_duration_scaling       (default 1.1)
+  trajectory_execution.allowed_goal_duration_margin             [s] (default 0.5)
+  moveit_simple_controller_manager.controller_names             (default: <group>_controller)
+  <controller>.joints                                           joints that it moves
+"""
+
+
+class MoveGroup(Node):
+    """Serves clients of MoveIt."""
+
+    @destroyed_when_refused
+    def __init__(self) -> None:
+        """Read the robot and offer everything.
+
+        Raises:
+            ArmError: The robot, or a parameter, is refused.
+        """
+        super().__init__(NAME)
+        description = declare_description(self)
+        robot = _robot(description)
+        limits = _execution_limits(self)
+        controllers = _controllers(self, robot)
+        refuse_misspelt(self)
+        semantic = self.create_publisher(String, 'robot_description_semantic', LATCHED)
+        semantic.publish(String(data=description.srdf))
+        monitor = SceneMonitor(self, robot)
+        self._queries = Background(self, 'queries')
+        StateServices(self, monitor, self._queries, _robot(description))
+        execution = TrajectoryExecution(self, controllers, lambda: monitor.places, limits)
+        ExecuteAction(self, execution)
+        # there is no octomap that would have to be cleared
+        self.create_service(Empty, 'clear_octomap', lambda _request, response: response)
+
+    def close(self) -> None:
+        """End the threads."""
+        self._queries.close()
+
+
+def _robot(description: Description) -> RobotGroups:
+    return RobotGroups(description.urdf, description.srdf, description.limits)
+
+
+def _execution_limits(node: Node) -> ExecutionLimits:
+    read = ParameterReader(node, 'trajectory_execution.')
+    return ExecutionLimits(
+        read.number(
+            'allowed_start_tolerance',
+            0.01,
+            (0.0, 10.0),
+            'how far the robot may be from the start of a trajectory; 0 is anywhere [rad]',
+        ),
+        read.number(
+            'allowed_execution_duration_scaling',
+            1.1,
+            (1.0, 100.0),
+            'how many times as long as planned a trajectory may take',
+        ),
+        read.number(
+            'allowed_goal_duration_margin',
+            0.5,
+            (0.0, 100.0),
+            'how much longer than that it may take [s]',
+        ),
+    )
+
+
+def _controllers(node: Node, robot: RobotGroups) -> dict[str, list[str]]:
+    """Return the joints of each controller; by default those of bring-up, one for each group."""
+    defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
+    manager = 'moveit_simple_controller_manager.'
+    names = ParameterReader(node, manager).texts(
+        'controller_names', list(defaults), 'controllers with an action follow_joint_trajectory'
+    )
+    return {
+        name: list(
+            ParameterReader(node, f'{manager}{name}.').texts(
+                'joints', defaults.get(name, []), f'joints that {name} moves'
+            )
+        )
+        for name in names
+    }
+
+
+def _serve(stop: threading.Event) -> None:
+    node = MoveGroup()
+    try:
+        notify_ready()
+        spin([node], stop)
+    finally:
+        node.close()
+        node.destroy_node()
+
+
+def main() -> int:
+    """Run until Ctrl-C or SIGTERM.
+
+    Returns:
+        Exit code: 0, or 1 when parameters or the robot are refused.
+    """
+    return run_program(NAME, _serve, ArmError, help_text=HELP)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,293 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Execution of trajectories through the action FollowJointTrajectory of the controllers.
+
+Limits and codes are those of MoveIt's trajectory_execution_manager.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+import time
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from rclpy.action.client import ActionClient
+from rclpy.node import Node
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_model.ros import seconds
+
+from ..exceptions import PlanningCode, PlanningError
+
+WATCH_PERIOD = 0.05
+"""How often executions are looked at in [s]."""
+
+STOP_TIMEOUT = 5.0
+"""Time in which controllers must have stopped in [s]."""
+
+Done = Callable[[PlanningCode, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionLimits:
+    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``.
+
+    Attributes:
+        start_tolerance: How far the robot may be from the start in [rad]; 0 for anywhere.
+        duration_scaling: How many times as long as planned it may take.
+        duration_margin: How much longer than that in [s].
+    """
+
+    start_tolerance: float = 0.01
+    duration_scaling: float = 1.1
+    duration_margin: float = 0.5
+
+
+@dataclass(slots=True, eq=False)
+class Execution:
+    """A trajectory on its way.
+
+    Attributes:
+        trajectory: The trajectory_msgs/JointTrajectory.
+        done: Called once, with how it ended.
+        begin: Steady time of its start in [s].
+    """
+
+    trajectory: Any
+    done: Done
+    begin: float = field(default_factory=time.monotonic)
+    deadline: float = 0.0
+    handles: dict[str, Any] = field(default_factory=dict)
+    waits_for: set[str] = field(default_factory=set)
+    ending: tuple[PlanningCode, str] | None = None
+    is_over: bool = False
+
+    @property
+    def joints(self) -> set[str]:
+        """Names of the joints that it moves."""
+        return set(self.trajectory.joint_names)
+
+
+class TrajectoryExecution:
+    """Has controllers follow trajectories, and watches them; belongs to the node's executor."""
+
+    def __init__(
+        self,
+        node: Node,
+        controllers: Mapping[str, Sequence[str]],
+        places: Callable[[], Mapping[str, float]],
+        limits: ExecutionLimits,
+    ) -> None:
+        """Know the controllers; their actions may come later.
+
+        Args:
+            node: The node.
+            controllers: Joints of each controller, by its name.
+            places: Returns where the joints are in [rad], by joint.
+            limits: When an execution is refused or ended.
+        """
+        self._node, self._controllers, self._places = node, controllers, places
+        self._limits = limits
+        self._clients = {
+            name: ActionClient(node, FollowJointTrajectory, f'{name}/follow_joint_trajectory')
+            for name in controllers
+        }
+        self._running: list[Execution] = []
+        node.create_timer(WATCH_PERIOD, self._watch)
+
+    def start(
+        self,
+        trajectory: Any,  # noqa: ANN401  # messages have no type
+        done: Done,
+        names: Sequence[str] = (),
+    ) -> Execution:
+        """Have a trajectory followed.
+
+        Args:
+            trajectory: A trajectory_msgs/JointTrajectory.
+            done: Called once, when it has ended.
+            names: Controllers that may follow it; empty for all.
+
+        Raises:
+            PlanningError: It does not begin where the robot is, no controller follows it, or
+                one of its joints is on its way already.
+        """
+        execution = Execution(trajectory, done)
+        if not trajectory.points:
+            raise PlanningError(PlanningCode.INVALID_MOTION_PLAN, 'the trajectory has no points')
+        self._check_points(trajectory)
+        for other in self._running:
+            if shared := other.joints & execution.joints:
+                raise PlanningError(
+                    PlanningCode.CONTROL_FAILED,
+                    f'{min(shared)} is moved by another execution; stop it first, or wait',
+                )
+        self._check_start(trajectory)
+        parts = self._parts(trajectory, names)
+        lasts = seconds(trajectory.points[-1].time_from_start)
+        limits = self._limits
+        execution.deadline = (
+            execution.begin + limits.duration_scaling * lasts + limits.duration_margin
+        )
+        self._running.append(execution)
+        execution.waits_for = set(parts)
+        for name, part in parts.items():
+            goal = FollowJointTrajectory.Goal(trajectory=part)
+            sent = self._clients[name].send_goal_async(goal)
+            sent.add_done_callback(
+                lambda answer, name=name: self._accepted(execution, name, answer)
+            )
+        return execution
+
+    def stop(
+        self,
+        execution: Execution,
+        code: PlanningCode = PlanningCode.PREEMPTED,
+        reason: str = 'stopped on request',
+    ) -> None:
+        """Have it stopped; ``done`` is called when the controllers have.
+
+        Args:
+            execution: The execution.
+            code: Why.
+            reason: The same in words.
+        """
+        if execution.is_over or execution.ending is not None:
+            return
+        execution.ending = code, reason
+        execution.deadline = time.monotonic() + STOP_TIMEOUT
+        for handle in execution.handles.values():
+            handle.cancel_goal_async()
+
+    def stop_all(self, reason: str) -> None:
+        """Have everything stopped that is on its way.
+
+        Args:
+            reason: Why.
+        """
+        for execution in list(self._running):
+            self.stop(execution, PlanningCode.PREEMPTED, reason)
+
+    def _check_points(self, trajectory: Any) -> None:  # noqa: ANN401
+        for number, point in enumerate(trajectory.points):
+            if len(point.positions) != len(trajectory.joint_names):
+                raise PlanningError(
+                    PlanningCode.INVALID_MOTION_PLAN,
+                    f'point {number} has {len(point.positions)} positions of'
+                    f' {len(trajectory.joint_names)} joints',
+                )
+
+    def _check_start(self, trajectory: Any) -> None:  # noqa: ANN401
+        tolerance = self._limits.start_tolerance
+        places = self._places()
+        start = trajectory.points[0].positions
+        for name, wanted in zip(trajectory.joint_names, start, strict=True):
+            if name not in places:
+                raise PlanningError(
+                    PlanningCode.ROBOT_STATE_STALE, f'joint {name}: no position received yet'
+                )
+            if tolerance and abs(places[name] - wanted) > tolerance:
+                raise PlanningError(
+                    PlanningCode.CONTROL_FAILED,
+                    f'Invalid Trajectory: start point deviates from current robot state more than'
+                    f' {tolerance:g} at joint {name!r}: it is at {places[name]:.4f}, the'
+                    f' trajectory begins at {wanted:.4f}; plan anew',
+                )
+
+    def _parts(self, trajectory: Any, names: Sequence[str]) -> dict[str, JointTrajectory]:  # noqa: ANN401
+        """Return what each controller is to follow."""
+        if unknown := [name for name in names if name not in self._controllers]:
+            raise PlanningError(
+                PlanningCode.CONTROL_FAILED,
+                f'no controller {unknown[0]!r}; controllers: {", ".join(self._controllers)}',
+            )
+        left = list(trajectory.joint_names)
+        parts: dict[str, JointTrajectory] = {}
+        for name in names or self._controllers:
+            joints = [joint for joint in left if joint in self._controllers[name]]
+            if not joints:
+                continue
+            if not self._clients[name].server_is_ready():
+                action = f'{self._node.resolve_topic_name(name)}/follow_joint_trajectory'
+                raise PlanningError(
+                    PlanningCode.CONTROL_FAILED, f'no action {action}; start the controller {name}'
+                )
+            left = [joint for joint in left if joint not in joints]
+            parts[name] = _part(trajectory, joints)
+        if left:
+            known = '; '.join(
+                f'{name}: {", ".join(joints)}' for name, joints in self._controllers.items()
+            )
+            raise PlanningError(
+                PlanningCode.CONTROL_FAILED, f'no controller moves {left[0]}; there are {known}'
+            )
+        return parts
+
+    def _accepted(self, execution: Execution, name: str, answer: Any) -> None:  # noqa: ANN401
+        handle = answer.result()
+        if not handle.accepted:
+            execution.waits_for.discard(name)
+            self._fail(execution, f'{name} rejected the trajectory')
+            return
+        execution.handles[name] = handle
+        handle.get_result_async().add_done_callback(
+            lambda result: self._ended(execution, name, result)
+        )
+        if execution.ending is not None:
+            handle.cancel_goal_async()
+
+    def _ended(self, execution: Execution, name: str, answer: Any) -> None:  # noqa: ANN401
+        execution.waits_for.discard(name)
+        wrapped = answer.result()
+        if wrapped.status == GoalStatus.STATUS_SUCCEEDED and not wrapped.result.error_code:
+            self._conclude(execution)
+            return
+        words = wrapped.result.error_string or f'error code {wrapped.result.error_code}'
+        self._fail(execution, f'{name}: {words}')
+
+    def _fail(self, execution: Execution, reason: str) -> None:
+        self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
+        self._conclude(execution)
+
+    def _conclude(self, execution: Execution) -> None:
+        """End it when all of its controllers have ended."""
+        if execution.waits_for or execution.is_over:
+            return
+        execution.is_over = True
+        self._running.remove(execution)
+        execution.done(*(execution.ending or (PlanningCode.SUCCESS, '')))
+
+    def _watch(self) -> None:
+        now = time.monotonic()
+        for execution in list(self._running):
+            if now <= execution.deadline:
+                continue
+            if execution.ending is None:
+                allowed = execution.deadline - execution.begin
+                self.stop(
+                    execution,
+                    PlanningCode.TIMED_OUT,
+                    'Controller is taking too long to execute trajectory (the expected upper'
+                    f' bound for the trajectory execution was {allowed:.2f} seconds)',
+                )
+            else:  # a controller that does not answer any more
+                execution.waits_for.clear()
+                self._conclude(execution)
+
+
+def _part(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa: ANN401
+    """Return the trajectory of some of the joints."""
+    names = list(trajectory.joint_names)
+    columns = [names.index(joint) for joint in joints]
+    part = JointTrajectory(joint_names=list(joints))
+    for point in trajectory.points:
+        picked = {
+            kind: [float(values[column]) for column in columns] if len(values) else []
+            for kind in ('positions', 'velocities', 'accelerations')
+            for values in [getattr(point, kind)]
+        }
+        part.points.append(JointTrajectoryPoint(**picked, time_from_start=point.time_from_start))
+    return part

@@ -1,0 +1,114 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot with all of its joints, and the groups of its SRDF in which motions are planned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from urdf_reader import DescriptionError, find_group, parse_srdf, read_urdf
+
+from arm_model import Array, frozen, Kinematics, ModelError, PlanningScene, RobotModel
+
+from ..exceptions import PlanningCode, PlanningError
+
+
+class RobotGroups:
+    """The robot as a whole, and a model of each group, made when it is first asked for.
+
+    It belongs to one thread, as the models do; ``kinematics`` and ``scene`` are for any.
+
+    Attributes:
+        name: Name of the robot.
+        names: Names of the groups.
+        all_joints: Names of all joints, those that follow others too.
+        kinematics: All joints of the robot.
+        scene: The robot alone; all joints move.
+    """
+
+    def __init__(
+        self, urdf: str, srdf: str, limits: Mapping[str, Any], folder: Path | None = None
+    ) -> None:
+        """Read the robot.
+
+        Args:
+            urdf: Robot description as XML text.
+            srdf: Semantic description as XML text.
+            limits: The table ``joint_limits`` of a limits file.
+            folder: Folder of the URDF, where names of mesh files are relative.
+
+        Raises:
+            ModelError: They do not make a robot, or the SRDF has no group.
+        """
+        self._texts, self._limits, self._folder = (urdf, srdf), limits, folder
+        try:
+            tree, semantic = read_urdf(urdf), parse_srdf(srdf)
+        except DescriptionError as error:
+            raise ModelError(str(error)) from error
+        self.name, self.names = tree.name, tuple(semantic.groups)
+        if not self.names:
+            raise ModelError('the SRDF has no group; give it one with <group name="arm">')
+        self.kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])
+        self.all_joints = tuple(each.name for each in tree.movable())
+        joints = {}
+        for name in self.names:
+            # a group of links alone, such as a fixed hand, moves nothing
+            with suppress(DescriptionError):
+                joints[name] = find_group(tree, semantic, name).joints
+        self._joints: Mapping[str, Sequence[str]] = joints
+        ranges = tree.ranges()
+        self._standing = frozen(
+            [min(max(ranges[name].lower, 0.0), ranges[name].upper) for name in self.joints]
+        )
+        self._models: dict[str, RobotModel] = {}
+        first = self.model(next(iter(joints), self.names[0])).scene
+        self.scene = PlanningScene(self.kinematics, first.link_shapes, first.allowed)
+
+    @property
+    def joints(self) -> Sequence[str]:
+        """Names of all joints of the robot, in the order of its positions."""
+        return self.kinematics.joints
+
+    def group_joints(self) -> Mapping[str, Sequence[str]]:
+        """Return the joints of each group that can move."""
+        return self._joints
+
+    def model(self, group: str) -> RobotModel:
+        """Return the model of a group.
+
+        Args:
+            group: Its name.
+
+        Raises:
+            PlanningError: There is no such group, or it cannot be moved.
+        """
+        if group not in self.names:
+            raise PlanningError(
+                PlanningCode.INVALID_GROUP_NAME,
+                f'no group {group!r}; groups: {", ".join(self.names)}',
+            )
+        if group not in self._models:
+            try:
+                self._models[group] = RobotModel(
+                    *self._texts, self._limits, group, folder=self._folder
+                )
+            except ModelError as error:
+                raise PlanningError(
+                    PlanningCode.INVALID_GROUP_NAME, f'group {group!r} cannot be moved: {error}'
+                ) from error
+        return self._models[group]
+
+    def positions(self, by_joint: Mapping[str, float]) -> Array:
+        """Return the positions of all joints; those that are not given stand at 0 or nearby.
+
+        Args:
+            by_joint: Positions in [rad]; other names than those of joints count nothing.
+        """
+        positions = np.array(self._standing)
+        for place, name in enumerate(self.joints):
+            positions[place] = by_joint.get(name, positions[place])
+        return frozen(positions)

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""States of joints between MoveIt's messages and values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+from moveit_msgs.msg import RobotState as StateMessage
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from arm_model import Array
+
+from ..exceptions import PlanningCode, PlanningError
+
+
+def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noqa: ANN401
+    """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint.
+
+    Args:
+        message: The state.
+        known: Joints of the robot, mimic joints too.
+
+    Raises:
+        PlanningError: A joint is unknown, a position is missing or not finite, or there are joints
+            of several degrees of freedom.
+    """
+    state = message.joint_state
+    if message.multi_dof_joint_state.joint_names:
+        raise _invalid('multi_dof_joint_state: the robot stands still, it has no such joint')
+    if len(state.name) != len(state.position):
+        raise _invalid(f'{len(state.name)} names and {len(state.position)} positions')
+    for name, position in zip(state.name, state.position, strict=True):
+        if name not in known:
+            raise _invalid(f'no joint {name!r}; joints: {", ".join(known)}')
+        if not math.isfinite(position):
+            raise _invalid(f'the position of {name} is {position}; it must be finite')
+    return dict(zip(state.name, state.position, strict=True))
+
+
+def _invalid(reason: str) -> PlanningError:
+    return PlanningError(PlanningCode.INVALID_ROBOT_STATE, f'robot state: {reason}')
+
+
+def state_message(joints: Sequence[str], positions: Array, root: str) -> StateMessage:
+    """Return joints at rest as a moveit_msgs/RobotState.
+
+    Args:
+        joints: Their names.
+        positions: Their positions in [rad].
+        root: Name of the root link.
+    """
+    header = Header(frame_id=root)
+    state = JointState(header=header, name=list(joints), position=positions.tolist())
+    message = StateMessage(joint_state=state)
+    message.multi_dof_joint_state.header = header
+    return message

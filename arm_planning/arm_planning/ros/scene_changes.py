@@ -1,0 +1,290 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of the shared scene by MoveIt's messages: a message counts as a whole or not at all.
+
+:mod:`arm_model.ros` reads what may collide; here are the parts that collisions do not need, frames
+of objects, padding and scale, and the codes of refusals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+import math
+from typing import Any
+
+from moveit_msgs.msg import CollisionObject as ObjectMessage
+
+from arm_model import (
+    AllowedCollisionMatrix,
+    Array,
+    combined,
+    LinkNameError,
+    ObjectNameError,
+    padded,
+    PlacedShape,
+    PlanningScene,
+    Pose,
+    SceneError,
+)
+from arm_model.ros import (
+    apply_attached_object,
+    apply_collision_object,
+    apply_planning_scene,
+    xyz,
+    xyzw,
+)
+
+from ..exceptions import PlanningCode, PlanningError
+from .geometry import check_mesh, placement, pose_of
+from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
+
+Frames = Callable[[str], Pose]
+"""Returns the pose of a frame in the root link; raises PlanningError."""
+
+
+def apply_scene(
+    snapshot: SceneSnapshot,
+    message: Any,  # noqa: ANN401  # message classes have no type
+    positions: Array,
+    frames: Frames | None = None,
+) -> SceneSnapshot:
+    """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene.
+
+    Args:
+        snapshot: The scene before.
+        message: The message.
+        positions: Positions of all joints of the robot in [rad].
+        frames: Frames that neither robot nor scene has, such as those of TF.
+
+    Raises:
+        PlanningError: A part of it is refused.
+    """
+    if len(message.world.octomap.octomap.data):
+        raise PlanningError(
+            PlanningCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+            'octomaps are not supported; send boxes or meshes as collision objects',
+        )
+    before = snapshot if message.is_diff else _without_settings(snapshot)
+    before = replace(
+        before,
+        name=message.name or snapshot.name,
+        fixed_frames=_fixed(before, message.fixed_frame_transforms, positions, frames),
+    )
+    before = _padded(before, message.link_padding, message.link_scale)
+    bodies = message.robot_state.attached_collision_objects
+    _check_meshes([*message.world.collision_objects, *(each.object for each in bodies)])
+    with _refused():
+        scene = apply_planning_scene(
+            before.scene, message, positions, _frame_of(before, positions, frames)
+        )
+    colors = {
+        each.id: (each.color.r, each.color.g, each.color.b, each.color.a)
+        for each in message.object_colors
+    }
+    after = replace(before, colors={**before.colors, **colors})
+    return _described(after, scene, message.world.collision_objects, bodies)
+
+
+def apply_object(
+    snapshot: SceneSnapshot,
+    message: Any,  # noqa: ANN401
+    positions: Array,
+    frames: Frames | None = None,
+) -> SceneSnapshot:
+    """Return a scene after a moveit_msgs/CollisionObject.
+
+    Args:
+        snapshot: The scene before.
+        message: The message.
+        positions: Positions of all joints of the robot in [rad].
+        frames: Frames that neither robot nor scene has.
+
+    Raises:
+        PlanningError: It is refused.
+    """
+    _check_meshes([message])
+    with _refused():
+        scene = apply_collision_object(
+            snapshot.scene, message, positions, _frame_of(snapshot, positions, frames)
+        )
+    return _described(snapshot, scene, [message], [])
+
+
+def apply_attached(
+    snapshot: SceneSnapshot,
+    message: Any,  # noqa: ANN401
+    positions: Array,
+    frames: Frames | None = None,
+) -> SceneSnapshot:
+    """Return a scene after a moveit_msgs/AttachedCollisionObject.
+
+    Args:
+        snapshot: The scene before.
+        message: The message.
+        positions: Positions of all joints of the robot in [rad].
+        frames: Frames that neither robot nor scene has.
+
+    Raises:
+        PlanningError: It is refused.
+    """
+    _check_meshes([message.object])
+    with _refused():
+        scene = apply_attached_object(
+            snapshot.scene, message, positions, _frame_of(snapshot, positions, frames)
+        )
+    return _described(snapshot, scene, [], [message])
+
+
+def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningScene:
+    """Return the scene as a group of the robot moves in it.
+
+    Args:
+        snapshot: The scene of the whole robot.
+        robot_alone: The first scene of the group's model: pairs that it allows stay allowed where
+            the matrix of the scene has no entry of them.
+    """
+    whole = snapshot.scene
+    entries = {**robot_alone.allowed.entries, **whole.allowed.entries}
+    return robot_alone.with_contents(
+        objects=whole.objects,
+        attached_bodies=whole.attached_bodies,
+        allowed=AllowedCollisionMatrix(entries, whole.allowed.defaults),
+        link_shapes=whole.link_shapes,
+    )
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    """Give refusals of the scene the code that MoveIt has for them."""
+    try:
+        yield
+    except LinkNameError as error:
+        raise PlanningError(PlanningCode.INVALID_LINK_NAME, str(error)) from error
+    except ObjectNameError as error:
+        raise PlanningError(PlanningCode.INVALID_OBJECT_NAME, str(error)) from error
+    except SceneError as error:
+        raise PlanningError(PlanningCode.FAILURE, str(error)) from error
+
+
+def _check_meshes(messages: Iterable[Any]) -> None:
+    for message in messages:
+        for mesh in message.meshes:
+            check_mesh(mesh, f'object {message.id!r}')
+
+
+def _frame_of(snapshot: SceneSnapshot, positions: Array, frames: Frames | None) -> Frames:
+    def frame_of(frame: str) -> Pose:
+        try:
+            return snapshot.frame(frame, positions)
+        except PlanningError:
+            if frames is None:
+                raise
+            return frames(frame)
+
+    return frame_of
+
+
+def _described(
+    before: SceneSnapshot, scene: PlanningScene, objects: Iterable[Any], bodies: Sequence[Any]
+) -> SceneSnapshot:
+    """Return the next version of a scene, with what messages say of objects besides."""
+    details, attached = dict(before.details), dict(before.attached_details)
+    for message in (*objects, *(body.object for body in bodies)):
+        if message.primitives or message.meshes or message.planes:
+            read = _details(message)
+            is_more = message.operation == ObjectMessage.APPEND and message.id in details
+            details[message.id] = _joined(details[message.id], read) if is_more else read
+    for body in bodies:
+        attached[body.object.id] = AttachedDetails(body.detach_posture, body.weight)
+    things = {*scene.objects, *scene.attached_bodies}
+    return replace(
+        before,
+        scene=scene,
+        version=before.version + 1,
+        details={name: details.get(name, ObjectDetails()) for name in things},
+        attached_details={name: attached[name] for name in scene.attached_bodies},
+        colors={name: color for name, color in before.colors.items() if name in things},
+    )
+
+
+def _details(message: Any) -> ObjectDetails:  # noqa: ANN401
+    what = f'object {message.id!r}'
+    if len(message.subframe_names) != len(message.subframe_poses):
+        raise PlanningError(
+            PlanningCode.FAILURE,
+            f'{what}: {len(message.subframe_names)} names of subframes and'
+            f' {len(message.subframe_poses)} poses',
+        )
+    subframes = {
+        name: pose_of(each, f'subframe {name!r} of {what}')
+        for name, each in zip(message.subframe_names, message.subframe_poses, strict=True)
+    }
+    return ObjectDetails(message.type.key, message.type.db, subframes, tuple(message.meshes))
+
+
+def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
+    return replace(
+        before,
+        subframes={**before.subframes, **added.subframes},
+        meshes=(*before.meshes, *added.meshes),
+    )
+
+
+def _without_settings(snapshot: SceneSnapshot) -> SceneSnapshot:
+    """Return a scene without what a whole scene replaces besides its objects."""
+    scene = snapshot.scene.with_contents(link_shapes=snapshot.link_shapes)
+    return replace(snapshot, scene=scene, colors={}, padding={}, scale={}, fixed_frames={})
+
+
+def _fixed(
+    snapshot: SceneSnapshot, transforms: Iterable[Any], positions: Array, frames: Frames | None
+) -> Mapping[str, Pose]:
+    found = dict(snapshot.fixed_frames)
+    frame_of = _frame_of(snapshot, positions, frames)
+    for each in transforms:
+        name, place = each.child_frame_id.removeprefix('/'), each.transform
+        pose = placement(xyz(place.translation), xyzw(place.rotation), f'frame {name!r}')
+        found[name] = combined(frame_of(each.header.frame_id), pose)
+    return found
+
+
+def _padded(
+    snapshot: SceneSnapshot, padding: Iterable[Any], scale: Iterable[Any]
+) -> SceneSnapshot:
+    margins, factors = dict(snapshot.padding), dict(snapshot.scale)
+    for each in padding:
+        _check_factor(snapshot, each.link_name, 'link_padding', each.padding, each.padding >= 0.0)
+        margins[each.link_name] = each.padding
+    for each in scale:
+        _check_factor(snapshot, each.link_name, 'link_scale', each.scale, each.scale > 0.0)
+        factors[each.link_name] = each.scale
+    if (margins, factors) == (snapshot.padding, snapshot.scale):
+        return snapshot
+    shapes = {
+        link: [
+            PlacedShape(
+                padded(one.shape, margins.get(link, 0.0), factors.get(link, 1.0)), one.pose
+            )
+            for one in placed
+        ]
+        for link, placed in snapshot.link_shapes.items()
+    }
+    scene = snapshot.scene.with_contents(link_shapes=shapes)
+    return replace(snapshot, scene=scene, padding=margins, scale=factors)
+
+
+def _check_factor(
+    snapshot: SceneSnapshot, link: str, what: str, value: float, usable: bool
+) -> None:
+    links = snapshot.scene.kinematics.frames
+    if link not in links:
+        raise PlanningError(
+            PlanningCode.INVALID_LINK_NAME, f'{what}: no link {link!r}; links: {", ".join(links)}'
+        )
+    if not (usable and math.isfinite(value)):
+        raise PlanningError(
+            PlanningCode.FAILURE,
+            f'{what} of {link} is {value:g}: a padding is 0 or more, a scale positive',
+        )

@@ -1,0 +1,153 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The shared scene on a node: MoveIt's topics and services that read and change it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    PlanningScene,
+    PlanningSceneWorld,
+)
+from moveit_msgs.msg import RobotState as StateMessage
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from arm_model import Array
+from node_runner import LATCHED
+
+from ..exceptions import PlanningError
+from .robot_groups import RobotGroups
+from .robot_state import joints_of, state_message
+from .scene_changes import apply_attached, apply_object, apply_scene
+from .scene_messages import ALL_COMPONENTS, attached_messages, scene_message
+from .scene_snapshot import SceneSnapshot
+
+DEPTH = 100
+"""Messages of changes that may wait: each of them counts."""
+
+
+class SceneMonitor:
+    """The scene, and where the joints are; belongs to the executor of its node.
+
+    Attributes:
+        robot: The robot.
+        snapshot: The scene; a value that any thread may keep.
+    """
+
+    def __init__(self, node: Node, robot: RobotGroups) -> None:
+        """Offer topics and services.
+
+        Args:
+            node: The node.
+            robot: The robot.
+        """
+        self.robot = robot
+        self.snapshot = SceneSnapshot.of(robot.scene, f'{robot.name} scene')
+        self._node = node
+        self._places: dict[str, float] = {}
+        self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
+        node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
+        for kind, topic, apply in (
+            (PlanningScene, 'planning_scene', apply_scene),
+            (CollisionObject, 'collision_object', apply_object),
+            (AttachedCollisionObject, 'attached_collision_object', apply_attached),
+        ):
+            node.create_subscription(kind, topic, self._change_by(topic, apply), DEPTH)
+        node.create_subscription(
+            PlanningSceneWorld, 'planning_scene_world', self._take_world, DEPTH
+        )
+        node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
+        node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
+        self._publish()
+
+    @property
+    def places(self) -> Mapping[str, float]:
+        """Return positions of the joints in [rad] that were received, by joint."""
+        return self._places
+
+    def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
+        """Return the positions of all joints of the robot in [rad].
+
+        Args:
+            message: A moveit_msgs/RobotState; the joints that it leaves out are where they are.
+
+        Raises:
+            PlanningError: It is refused.
+        """
+        given = {} if message is None else joints_of(message, self.robot.all_joints)
+        return self.robot.positions({**self._places, **given})
+
+    def start_scene(self, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
+        """Return the scene with the attached bodies that a moveit_msgs/RobotState has besides.
+
+        Args:
+            message: The state.
+            positions: Positions of all joints of the robot in [rad].
+
+        Raises:
+            PlanningError: A body is refused.
+        """
+        snapshot = self.snapshot
+        for body in message.attached_collision_objects:
+            snapshot = apply_attached(snapshot, body, positions)
+        return snapshot
+
+    def state(self, positions: Array | None = None) -> StateMessage:
+        """Return where all joints are as a moveit_msgs/RobotState, with attached bodies.
+
+        Args:
+            positions: Positions of all joints of the robot in [rad]; None for the present ones.
+        """
+        places = self.positions() if positions is None else positions
+        message = state_message(self.robot.joints, places, self.snapshot.root)
+        message.joint_state.header.stamp = self._node.get_clock().now().to_msg()
+        message.attached_collision_objects = attached_messages(self.snapshot)
+        return message
+
+    def _take_joints(self, message: JointState) -> None:
+        for name, position in zip(message.name, message.position, strict=False):
+            if position == position:  # noqa: PLR0124  # not NaN
+                self._places[name] = position
+
+    def _take_world(self, message: PlanningSceneWorld) -> None:
+        scene = PlanningScene(is_diff=True, world=message)
+        scene.robot_state.is_diff = True
+        self._change('planning_scene_world', apply_scene, scene)
+
+    def _change_by(self, topic: str, apply: Any) -> Callable[[Any], None]:  # noqa: ANN401
+        def take(message: Any) -> None:  # noqa: ANN401
+            self._change(topic, apply, message)
+
+        return take
+
+    def _change(self, source: str, apply: Any, message: Any) -> bool:  # noqa: ANN401
+        """Apply a message; a refusal is logged and leaves the scene as it is."""
+        try:
+            self.snapshot = apply(self.snapshot, message, self.positions())
+        except PlanningError as error:
+            self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
+            return False
+        self._publish()
+        return True
+
+    def _publish(self) -> None:
+        self._published.publish(scene_message(self.snapshot, self.robot.name, self.state()))
+
+    def _get(
+        self, request: GetPlanningScene.Request, response: GetPlanningScene.Response
+    ) -> GetPlanningScene.Response:
+        components = request.components.components or ALL_COMPONENTS
+        response.scene = scene_message(self.snapshot, self.robot.name, self.state(), components)
+        return response
+
+    def _apply(
+        self, request: ApplyPlanningScene.Request, response: ApplyPlanningScene.Response
+    ) -> ApplyPlanningScene.Response:
+        response.success = self._change('apply_planning_scene', apply_scene, request.scene)
+        return response

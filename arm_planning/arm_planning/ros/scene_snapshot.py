@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The planning scene that clients share: what may collide, and what else messages say of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from arm_model import Array, combined, ORIGIN, PlacedShape, PlanningScene, Pose
+
+from ..exceptions import PlanningCode, PlanningError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjectDetails:
+    """What collisions do not need of an object.
+
+    Attributes:
+        type_key: Key of its type in a database.
+        type_db: Which database.
+        subframes: Poses in the object, by name.
+        meshes: Its shape_msgs/Mesh, in the order of its meshes: of arm_model they are the hulls.
+    """
+
+    type_key: str = ''
+    type_db: str = ''
+    subframes: Mapping[str, Pose] = field(default_factory=dict)
+    meshes: Sequence[Any] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttachedDetails:
+    """What collisions do not need of an attached body.
+
+    Attributes:
+        detach_posture: The trajectory_msgs/JointTrajectory that lets it go.
+        weight: Its weight in [kg].
+    """
+
+    detach_posture: Any
+    weight: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneSnapshot:
+    """One state of the scene; immutable.
+
+    Attributes:
+        scene: What may collide: all joints of the robot move.
+        link_shapes: Shapes of the links without padding and scale.
+        version: How many changes were made before.
+        name: Its name.
+        details: Of objects of the world and attached ones, by name.
+        attached_details: Of attached bodies, by name.
+        colors: Red, green, blue and opacity, by object.
+        padding: By link in [m].
+        scale: By link.
+        fixed_frames: Frames that clients named, in the root link.
+    """
+
+    scene: PlanningScene
+    link_shapes: Mapping[str, Sequence[PlacedShape]]
+    version: int = 0
+    name: str = ''
+    details: Mapping[str, ObjectDetails] = field(default_factory=dict)
+    attached_details: Mapping[str, AttachedDetails] = field(default_factory=dict)
+    colors: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    padding: Mapping[str, float] = field(default_factory=dict)
+    scale: Mapping[str, float] = field(default_factory=dict)
+    fixed_frames: Mapping[str, Pose] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, scene: PlanningScene, name: str = '') -> SceneSnapshot:
+        """Return the first one.
+
+        Args:
+            scene: The robot.
+            name: Its name.
+        """
+        return cls(scene, scene.link_shapes, name=name)
+
+    @property
+    def root(self) -> str:
+        """The link in which objects of the world are."""
+        return self.scene.kinematics.root
+
+    def link_of(self, frame: str) -> tuple[str, Pose]:
+        """Return the link that carries a frame, and where the frame is in it.
+
+        Args:
+            frame: A link, an object or attached body, a subframe of one as ``object/subframe``,
+                or a frame that was named; empty for the root link.
+
+        Raises:
+            PlanningError: It is unknown.
+        """
+        name = frame.removeprefix('/')
+        if name in self.scene.kinematics.frames:
+            return name, ORIGIN
+        if not name:
+            return self.root, ORIGIN
+        if name in self.fixed_frames:
+            return self.root, self.fixed_frames[name]
+        thing, separator, subframe = name.partition('/')
+        found = self._thing(thing)
+        if found is None or (separator and subframe not in self.details[thing].subframes):
+            raise PlanningError(
+                PlanningCode.FRAME_TRANSFORM_FAILURE,
+                f'Unknown frame: {frame!r}; it must be a link, an object or object/subframe;'
+                f' objects: {", ".join(self.details) or "none"}',
+            )
+        link, pose = found
+        return link, combined(pose, self.details[thing].subframes[subframe]) if separator else pose
+
+    def frame(self, frame: str, positions: Array) -> Pose:
+        """Return where a frame is in the root link.
+
+        Args:
+            frame: As of :meth:`link_of`.
+            positions: Positions of all joints of the robot in [rad].
+
+        Raises:
+            PlanningError: It is unknown.
+        """
+        link, pose = self.link_of(frame)
+        if link == self.root:
+            return pose
+        return combined(self.scene.kinematics.link_pose(link, positions), pose)
+
+    def _thing(self, name: str) -> tuple[str, Pose] | None:
+        if name in self.scene.objects:
+            return self.root, self.scene.objects[name].pose
+        if name in self.scene.attached_bodies:
+            body = self.scene.attached_bodies[name]
+            return body.link, body.object.pose
+        return None

@@ -1,0 +1,58 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""States and paths as messages: nothing is lost, and what is wrong is refused."""
+
+from __future__ import annotations
+
+import math
+
+from moveit_msgs.msg import RobotState
+import numpy as np
+from planning_messages import panda
+import pytest
+from sensor_msgs.msg import JointState
+
+from arm_model import ModelError
+from arm_planning import PlanningCode, PlanningError
+from arm_planning.ros.robot_groups import RobotGroups
+from arm_planning.ros.robot_state import joints_of
+
+JOINTS = panda().joints
+
+
+@pytest.mark.parametrize(
+    ('state', 'words'),
+    [
+        (JointState(name=['elbow'], position=[0.0]), "no joint 'elbow'"),
+        (JointState(name=[JOINTS[0]], position=[math.nan]), 'nan'),
+        (JointState(name=[JOINTS[0]]), '1 names and 0 positions'),
+    ],
+)
+def test_states_that_are_wrong_are_refused(state: JointState, words: str) -> None:
+    """An unknown joint, a position that is no number, or none at all."""
+    with pytest.raises(PlanningError, match=words) as refusal:
+        joints_of(RobotState(joint_state=state), panda().all_joints)
+    assert refusal.value.code is PlanningCode.INVALID_ROBOT_STATE
+
+
+def test_joints_that_are_not_given_stand_in_their_range() -> None:
+    """Joint 4 of the Panda has no zero."""
+    positions = panda().positions({JOINTS[0]: 0.5})
+    assert positions[0] == 0.5
+    model = panda().model('panda_arm')
+    inside = np.array([positions[JOINTS.index(name)] for name in model.joints])
+    assert (inside >= model.limits.lower).all()
+    assert (inside <= model.limits.upper).all()
+
+
+def test_an_unknown_group_is_refused_with_the_known_ones() -> None:
+    """MoveIt's code for it."""
+    with pytest.raises(PlanningError, match='panda_arm') as refusal:
+        panda().model('legs')
+    assert refusal.value.code is PlanningCode.INVALID_GROUP_NAME
+
+
+def test_a_robot_without_groups_is_refused() -> None:
+    """Nothing could be planned."""
+    with pytest.raises(ModelError, match='no group'):
+        RobotGroups('<robot name="r"><link name="base"/></robot>', '<robot name="r"/>', {})

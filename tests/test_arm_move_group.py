@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""move_group on a simulated Panda, with the calls that clients of MoveIt make."""
+
+from __future__ import annotations
+
+from typing import Any, TYPE_CHECKING
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Pose
+from moveit_msgs.action import ExecuteTrajectory
+from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene, RobotTrajectory
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetPlanningScene,
+    GetPositionFK,
+    GetStateValidity,
+)
+from moving_arm import goal_to, MovingArm, READY, robot_parameters
+from processes import executable
+import pytest
+from shape_msgs.msg import SolidPrimitive
+from simulated_arm import JOINTS
+from std_msgs.msg import String
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from node_runner import LATCHED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+TURNED = [1.2, *READY[1:]]
+
+
+def test_clients_of_moveit_share_a_scene_and_execute(isolation: Isolation, tmp_path: Path) -> None:
+    """Scene, states, execution, cancel and refusals, on the simulated drives."""
+    with MovingArm(isolation, tmp_path) as arm:
+        group = arm.run(
+            executable('arm_planning', 'move_group'),
+            *('--ros-args', '--params-file', str(robot_parameters(tmp_path))),
+        )
+        group.wait_until_ready()
+        semantic = arm.client.listen(String, '/robot_description_semantic', LATCHED)
+        arm.client.spin_until(lambda: bool(semantic), 10.0, 'robot_description_semantic')
+        assert 'panda_arm' in semantic[0].data
+        arm.follow()
+        _back_to_ready(arm)
+        _shares_the_scene(arm)
+        _answers_about_states(arm)
+        _executes(arm)
+        _says_why_not(arm)
+        _cancels_and_stops(arm)
+
+
+class ActionRun:
+    """A goal of an action."""
+
+    def __init__(self, arm: MovingArm, kind: Any, name: str, goal: Any) -> None:
+        """Send it; it is accepted."""
+        self.states: list[str] = []
+        self._client = arm.client
+        client = arm.client.action(kind, name)
+        arm.client.spin_until(client.server_is_ready, 20.0, f'the action {name}')
+        sent = client.send_goal_async(goal, lambda each: self.states.append(each.feedback.state))
+        arm.client.spin_until(sent.done, 10.0, 'acceptance')
+        self._handle = sent.result()
+        assert self._handle.accepted
+        self._result = self._handle.get_result_async()
+
+    def cancel(self) -> None:
+        """Ask for its end."""
+        self._client.spin_until(self._handle.cancel_goal_async().done, 10.0, 'answer to cancel')
+
+    def wait(self) -> tuple[int, Any]:
+        """Return status and result."""
+        self._client.spin_until(self._result.done, 30.0, 'result')
+        return self._result.result().status, self._result.result().result
+
+
+def _box(name: str, x: float, y: float, z: float) -> CollisionObject:
+    thing = CollisionObject(id=name, operation=CollisionObject.ADD)
+    thing.header.frame_id = 'panda_link0'
+    thing.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.2, 0.2, 0.2])]
+    place = Pose()
+    place.position.x, place.position.y, place.position.z = x, y, z
+    thing.primitive_poses = [place]
+    return thing
+
+
+def _scene(arm: MovingArm) -> PlanningScene:
+    request = GetPlanningScene.Request()
+    return arm.client.call(GetPlanningScene, '/get_planning_scene', request).scene
+
+
+def _shares_the_scene(arm: MovingArm) -> None:
+    """PlanningSceneInterface: apply_planning_scene; pymoveit2: the topic collision_object."""
+    monitored = arm.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
+    change = PlanningScene(is_diff=True)
+    change.robot_state.is_diff = True
+    change.world.collision_objects = [_box('crate', 0.11, 0.31, 0.5)]
+    apply = ApplyPlanningScene.Request(scene=change)
+    assert arm.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    publisher = arm.client.node.create_publisher(CollisionObject, '/collision_object', 10)
+    arm.client.spin_until(lambda: bool(publisher.get_subscription_count()), 10.0, 'a listener')
+    publisher.publish(_box('far', -2.0, 0.0, 0.4))
+
+    def names() -> set[str]:
+        return {each.id for each in monitored[-1].world.collision_objects} if monitored else set()
+
+    arm.client.spin_until(lambda: names() == {'crate', 'far'}, 10.0, 'the scene with both')
+    scene = _scene(arm)
+    assert {each.id for each in scene.world.collision_objects} == {'crate', 'far'}
+    assert dict(
+        zip(
+            scene.robot_state.joint_state.name, scene.robot_state.joint_state.position, strict=True
+        )
+    )['panda_joint4'] == pytest.approx(READY[3], abs=0.02)
+    refused = ApplyPlanningScene.Request(scene=PlanningScene(is_diff=True))
+    refused.scene.world.collision_objects = [
+        CollisionObject(id='nothing', operation=CollisionObject.REMOVE)
+    ]
+    assert not arm.client.call(ApplyPlanningScene, '/apply_planning_scene', refused).success
+
+
+def _answers_about_states(arm: MovingArm) -> None:
+    request = GetPositionFK.Request(fk_link_names=['panda_link8'])
+    answer = arm.client.call(GetPositionFK, '/compute_fk', request)
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
+    assert answer.pose_stamped[0].header.frame_id == 'panda_link0'
+    assert answer.pose_stamped[0].pose.position.x == pytest.approx(0.307, abs=0.03)
+    unknown = GetPositionFK.Request(fk_link_names=['moon'])
+    code = arm.client.call(GetPositionFK, '/compute_fk', unknown).error_code
+    assert (code.val, code.source) == (MoveItErrorCodes.INVALID_LINK_NAME, 'move_group')
+    assert 'moon' in code.message
+    check = GetStateValidity.Request(group_name='panda_arm')
+    assert arm.client.call(GetStateValidity, '/check_state_validity', check).valid
+    check.robot_state.joint_state.name = list(JOINTS)
+    check.robot_state.joint_state.position = TURNED
+    answer = arm.client.call(GetStateValidity, '/check_state_validity', check)
+    assert not answer.valid
+    assert 'crate' in {answer.contacts[0].contact_body_1, answer.contacts[0].contact_body_2}
+    assert answer.contacts[0].depth > 0.0
+
+
+def _trajectory(positions: Sequence[float], seconds: int) -> RobotTrajectory:
+    """Return a straight motion from READY."""
+    trajectory = JointTrajectory(joint_names=list(JOINTS))
+    rest = [0.0] * len(JOINTS)
+    for place, time in ((READY, 0), (positions, seconds)):
+        point = JointTrajectoryPoint(positions=place, velocities=rest)
+        point.time_from_start.sec = time
+        trajectory.points.append(point)
+    return RobotTrajectory(joint_trajectory=trajectory)
+
+
+def execute(arm: MovingArm, trajectory: RobotTrajectory) -> ActionRun:
+    """Send a goal of execute_trajectory."""
+    goal = ExecuteTrajectory.Goal(trajectory=trajectory)
+    return ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal)
+
+
+def _executes(arm: MovingArm) -> None:
+    """There and back: MoveGroupInterface::execute."""
+    there = [-0.2, *READY[1:]]
+    back = _trajectory(there, 2)
+    back.joint_trajectory.points[0].positions = there
+    back.joint_trajectory.points[1].positions = READY
+    for trajectory in (_trajectory(there, 2), back):
+        run = execute(arm, trajectory)
+        status, result = run.wait()
+        assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result
+        assert run.states == ['MONITOR', 'IDLE']
+
+
+def _says_why_not(arm: MovingArm) -> None:
+    """The trajectory begins elsewhere, or no controller moves its joint."""
+    elsewhere, leg = _trajectory(READY, 2), _trajectory(READY, 2)
+    elsewhere.joint_trajectory.points[0].positions = [0.3, *READY[1:]]
+    leg.joint_trajectory.joint_names[0] = 'leg'
+    for trajectory, code, words in (
+        (elsewhere, MoveItErrorCodes.CONTROL_FAILED, 'panda_joint1'),
+        (leg, MoveItErrorCodes.ROBOT_STATE_STALE, 'leg'),
+        (RobotTrajectory(), MoveItErrorCodes.INVALID_MOTION_PLAN, 'no points'),
+    ):
+        status, result = execute(arm, trajectory).wait()
+        assert status == GoalStatus.STATUS_ABORTED
+        assert result.error_code.val == code, result.error_code
+        assert words in result.error_code.message
+        assert result.error_code.source == 'move_group'
+
+
+def _cancels_and_stops(arm: MovingArm) -> None:
+    """A cancel, and 'stop' of RViz' panel; the arm stops on the path."""
+    run = execute(arm, _trajectory([-1.0, *READY[1:]], 8))
+    arm.client.spin_until(lambda: 'MONITOR' in run.states, 10.0, 'execution')
+    publisher = arm.client.node.create_publisher(String, '/trajectory_execution_event', 10)
+    arm.client.spin_until(lambda: bool(publisher.get_subscription_count()), 10.0, 'a listener')
+    busy = execute(arm, _trajectory(READY, 2)).wait()[1].error_code
+    assert busy.val == MoveItErrorCodes.CONTROL_FAILED
+    assert 'another execution' in busy.message
+    run.cancel()
+    status, result = run.wait()
+    assert (status, result.error_code.val) == (
+        GoalStatus.STATUS_CANCELED,
+        MoveItErrorCodes.PREEMPTED,
+    ), result.error_code
+    _back_to_ready(arm)
+    run = execute(arm, _trajectory([-1.0, *READY[1:]], 8))
+    arm.client.spin_until(lambda: 'MONITOR' in run.states, 10.0, 'execution')
+    publisher.publish(String(data='stop'))
+    status, result = run.wait()
+    assert (status, result.error_code.val) == (
+        GoalStatus.STATUS_ABORTED,
+        MoveItErrorCodes.PREEMPTED,
+    ), result.error_code
+
+
+def _back_to_ready(arm: MovingArm) -> None:
+    status, result = arm.send(goal_to(READY, 3.0)).wait()
+    assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
