@@ -150,6 +150,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.write(f'{finding}\n')
     errors = sum(finding.severity is Severity.ERROR for finding in findings)
     warnings = len(findings) - errors
-    result = f'{errors} errors, {warnings} warnings' if findings else 'nothing is wrong'
+    counts = f'{_counted(errors, "error")}, {_counted(warnings, "warning")}'
+    result = counts if findings else 'nothing is wrong'
     sys.stdout.write(f'{robot.name}: {result}\n')
     return 1 if errors else 0
+
+
+def _counted(number: int, noun: str) -> str:
+    return f'{number} {noun}' if number == 1 else f'{number} {noun}s'

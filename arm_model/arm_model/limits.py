@@ -187,11 +187,12 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
         defaults.setdefault(words, []).append(name)
         return value
 
+    sliding = joint.kind is JointKind.PRISMATIC
+    unit = 'm' if sliding else 'rad'
     velocity = _velocity(name, entry) or span.velocity
     if not velocity:
-        sliding = joint.kind is JointKind.PRISMATIC
-        value, unit = (DEFAULT_SLIDING_VELOCITY, 'm/s') if sliding else (DEFAULT_VELOCITY, 'rad/s')
-        velocity = default(f'no max_velocity in any file, so {value:g} {unit}', value)
+        value = DEFAULT_SLIDING_VELOCITY if sliding else DEFAULT_VELOCITY
+        velocity = default(f'no max_velocity in any file, so {value:g} {unit}/s', value)
     elif span.velocity and velocity > span.velocity * (1 + ROUNDING_TOLERANCE):
         raise LimitsError(
             f'joint {name}: max_velocity {velocity:g} is wider than the description'
@@ -199,7 +200,7 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
         )
     lower, upper = _span(name, entry, span)
     acceleration = _positive(name, entry, 'acceleration') or default(
-        f'no max_acceleration in the limits file, so {DEFAULT_ACCELERATION:g} per s2',
+        f'no max_acceleration in the limits file, so {DEFAULT_ACCELERATION:g} {unit}/s2',
         DEFAULT_ACCELERATION,
     )
     jerk = _positive(name, entry, 'jerk') or default(

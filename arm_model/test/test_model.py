@@ -207,7 +207,9 @@ def test_what_no_file_says_has_a_default_that_is_noted_once() -> None:
     assert model.limits.jerk.tolist() == [10.0, 50.0, 10.0]
     defaults = [note for note in model.notes if note.startswith('no max_')]
     joints = [note.rpartition(': ')[2] for note in defaults]
-    assert joints == ['j1, j2', 'j1, j3', 'j1, j2, j3', 'j3']
+    assert joints == ['j1, j2', 'j1', 'j1, j2, j3', 'j3', 'j3']
+    units = [note.partition(':')[0].rpartition(' ')[2] for note in defaults]
+    assert units == ['rad/s', 'rad/s2', 'max_acceleration', 'm/s', 'm/s2']
 
 
 def test_unknown_names_are_refused_with_the_known_ones() -> None:

@@ -186,6 +186,13 @@ def test_cyclic_modes_move_too(master: CanopenMaster) -> None:
     assert drive.position == pytest.approx(0.2, abs=0.001)
 
 
+@pytest.mark.parametrize('mode', ['position', 5, -3])
+def test_an_unknown_mode_is_refused(master: CanopenMaster, mode: object) -> None:
+    """With the modes that there are, as every other error of the package."""
+    with pytest.raises(DriveError, match=r'mode of operation .*PROFILE_POSITION \(1\), '):
+        master.drive('joint1').select_mode(mode)  # type: ignore[arg-type]
+
+
 def test_objects_are_read_and_written(master: CanopenMaster) -> None:
     """By number and name, typed by the EDS; what is wrong says so, before a frame where it can."""
     sdo = master.sdo('joint1')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import shutil
 import signal
 import subprocess
 import sys
@@ -40,15 +41,28 @@ def test_a_process_ends_with_its_exit_code(tmp_path: Path) -> None:
     assert process.stderr == ''
 
 
-def test_the_article_is_checked(capsys: pytest.CaptureFixture[str]) -> None:
-    """The bus.yml of the article works, with two warnings that --strict makes errors."""
-    assert main(['check', str(PANDA)]) == 0
+def test_the_article_is_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The bus.yml of the article works, with two warnings that --strict makes errors.
+
+    Ours differs from it in both.
+    """
+    mode = '        - {index: 0x6060, sub_index: 0} # Modes of Operation\n'
+    target = '        - {index: 0x607A, sub_index: 0} # Target Position\n'
+    head = '    2:\n      enabled: true\n      cob_id: "auto"\n      mapping:\n'
+    text = PANDA.read_text('utf-8')
+    assert text.count(mode + target + head) == text.count('value: 10} # Set Interpolation') == 1
+    text = text.replace(mode + target + head, mode + head + target)
+    article = tmp_path / 'bus.yml'
+    article.write_text(text.replace('value: 10} # Set Inter', 'value: 50} # Set Inter'), 'utf-8')
+    shutil.copy(PANDA.with_name('cia402_slave.eds'), tmp_path)
+    assert main(['check', str(article)]) == 0
     output = capsys.readouterr().out
-    assert f'{PANDA}:23: warning: defaults.sdo[5]: 0x60C2 (interpolation period) is 50' in output
-    assert f'{PANDA}:51: warning: defaults.rpdo.2: 0x607A (target position) is in RPDO' in output
+    assert f'{article}:23: warning: defaults.sdo[5]: 0x60C2 (interpolation period) is 50' in output
+    assert f'{article}:51: warning: defaults.rpdo.2: 0x607A (target position) is in RPDO' in output
     assert 'load at 1000 kbit/s: 2912 frames/s, 26.7% (31.4% with the most stuffing)' in output
-    assert output.splitlines()[-1] == f'{PANDA}: 0 errors, 2 warnings'
-    assert main(['check', str(PANDA), '--strict']) == 1
+    assert output.splitlines()[-1] == f'{article}: 0 errors, 2 warnings'
+    assert main(['check', str(article), '--strict']) == 1
+    assert main(['check', str(PANDA), '--strict']) == 0
 
 
 def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,6 +11,7 @@ import time
 from ..cia402.drive_commands import DriveCommands, Sequence
 from ..cia402.position_modes import Move
 from ..cia402.status import drive_status, DriveStatus
+from ..exceptions import DriveError
 from ..master.runner import NetworkThread
 from ..standard.drive import DriveState, OperationMode
 from .device import DeviceSdo
@@ -103,8 +104,11 @@ class CanopenDrive:
 
         Args:
             mode: The mode, or its number in 0x6060.
+
+        Raises:
+            DriveError: It is no mode of CiA 402, or the drive refuses it.
         """
-        return self._run('mode', partial(self._commands.select_mode, OperationMode(mode)))
+        return self._run('mode', partial(self._commands.select_mode, _operation_mode(mode)))
 
     def disable(self) -> str:
         """Take the torque away (Switched On)."""
@@ -162,3 +166,11 @@ class CanopenDrive:
 
     def _deliver(self, command: Callable[[], str]) -> str:
         return self._thread.run(lambda: self._commands.deliver(command)).result()
+
+
+def _operation_mode(mode: OperationMode | int) -> OperationMode:
+    try:
+        return OperationMode(mode)
+    except ValueError:
+        modes = ', '.join(f'{each.name} ({each.value})' for each in OperationMode if each)
+        raise DriveError(f'unknown mode of operation {mode!r}; choose one of {modes}') from None
