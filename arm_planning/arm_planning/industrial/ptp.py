@@ -19,6 +19,9 @@ from .timing import FullSpeedPath
 STANDSTILL = 1e-3
 """How long a motion takes that has no way in [s]."""
 
+NEGLIGIBLE = 1e-12
+"""Share of the longest way that a joint counts to have at least."""
+
 NO_WAY = 1e-9
 """Greatest way of a joint that counts as none in [rad]."""
 
@@ -35,7 +38,7 @@ def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
     size = np.abs(way)
     if size.max() < NO_WAY:
         return standstill(goal)
-    sizes = np.maximum(size, np.finfo(float).tiny)
+    sizes = np.maximum(size, NEGLIGIBLE * size.max())
     speed, acceleration, jerk = (  # of the share of the way
         float((limit / sizes).min())
         for limit in (limits.velocity, limits.acceleration, limits.jerk)

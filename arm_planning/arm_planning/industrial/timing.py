@@ -11,7 +11,7 @@ import numpy as np
 from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Segment, Timing
 
-MAX_SPACING = 0.02
+MAX_SPACING = 0.05
 """Greatest length of a segment of a path that is not straight in [s]."""
 
 MIN_SPACING = 1e-4
@@ -23,7 +23,7 @@ SPEEDS = (0.75, 0.55, 0.4, 0.3, 0.2)
 A path that slows down at many places is quicker at an even speed.
 """
 
-SLOW = 1.15
+SLOW = 1.5
 """How much longer a path may take for its joints before an even speed is tried."""
 
 QUANTITIES = ('speed', 'acceleration', 'jerk')
@@ -123,22 +123,19 @@ def slower(path: Path, factor: float) -> Path:
 
 def _from_rest_to_rest(full: FullSpeedPath) -> Path:
     """Return the path with one jerk-limited profile from its begin to its end."""
+    profile, lasts = _profile(full.path.duration, full)
+    if full.straight:
+        return _straight(full.path, profile, lasts)
     path = full.path
-    profile, lasts = _profile(path.duration, full)
     begins = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
     end = float(lasts.sum())
-    times = np.append(begins, end)
-    if not full.straight:
-        grid = np.linspace(0.0, end, int(np.ceil(end / MAX_SPACING)) + 1)
-        fine = np.linspace(0.0, end, 4 * len(grid))
-        along, _, _ = _evaluated(profile, begins, fine)
-        crossings = np.interp(path.starts[1:], along, fine)
-        times = np.unique(np.concatenate((times, grid, crossings)))
-        keep = np.diff(times, prepend=-1.0) > MIN_SPACING
-        keep[-1] = True
-        times = times[keep]
-        if len(times) > 2 and times[-1] - times[-2] <= MIN_SPACING:
-            times = np.delete(times, -2)
+    grid = np.linspace(0.0, end, int(np.ceil(end / MAX_SPACING)) + 1)
+    fine = np.linspace(0.0, end, 4 * len(grid))
+    crossings = np.interp(path.starts[1:], _evaluated(profile, begins, fine)[0], fine)
+    times = np.unique(np.concatenate((begins, grid, crossings)))
+    keep = np.diff(times, prepend=-1.0) > MIN_SPACING
+    keep &= (times < end - MIN_SPACING) | (times == end)
+    times = np.unique(np.append(times[keep], end))
     along, rate, bend = _evaluated(profile, begins, times)
     along = np.clip(along, 0.0, path.duration)
     numbers = np.maximum(np.searchsorted(path.starts, along, side='right') - 1, 0)
@@ -155,6 +152,23 @@ def _from_rest_to_rest(full: FullSpeedPath) -> Path:
             for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
         ]
     )
+
+
+def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Array) -> Path:
+    """Return one straight segment as a profile leads along it: a cubic for each phase, exactly.
+
+    A phase may be as short as rounding, so that no polynomial could be fitted to its ends.
+    """
+    base, slope = line.coefficients[0, :2]
+    segments, start = [], 0.0
+    for place, rate, bend, jerk, last in zip(*profile, lasts, strict=True):
+        coefficients = np.zeros((6, len(base)))
+        shares = np.array([[place], [rate], [bend / 2.0], [jerk / 6.0]])
+        coefficients[:4] = shares * slope
+        coefficients[0] += base
+        segments.append(Segment(start, float(last), coefficients))
+        start += float(last)
+    return Path(segments)
 
 
 def _profile(

@@ -46,7 +46,7 @@ MAX_NEWTON = 6
 MAX_CORRECTION = 0.3
 """Greatest motion of a joint in a Newton step in [rad]: more leads to another configuration."""
 
-DIFFERENCE = 1e-5
+DIFFERENCE = 1e-6
 """Share of a curve between the places of a difference quotient."""
 
 SHARPNESS = 16
@@ -184,10 +184,8 @@ class _Tracer:
 
     def _place(self, share: float, positions: Array) -> _Place:
         first = self._field(share, positions)
-        before, after = (
-            self._field(share + by, positions + by * first) for by in (-DIFFERENCE, DIFFERENCE)
-        )
-        return _Place(share, positions, first, (after - before) / (2.0 * DIFFERENCE))
+        after = self._field(share + DIFFERENCE, positions + DIFFERENCE * first)
+        return _Place(share, positions, first, (after - first) / DIFFERENCE)
 
     def _field(self, share: float, positions: Array) -> Array:
         """Return how joints follow the curve: derivatives by the share."""
