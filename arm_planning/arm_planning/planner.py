@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 import time
 
 import numpy as np
@@ -15,11 +16,17 @@ from arm_model import Array, checked, CommandError, PlanningScene, Pose, RobotMo
 from .exceptions import PlanningCode, PlanningError
 from .free.free_motion import FreeMotion
 from .free.timing import scaled_limits
+from .ik.solver import DEFAULT_TIMEOUT, IkSolver
+from .industrial.limits import CartesianLimits
+from .industrial.planner import IndustrialPlanner, PLANNER_IDS
 from .requests import Goal, JointGoal, MotionPlan, MotionRequest
 from .validity import ValidityCheck, Violation
 
 FREE_MOTION = ('RRTConnectkConfigDefault', 'RRTConnect', 'geometric::RRTConnect')
 """Names of MoveIt and OMPL for the planner of free motion."""
+
+IK_SOLUTIONS = 4
+"""Solutions of inverse kinematics that are goals of a free motion at most."""
 
 DEFAULT_PLANNER = FREE_MOTION[0]
 """What plans a request without a planner_id."""
@@ -31,6 +38,7 @@ class Planner:
     def __init__(
         self,
         model: RobotModel,
+        cartesian_limits: CartesianLimits | None = None,
         clock: Callable[[], float] = time.monotonic,
         seed: int = 0,
     ) -> None:
@@ -38,11 +46,14 @@ class Planner:
 
         Args:
             model: The arm; its scene counts where a call has none.
+            cartesian_limits: Limits of a link's motion for LIN and CIRC; None has the defaults.
             clock: Steady time in [s], for time-outs.
             seed: Of the random numbers: with the same seed and time enough, the same plans.
         """
         self._model, self._clock = model, clock
         self._draw = np.random.default_rng(seed)
+        self._industrial = IndustrialPlanner(model, cartesian_limits, clock)
+        self._solvers: dict[str, IkSolver] = {}
         self._check: ValidityCheck | None = None
 
     def plan(self, request: MotionRequest, scene: PlanningScene | None = None) -> MotionPlan:
@@ -56,27 +67,44 @@ class Planner:
             PlanningError: The request is refused, or no motion was found in time.
         """
         began = self._clock()
+        scene = self._model.scene if scene is None else scene
         self._refuse(request)
-        check = self._checked_in(scene)
-        start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
-        _require(check.state(start), 'start', _START_CODES)
-        goals = self._goals(request.goals, check)
-        limits = scaled_limits(
-            self._model.limits, request.velocity_scaling, request.acceleration_scaling
-        )
-        free = FreeMotion(limits, check, self._draw)
-        deadline = began + request.timeout
+        if request.planner_id in PLANNER_IDS:
+            plan = self._industrial.plan(request, scene)
+        else:
+            plan = self._free_motion(request, scene, began + request.timeout)
+        return replace(plan, planning_time=self._clock() - began)
 
-        def expired() -> bool:
-            return self._clock() > deadline
+    def ik(
+        self,
+        pose: Pose,
+        seed: Sequence[float] | Array,
+        *,
+        link: str = '',
+        scene: PlanningScene | None = None,
+        timeout: float = DEFAULT_TIMEOUT,
+        count: int = 1,
+    ) -> list[Array]:
+        """Return joint positions for a pose that are free of contact, nearest to the seed first.
 
-        paths = [free.plan(start, goals, expired)]
-        with suppress(PlanningError):  # no time is left for further attempts
-            while len(paths) < request.attempts:
-                paths.append(free.plan(start, goals, expired))
-        quickest = min(paths, key=lambda path: path.duration)
-        name = request.planner_id or DEFAULT_PLANNER
-        return MotionPlan(quickest, name, planning_time=self._clock() - began)
+        Args:
+            pose: Where the link is wanted, in the root link.
+            seed: Joint positions in [rad] (n), of which solutions are wanted near.
+            link: The link; empty for the tip.
+            scene: What may collide; by default that of the model.
+            timeout: Time for the search of an arm without closed form in [s].
+            count: How many solutions end that search.
+
+        Raises:
+            PlanningError: There is no solution, and why; or a number is not finite.
+        """
+        if link not in self._solvers:
+            self._solvers[link] = IkSolver(self._model, link, self._clock)
+        scene = self._model.scene if scene is None else scene
+        try:
+            return self._solvers[link].solve(pose, seed, scene, timeout, count)
+        except CommandError as error:
+            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
     def is_valid(
         self, positions: Sequence[float] | Array, scene: PlanningScene | None = None
@@ -91,7 +119,7 @@ class Planner:
             PlanningError: They are not finite numbers, one for each joint.
         """
         state = self._state(positions, 'state', PlanningCode.INVALID_ROBOT_STATE)
-        return self._checked_in(scene).state(state)
+        return self._checked_in(self._model.scene if scene is None else scene).state(state)
 
     def fk(self, positions: Sequence[float] | Array, link: str = '') -> Pose:
         """Return the pose of a link in the root link.
@@ -110,8 +138,30 @@ class Planner:
             raise PlanningError(PlanningCode.INVALID_LINK_NAME, str(error)) from error
         return self._model.kinematics.link_pose(link or self._model.tip, state)
 
-    def _checked_in(self, scene: PlanningScene | None) -> ValidityCheck:
-        scene = self._model.scene if scene is None else scene
+    def _free_motion(
+        self, request: MotionRequest, scene: PlanningScene, deadline: float
+    ) -> MotionPlan:
+        """Return the quickest of the free motions that are found in as many attempts."""
+
+        def expired() -> bool:
+            return self._clock() > deadline
+
+        check = self._checked_in(scene)
+        start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
+        _require(check.state(start), 'start', _START_CODES)
+        goals = self._goals(request, start, check)
+        limits = scaled_limits(
+            self._model.limits, request.velocity_scaling, request.acceleration_scaling
+        )
+        free = FreeMotion(limits, check, self._draw)
+        paths = [free.plan(start, goals, expired)]
+        with suppress(PlanningError):  # no time is left for further attempts
+            while len(paths) < request.attempts:
+                paths.append(free.plan(start, goals, expired))
+        quickest = min(paths, key=lambda path: path.duration)
+        return MotionPlan(quickest, request.planner_id or DEFAULT_PLANNER)
+
+    def _checked_in(self, scene: PlanningScene) -> ValidityCheck:
         if self._check is None or self._check.scene is not scene:
             self._check = ValidityCheck(self._model.limits, scene)
         return self._check
@@ -122,34 +172,34 @@ class Planner:
         except CommandError as error:
             raise PlanningError(code, str(error)) from error
 
-    def _goals(self, goals: Sequence[Goal], check: ValidityCheck) -> list[Array]:
-        """Return the goals that are valid, or raise what is wrong with the first."""
+    def _goals(self, request: MotionRequest, start: Array, check: ValidityCheck) -> list[Array]:
+        """Return the states of all goals that are valid, or raise what is wrong with the first."""
         found = []
-        for goal in goals:
+        for goal in request.goals:
             with suppress(PlanningError):
-                found.append(self._joint_goal(goal, check))
-        return found or [self._joint_goal(goals[0], check)]
+                found += self._states(goal, start, check)
+        return found or self._states(request.goals[0], start, check)
 
-    def _joint_goal(self, goal: Goal, check: ValidityCheck) -> Array:
-        if not isinstance(goal, JointGoal):
-            raise PlanningError(
-                PlanningCode.UNRECOGNIZED_GOAL_TYPE, 'free motion needs a goal in joint space'
-            )
-        state = self._state(goal.positions, 'goal', PlanningCode.INVALID_GOAL_CONSTRAINTS)
-        _require(check.state(state), 'goal', _GOAL_CODES)
-        return state
+    def _states(self, goal: Goal, start: Array, check: ValidityCheck) -> list[Array]:
+        """Return the states of a goal, which are valid."""
+        if isinstance(goal, JointGoal):
+            state = self._state(goal.positions, 'goal', PlanningCode.INVALID_GOAL_CONSTRAINTS)
+            _require(check.state(state), 'goal', _GOAL_CODES)
+            return [state]
+        states = self.ik(goal.pose, start, link=goal.link, scene=check.scene, count=IK_SOLUTIONS)
+        return [state for state in states if check.state(state) is None][:IK_SOLUTIONS]
 
     def _refuse(self, request: MotionRequest) -> None:
         """Raise what is wrong with a request before anything is computed."""
-        if request.planner_id not in ('', *FREE_MOTION):
-            known = ', '.join(FREE_MOTION)
+        if request.planner_id not in ('', *FREE_MOTION, *PLANNER_IDS):
+            known = ', '.join((*FREE_MOTION, *PLANNER_IDS))
             raise PlanningError(
                 PlanningCode.FAILURE,
                 f'unknown planner_id {request.planner_id!r}; choose one of {known}',
             )
         if not request.goals:
             raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'the request has no goal')
-        if request.constraints is not None:
+        if request.constraints is not None and request.planner_id not in PLANNER_IDS:
             raise PlanningError(
                 PlanningCode.PLANNING_FAILED, 'free motion does not heed path constraints'
             )

@@ -12,8 +12,15 @@ import numpy as np
 from planning_scenes import broken_limits, deepest_overlap, with_box, with_random_boxes
 import pytest
 
-from arm_model import Array, frozen
-from arm_planning import JointGoal, MotionRequest, Planner, PlanningCode, PlanningError
+from arm_model import Array, frozen, ORIGIN, Pose
+from arm_planning import (
+    JointGoal,
+    MotionRequest,
+    Planner,
+    PlanningCode,
+    PlanningError,
+    PoseGoal,
+)
 
 SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '6')))
 """Of the random scenes; more of them by the environment."""
@@ -23,6 +30,9 @@ OVERLAP_TOLERANCE = 1e-6
 
 TIMEOUT = 60.0
 """Time for planning in [s]: a busy machine is no failure."""
+
+LENGTH, LINE_TOLERANCE = 0.2, 1e-4
+"""A straight way of the tip, and how far it may be off, in [m]."""
 
 AROUND = 0.9
 """How far a goal may be from the ready pose in [rad]."""
@@ -151,3 +161,37 @@ def test_requests_that_make_no_sense_are_refused() -> None:
     }
     for words, case in cases.items():
         assert words in str(refusal(planner, case))
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_a_pose_is_reached_by_a_free_motion(name: str) -> None:
+    """By a solution of inverse kinematics that is free of contact."""
+    model, planner = robot(name), Planner(robot(name))
+    wanted = ready(name) + 0.3
+    goal = PoseGoal(planner.fk(wanted))
+    plan = planner.plan(MotionRequest(ready(name), [goal], timeout=TIMEOUT))
+    reached = planner.fk(plan.path.end.position)
+    assert np.allclose(reached.position, goal.pose.position, atol=1e-5)
+    assert np.allclose(reached.rotation, goal.pose.rotation, atol=1e-5)
+    assert deepest_overlap(plan.path, model.scene) > -OVERLAP_TOLERANCE
+
+
+def test_the_planner_id_chooses_the_pipeline() -> None:
+    """PTP is straight in joint space, LIN in space; the plan says which planner it was."""
+    model, here = robot('panda'), ready('panda')
+    planner = Planner(model)
+    begin = planner.fk(here)
+    goal = PoseGoal(Pose(begin.rotation, begin.position + np.array((0.0, LENGTH, 0.0))))
+    for name in ('PTP', 'LIN', 'RRTConnect'):
+        plan = planner.plan(MotionRequest(here, [goal], planner_id=name, timeout=TIMEOUT))
+        assert plan.planner_id == name
+        middle = planner.fk(plan.path.at(0.5 * plan.path.duration).position).position
+        off = np.cross(middle - begin.position, (goal.pose.position - begin.position) / LENGTH)
+        assert (float(np.linalg.norm(off)) < LINE_TOLERANCE) == (name == 'LIN')
+
+
+def test_a_pose_out_of_reach_is_refused() -> None:
+    """With MoveIt's code."""
+    far = Pose(ORIGIN.rotation, frozen([3.0, 0.0, 0.5]))
+    error = refusal(Planner(robot('panda')), MotionRequest(ready('panda'), [PoseGoal(far)]))
+    assert error.code is PlanningCode.NO_IK_SOLUTION
