@@ -104,7 +104,10 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     [
         ([], 'required: VERB'),
         (['check'], 'required: BUS.yml'),
-        (['chekc', 'bus.yml'], "invalid choice: 'chekc'"),
+        (['chekc', str(PANDA)], "unknown 'chekc'; did you mean check?"),
+        (['xyzzy'], "invalid choice: 'xyzzy'"),
+        (['check', str(PANDA), '--bitrat3=500k'], '--bitrat3; did you mean --bitrate?'),
+        (['check', str(PANDA), '--xyzzy'], 'unrecognized arguments: --xyzzy'),
         (['check', 'bus.yml', '--bitrate', '500'], '500 bit/s is not 10k to 1M; 500k perhaps'),
         (['check', 'bus.yml', '--bitrate', '2M'], '2M bit/s is not 10k to 1M'),
         (['check', 'bus.yml', '--bitrate', 'fast'], "'fast' is no bit rate"),

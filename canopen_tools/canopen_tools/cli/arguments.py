@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+import difflib
 from typing import TYPE_CHECKING, TypeAlias
 
 from arm_canopen.exceptions import CanopenError
@@ -19,6 +20,32 @@ else:
 
 class UsageError(CanopenError):
     """The command line names something that does not exist; nothing was sent yet."""
+
+
+class SuggestingParser(argparse.ArgumentParser):
+    """Names the likely verb or option where one is misspelt; its sub-parsers do so, too."""
+
+    def parse_known_args(  # type: ignore[override]  # without the overloads of typeshed
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """Parse what is known; end with a message where the rest resembles an option."""
+        parsed, rest = super().parse_known_args(args, namespace)
+        for text in rest:
+            option = text.partition('=')[0]
+            if option.startswith('--') and (hint := _hint(option, self._option_string_actions)):
+                self.error(f'unknown option {option}{hint}')
+        return parsed, rest
+
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        choices = action.choices
+        if choices is not None and value not in choices and (hint := _hint(str(value), choices)):
+            raise argparse.ArgumentError(action, f'unknown {value!r}{hint}')
+        super()._check_value(action, value)
+
+
+def _hint(text: str, known: Iterable[object]) -> str:
+    close = difflib.get_close_matches(text, [str(each) for each in known], n=1)
+    return f'; did you mean {close[0]}?' if close else ''
 
 
 BITRATE_MIN, BITRATE_MAX = 10_000, 1_000_000  # [bit/s] CiA 301, table 1

@@ -19,7 +19,7 @@ from arm_canopen.exceptions import CanopenError
 
 from ..ros_arguments import split_ros_arguments
 from . import check, dcf, diff, eds, lss, objects, scan
-from .arguments import apply_parameters, UsageError
+from .arguments import apply_parameters, SuggestingParser, UsageError
 from .output import warn
 
 VERBS = (check, eds, scan, objects, diff, dcf, lss)
@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = SuggestingParser(
         prog='canopen', description='Checks, reads and sets CANopen files, devices and buses.'
     )
     verbs = parser.add_subparsers(title='verbs', metavar='VERB', required=True)
