@@ -53,6 +53,16 @@ def test_good_figures_are_no_problem() -> None:
     assert len(results.lines()) == 5
 
 
+def test_late_commands_judge_no_speed() -> None:
+    """A computer too busy to jog stops the tool; the row says so, and other causes are judged."""
+    results = Results()
+    results.square('square', Square(0.1, 0.0, 1e-4, 2e-3, gap=0.23))
+    assert results.problems == []
+    assert 'not judged: jog commands were up to 0.23 s apart' in results.lines()[0]
+    results.square('square', Square(0.1, 0.0, 1e-4, 2e-3, gap=0.03))
+    assert results.problems == ['square: the tool moved at 0.0000 m/s instead of 0.100 m/s']
+
+
 def test_late_answers_judge_no_path() -> None:
     """Where a busy computer let PDOs come late, only what was commanded is judged."""
     results = Results()

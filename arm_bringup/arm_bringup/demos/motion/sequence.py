@@ -106,14 +106,14 @@ class MotionSequence:
             frame: Link along whose axes.
         """
         self.enter(f'a square in the {name}')
-        speeds, commanded, measured = [], 0.0, 0.0
+        speeds, commanded, measured, gap = [], 0.0, 0.0, 0.0
         missed = self.client.figures.bus.missed_pdos
         for way in SIDES:
             begin = self.client.last
             axes = self.model.pose(begin.position, frame).rotation
             direction = axes @ np.array(way, dtype=float)
             first = len(self.client.samples)
-            self._jog(SPEED * np.array(way), frame, SIDE)
+            gap = max(gap, self._jog(SPEED * np.array(way), frame, SIDE))
             moving = self.client.samples[first:]
             self._rest()
             side = self.client.samples[first:]
@@ -124,7 +124,7 @@ class MotionSequence:
             measured = max(measured, away_from_line(tools, begin.measured_tool, direction))
         reached = min(speeds, key=lambda speed: -abs(speed - SPEED))
         missed = self.client.figures.bus.missed_pdos - missed
-        square = Square(SPEED, reached, commanded, measured, missed)
+        square = Square(SPEED, reached, commanded, measured, missed, gap)
         self.results.square(f'square, {name}', square)
 
     def singularity(self) -> None:
@@ -218,16 +218,20 @@ class MotionSequence:
 
     def _jog(
         self, linear: Array, frame: str, longest: float, done: Callable[[], bool] | None = None
-    ) -> None:
-        """Jog for a time, or until it is done."""
-        begun = time.monotonic()
+    ) -> float:
+        """Jog for a time, or until it is done; return the longest time between commands in [s]."""
+        begun = last = time.monotonic()
+        gap = 0.0
         while (elapsed := time.monotonic() - begun) < longest:
             self.client.jog(linear, frame)
+            now = time.monotonic()
+            gap, last = max(gap, now - last), now
             self.client.listen(PERIOD)
             self.look()
             if done is not None and elapsed > 2.0 * SETTLE and done():
                 break
         self.client.jog(0.0 * linear, frame)
+        return max(gap, time.monotonic() - last)
 
     def _stuck(self) -> bool:
         """Say whether the tool has hardly moved lately."""
