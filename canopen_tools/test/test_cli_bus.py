@@ -149,6 +149,7 @@ def test_scan_leaves_the_sdo_channels_to_a_master(
     captured = capsys.readouterr()
     assert captured.out.splitlines()[1].split() == ['3', 'pre-operational']
     assert 'a master is on this bus (SYNC), so devices are not queried' in captured.err
+    assert 'a master with a heartbeat is listed like a device; --bus-config' in captured.err
     assert main(['scan', '--can', name, *LISTEN, '--query']) == 0
     assert 'its transfers may fail' in capsys.readouterr().err
     assert {frame.can_id for frame in witness.receive(0.0)} >= {0x602, 0x582, 0x603, 0x583}

@@ -109,6 +109,8 @@ def run(options: argparse.Namespace) -> int:
         warn(f'listening on {bus.name} for {options.listen:g} s')
         session.listen(options.listen)
         found = _frames(session, config)
+        if session.masters and session.states and config is None:
+            warn('a master with a heartbeat is listed like a device; --bus-config leaves it out')
         if _may_query(session, query=options.query):
             _find_silent(session, found)
             for device in found.values():
