@@ -112,8 +112,7 @@ class Arm(Robot):
             message.header.stamp = node.get_clock().now().to_msg()
             publisher.publish(message)
 
-        yield jog
-        node.destroy_publisher(publisher)
+        yield jog  # the publisher stays: the last callback of a timer may come after its end
 
 
 class Dog(Robot):
