@@ -106,7 +106,7 @@ def installed_robots_folder() -> Path:
     except PackageNotFoundError as error:
         raise RobotError(
             'the package arm_bringup is not in AMENT_PREFIX_PATH; '
-            'build the workspace (make build) and source env.sh'
+            'source env.sh in this shell again; if that does not help, run make build before it'
         ) from error
 
 

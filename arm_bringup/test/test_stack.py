@@ -192,7 +192,7 @@ def test_the_public_robot_state_publisher_runs_where_it_is_installed(
 def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
     """A missing package and a missing executable are distinguished."""
     stack = Stack(ROBOT, 'can0', simulate=True)
-    with pytest.raises(StartError, match=r'canopen_sim is not in AMENT_PREFIX_PATH.*make build'):
+    with pytest.raises(StartError, match=r'canopen_sim is not in .*; source env.sh.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: None)
     with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)

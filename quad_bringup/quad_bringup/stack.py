@@ -139,7 +139,8 @@ def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> Pr
     executable = first_found(STATE_PUBLISHERS, find)
     if executable is None:
         raise StartError(
-            'no robot_state_publisher; build the workspace (make build) and source env.sh'
+            'no robot_state_publisher; source env.sh in this shell again; '
+            'if that does not help, run make build before it'
         )
     values = {'publish_frequency': f'{TF_RATE}', **stack.frames}
     return ProcessSpec(

@@ -118,7 +118,7 @@ def node_argv(
     if file is None:
         raise StartError(
             f'the package {executable.package} is not in AMENT_PREFIX_PATH; '
-            'build the workspace (make build) and source env.sh'
+            'source env.sh in this shell again; if that does not help, run make build before it'
         )
     if not os.access(file, os.X_OK):
         raise StartError(f'{file} does not exist; build the workspace (make build)')

@@ -32,7 +32,7 @@ def test_parameters_reach_the_command_line(tmp_path: Path) -> None:
 
 def test_a_workspace_that_is_not_built_is_reported(tmp_path: Path) -> None:
     """A missing package and a missing executable are distinguished."""
-    with pytest.raises(StartError, match=r'some_package is not in AMENT_PREFIX_PATH.*make build'):
+    with pytest.raises(StartError, match=r'some_package is not in .*; source env.sh.*make build'):
         node_argv(NODE, lambda package, name: None)
     with pytest.raises(StartError, match=r'some_node does not exist.*make build'):
         node_argv(NODE, lambda package, name: tmp_path / name)
