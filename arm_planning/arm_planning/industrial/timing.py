@@ -14,6 +14,9 @@ from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Se
 MAX_SPACING = 0.05
 """Greatest length of a segment of a path that is not straight in [s]."""
 
+MAX_SEGMENTS = 400
+"""Segments of that length at most: a slow path bends as little from one to the next."""
+
 MIN_SPACING = 1e-4
 """Places that are nearer than this in time count as one in [s]."""
 
@@ -129,7 +132,8 @@ def _from_rest_to_rest(full: FullSpeedPath) -> Path:
     path = full.path
     begins = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
     end = float(lasts.sum())
-    grid = np.linspace(0.0, end, int(np.ceil(end / MAX_SPACING)) + 1)
+    count = min(int(np.ceil(end / MAX_SPACING)), MAX_SEGMENTS)
+    grid = np.linspace(0.0, end, count + 1)
     fine = np.linspace(0.0, end, 4 * len(grid))
     crossings = np.interp(path.starts[1:], _evaluated(profile, begins, fine)[0], fine)
     times = np.unique(np.concatenate((begins, grid, crossings)))
