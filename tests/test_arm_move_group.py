@@ -8,13 +8,22 @@ from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose
-from moveit_msgs.action import ExecuteTrajectory
-from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene, RobotTrajectory
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup
+from moveit_msgs.msg import (
+    CollisionObject,
+    Constraints,
+    JointConstraint,
+    MoveItErrorCodes,
+    PlanningScene,
+    RobotTrajectory,
+)
 from moveit_msgs.srv import (
     ApplyPlanningScene,
+    GetMotionPlan,
     GetPlanningScene,
     GetPositionFK,
     GetStateValidity,
+    QueryPlannerInterfaces,
 )
 from moving_arm import goal_to, MovingArm, READY, robot_parameters
 from processes import executable
@@ -37,8 +46,8 @@ pytestmark = pytest.mark.scenario
 TURNED = [1.2, *READY[1:]]
 
 
-def test_clients_of_moveit_share_a_scene_and_execute(isolation: Isolation, tmp_path: Path) -> None:
-    """Scene, states, execution, cancel and refusals, on the simulated drives."""
+def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path) -> None:
+    """Scene, states, plans, execution, cancel and refusals, on the simulated drives."""
     with MovingArm(isolation, tmp_path) as arm:
         group = arm.run(
             executable('arm_planning', 'move_group'),
@@ -55,6 +64,43 @@ def test_clients_of_moveit_share_a_scene_and_execute(isolation: Isolation, tmp_p
         _executes(arm)
         _says_why_not(arm)
         _cancels_and_stops(arm)
+        _back_to_ready(arm)
+        _plans_for_move_group_interface(arm)
+        _plans_and_executes_for_pymoveit2(arm)
+        _cancels_a_move(arm)
+        _says_why_no_plan(arm)
+
+
+def goal_constraints(positions: Sequence[float]) -> Constraints:
+    """Return a goal as MoveGroupInterface::setJointValueTarget makes it."""
+    return Constraints(
+        joint_constraints=[
+            JointConstraint(
+                joint_name=name,
+                position=position,
+                tolerance_above=1e-4,
+                tolerance_below=1e-4,
+                weight=1.0,
+            )
+            for name, position in zip(JOINTS, positions, strict=True)
+        ]
+    )
+
+
+def move_goal(positions: Sequence[float], *, plan_only: bool = False) -> MoveGroup.Goal:
+    """Return a goal as MoveGroupInterface::move makes it: of the present state and scene."""
+    goal = MoveGroup.Goal()
+    request = goal.request
+    request.group_name = 'panda_arm'
+    request.num_planning_attempts = 1
+    request.allowed_planning_time = 5.0
+    request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 1.0
+    request.start_state.is_diff = True
+    request.goal_constraints = [goal_constraints(positions)]
+    goal.planning_options.plan_only = plan_only
+    goal.planning_options.planning_scene_diff.is_diff = True
+    goal.planning_options.planning_scene_diff.robot_state.is_diff = True
+    return goal
 
 
 class ActionRun:
@@ -72,6 +118,13 @@ class ActionRun:
         assert self._handle.accepted
         self._result = self._handle.get_result_async()
 
+    def wait_for_motion(self) -> None:
+        """Wait until it is executed; it must not end before."""
+        self._client.spin_until(
+            lambda: 'MONITOR' in self.states or self._result.done(), 10.0, 'execution'
+        )
+        assert not self._result.done(), self._result.result().result.error_code
+
     def cancel(self) -> None:
         """Ask for its end."""
         self._client.spin_until(self._handle.cancel_goal_async().done, 10.0, 'answer to cancel')
@@ -80,6 +133,11 @@ class ActionRun:
         """Return status and result."""
         self._client.spin_until(self._result.done, 30.0, 'result')
         return self._result.result().status, self._result.result().result
+
+
+def move(arm: MovingArm, goal: MoveGroup.Goal) -> ActionRun:
+    """Send a goal of move_action."""
+    return ActionRun(arm, MoveGroup, '/move_action', goal)
 
 
 def _box(name: str, x: float, y: float, z: float) -> CollisionObject:
@@ -197,7 +255,7 @@ def _says_why_not(arm: MovingArm) -> None:
 def _cancels_and_stops(arm: MovingArm) -> None:
     """A cancel, and 'stop' of RViz' panel; the arm stops on the path."""
     run = execute(arm, _trajectory([-1.0, *READY[1:]], 8))
-    arm.client.spin_until(lambda: 'MONITOR' in run.states, 10.0, 'execution')
+    run.wait_for_motion()
     publisher = arm.client.node.create_publisher(String, '/trajectory_execution_event', 10)
     arm.client.spin_until(lambda: bool(publisher.get_subscription_count()), 10.0, 'a listener')
     busy = execute(arm, _trajectory(READY, 2)).wait()[1].error_code
@@ -211,7 +269,7 @@ def _cancels_and_stops(arm: MovingArm) -> None:
     ), result.error_code
     _back_to_ready(arm)
     run = execute(arm, _trajectory([-1.0, *READY[1:]], 8))
-    arm.client.spin_until(lambda: 'MONITOR' in run.states, 10.0, 'execution')
+    run.wait_for_motion()
     publisher.publish(String(data='stop'))
     status, result = run.wait()
     assert (status, result.error_code.val) == (
@@ -223,3 +281,68 @@ def _cancels_and_stops(arm: MovingArm) -> None:
 def _back_to_ready(arm: MovingArm) -> None:
     status, result = arm.send(goal_to(READY, 3.0)).wait()
     assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
+
+
+def _plans_for_move_group_interface(arm: MovingArm) -> None:
+    """MoveGroupInterface::plan, then ::execute with what it got."""
+    planners = arm.client.call(
+        QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
+    )
+    assert planners.planner_interfaces[0].pipeline_id == 'ompl'
+    status, result = move(arm, move_goal([-0.4, *READY[1:]], plan_only=True)).wait()
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+    points = result.planned_trajectory.joint_trajectory.points
+    assert list(points[-1].positions) == pytest.approx([-0.4, *READY[1:]], abs=1e-3)
+    assert result.planning_time > 0.0
+    assert list(result.trajectory_start.joint_state.name)[:7] == JOINTS
+    goal = ExecuteTrajectory.Goal(trajectory=result.planned_trajectory)
+    status, result = ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal).wait()
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+
+
+def _plans_and_executes_for_pymoveit2(arm: MovingArm) -> None:
+    """plan_kinematic_path with the joints as start state, then execute_trajectory."""
+    request = GetMotionPlan.Request()
+    wanted = request.motion_plan_request
+    wanted.group_name = 'panda_arm'
+    wanted.allowed_planning_time, wanted.num_planning_attempts = 0.5, 5
+    wanted.start_state.joint_state.name = list(JOINTS)
+    wanted.start_state.joint_state.position = [-0.4, *READY[1:]]
+    wanted.goal_constraints = [goal_constraints(READY)]
+    answer = arm.client.call(GetMotionPlan, '/plan_kinematic_path', request).motion_plan_response
+    assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code.message
+    goal = ExecuteTrajectory.Goal(trajectory=answer.trajectory)
+    status, result = ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal).wait()
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+
+
+def _cancels_a_move(arm: MovingArm) -> None:
+    """In the middle of its execution; what was planned is in the result."""
+    away = move_goal([-0.8, *READY[1:]])
+    away.request.max_velocity_scaling_factor = 0.2
+    run = move(arm, away)
+    run.wait_for_motion()
+    run.cancel()
+    status, result = run.wait()
+    assert (status, result.error_code.val) == (
+        GoalStatus.STATUS_CANCELED,
+        MoveItErrorCodes.PREEMPTED,
+    ), result.error_code
+    assert result.planned_trajectory.joint_trajectory.points
+
+
+def _says_why_no_plan(arm: MovingArm) -> None:
+    """The blocked goal names the pair."""
+    blocked, unknown, far = move_goal(TURNED), move_goal(READY), move_goal(READY)
+    unknown.request.group_name = 'legs'
+    far.request.goal_constraints[0].joint_constraints[0].joint_name = 'leg'
+    for goal, code, words in (
+        (blocked, MoveItErrorCodes.GOAL_IN_COLLISION, 'crate'),
+        (unknown, MoveItErrorCodes.INVALID_GROUP_NAME, 'panda_arm'),
+        (far, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "'leg'"),
+    ):
+        status, result = move(arm, goal).wait()
+        assert status == GoalStatus.STATUS_ABORTED
+        assert result.error_code.val == code, result.error_code
+        assert words in result.error_code.message
+        assert result.error_code.source == 'move_group'

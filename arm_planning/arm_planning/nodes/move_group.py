@@ -26,6 +26,8 @@ from node_runner import (
 from ..ros.background import Background
 from ..ros.execute_action import ExecuteAction
 from ..ros.execution import ExecutionLimits, TrajectoryExecution
+from ..ros.move_action import MoveAction
+from ..ros.planning import PlanningThread
 from ..ros.robot_groups import RobotGroups
 from ..ros.scene_monitor import SceneMonitor
 from ..ros.state_services import StateServices
@@ -33,7 +35,7 @@ from ..ros.state_services import StateServices
 NAME = 'move_group'
 
 HELP = """\
-The planning scene of a robot, its states and the execution of trajectories: MoveIt's interfaces.
+Plan and execute motions of a robot among obstacles: MoveIt's interfaces.
 
 usage: ros2 run arm_planning move_group --ros-args --params-file robot.yaml
 
@@ -70,12 +72,16 @@ class MoveGroup(Node):
         StateServices(self, monitor, self._queries, _robot(description))
         execution = TrajectoryExecution(self, controllers, lambda: monitor.places, limits)
         ExecuteAction(self, execution)
+        self._planning = Background(self, 'planning')
+        planning = PlanningThread(self, monitor, self._planning, _robot(description))
+        MoveAction(self, planning, self._planning, execution)
         # there is no octomap that would have to be cleared
         self.create_service(Empty, 'clear_octomap', lambda _request, response: response)
 
     def close(self) -> None:
         """End the threads."""
         self._queries.close()
+        self._planning.close()
 
 
 def _robot(description: Description) -> RobotGroups:

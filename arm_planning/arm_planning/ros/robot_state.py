@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""States of joints between MoveIt's messages and values."""
+"""States and trajectories of joints between MoveIt's messages and values."""
 
 from __future__ import annotations
 
@@ -9,10 +9,14 @@ import math
 from typing import Any
 
 from moveit_msgs.msg import RobotState as StateMessage
+from moveit_msgs.msg import RobotTrajectory
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import Array
+from arm_model.ros import duration_fields
+from arm_trajectory import Path
 
 from ..exceptions import PlanningCode, PlanningError
 
@@ -58,3 +62,32 @@ def state_message(joints: Sequence[str], positions: Array, root: str) -> StateMe
     message = StateMessage(joint_state=state)
     message.multi_dof_joint_state.header = header
     return message
+
+
+def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTrajectory:
+    """Return a path as a moveit_msgs/RobotTrajectory.
+
+    Its points are the ends of the path's polynomials, with velocities and accelerations: a quintic
+    between two of them is the path itself.
+
+    Args:
+        joints: Names of the joints.
+        path: The path.
+        root: Name of the root link.
+    """
+    times = [*path.starts.tolist(), path.duration]
+    trajectory = JointTrajectory(header=Header(frame_id=root), joint_names=list(joints))
+    trajectory.points = [_point(path, time) for time in times]
+    return RobotTrajectory(joint_trajectory=trajectory)
+
+
+def _point(path: Path, time: float) -> JointTrajectoryPoint:
+    place = path.at(time)
+    point = JointTrajectoryPoint(
+        positions=place.position.tolist(),
+        velocities=place.velocity.tolist(),
+        accelerations=place.acceleration.tolist(),
+    )
+    fields = duration_fields(time)
+    point.time_from_start.sec, point.time_from_start.nanosec = fields['sec'], fields['nanosec']
+    return point

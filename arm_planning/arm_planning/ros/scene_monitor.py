@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+import math
+import time
 from typing import Any
 
 from moveit_msgs.msg import (
@@ -21,7 +23,7 @@ from sensor_msgs.msg import JointState
 from arm_model import Array
 from node_runner import LATCHED
 
-from ..exceptions import PlanningError
+from ..exceptions import PlanningCode, PlanningError
 from .robot_groups import RobotGroups
 from .robot_state import joints_of, state_message
 from .scene_changes import apply_attached, apply_object, apply_scene
@@ -30,6 +32,9 @@ from .scene_snapshot import SceneSnapshot
 
 DEPTH = 100
 """Messages of changes that may wait: each of them counts."""
+
+STATE_TIMEOUT = 1.0
+"""Age at which joint states count no more in [s]."""
 
 
 class SceneMonitor:
@@ -51,6 +56,7 @@ class SceneMonitor:
         self.snapshot = SceneSnapshot.of(robot.scene, f'{robot.name} scene')
         self._node = node
         self._places: dict[str, float] = {}
+        self._arrivals: dict[str, float] = {}
         self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
         for kind, topic, apply in (
@@ -83,6 +89,28 @@ class SceneMonitor:
         given = {} if message is None else joints_of(message, self.robot.all_joints)
         return self.robot.positions({**self._places, **given})
 
+    def check_received(self, group: str, message: Any) -> None:  # noqa: ANN401
+        """Make sure that it is known where the joints of a group are.
+
+        Args:
+            group: The group.
+            message: A moveit_msgs/RobotState that may have them.
+
+        Raises:
+            PlanningError: A joint was never received, or is too old.
+        """
+        given, now = set(message.joint_state.name), time.monotonic()
+        for joint in self.robot.model(group).joints:
+            age = now - self._arrivals.get(joint, -math.inf)
+            if joint not in given and age > STATE_TIMEOUT:
+                topic = self._node.resolve_topic_name('joint_states')
+                since = f'{age:.1f} s old' if math.isfinite(age) else 'not received yet'
+                raise PlanningError(
+                    PlanningCode.ROBOT_STATE_STALE,
+                    f'joint {joint}: its position on {topic} is {since}; start what publishes it,'
+                    ' or give the start state',
+                )
+
     def start_scene(self, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
         """Return the scene with the attached bodies that a moveit_msgs/RobotState has besides.
 
@@ -111,9 +139,10 @@ class SceneMonitor:
         return message
 
     def _take_joints(self, message: JointState) -> None:
+        now = time.monotonic()
         for name, position in zip(message.name, message.position, strict=False):
             if position == position:  # noqa: PLR0124  # not NaN
-                self._places[name] = position
+                self._places[name], self._arrivals[name] = position, now
 
     def _take_world(self, message: PlanningSceneWorld) -> None:
         scene = PlanningScene(is_diff=True, world=message)

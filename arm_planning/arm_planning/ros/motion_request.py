@@ -1,0 +1,319 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""MoveIt's requests of motions as requests of the core."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import math
+from typing import Any
+
+import numpy as np
+from shape_msgs.msg import SolidPrimitive
+
+from arm_model import (
+    Array,
+    combined,
+    frozen,
+    inverse,
+    ORIGIN,
+    PlacedShape,
+    Pose,
+    RobotModel,
+    SceneError,
+)
+from arm_model.ros import primitive_shape, xyz, xyzw
+
+from ..exceptions import PlanningCode, PlanningError
+from ..requests import (
+    CircPoint,
+    CircPointKind,
+    DEFAULT_TIMEOUT,
+    Goal,
+    JointGoal,
+    MotionRequest,
+    OrientationConstraint,
+    PathConstraints,
+    PoseGoal,
+    PositionConstraint,
+)
+from .geometry import placement, pose_of
+from .scene_snapshot import SceneSnapshot
+
+ANY_ORIENTATION = (math.pi, math.pi, math.pi)
+"""Tolerance of a goal that names a position only in [rad]."""
+
+OMPL, PILZ = 'ompl', 'pilz_industrial_motion_planner'
+
+PIPELINES: Mapping[str, str] = {'': '', OMPL: '', PILZ: 'PTP'}
+"""Planning pipelines by MoveIt's names, each with its default planner; empty is ours."""
+
+
+class RequestReader:
+    """Reads requests of one group in one scene, with the robot at one place."""
+
+    def __init__(self, model: RobotModel, snapshot: SceneSnapshot, positions: Array) -> None:
+        """Read for a group.
+
+        Args:
+            model: The group.
+            snapshot: The scene, for the frames of goals.
+            positions: Where all joints of the robot are in [rad].
+        """
+        self._model, self._snapshot, self._positions = model, snapshot, positions
+        place = dict(zip(snapshot.scene.kinematics.joints, positions.tolist(), strict=True))
+        self._start = frozen([place[name] for name in model.joints])
+
+    def request(self, message: Any) -> MotionRequest:  # noqa: ANN401  # messages have no type
+        """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is.
+
+        Raises:
+            PlanningError: It has no goal, or a part of it is refused.
+        """
+        if message.pipeline_id not in PIPELINES:
+            known = ', '.join(filter(None, PIPELINES))
+            raise PlanningError(
+                PlanningCode.PLANNING_FAILED,
+                f'No planning pipeline {message.pipeline_id!r}; choose one of {known}',
+            )
+        if not message.goal_constraints:
+            raise _bad_goal('no goal constraints; a goal has joints or a pose')
+        if message.trajectory_constraints.constraints or message.reference_trajectories:
+            raise _bad_goal('trajectory_constraints and reference_trajectories are not supported')
+        via = self._via(message.path_constraints)
+        constraints = None if via else self.constraints(message.path_constraints)
+        return MotionRequest(
+            start=self._start,
+            goals=tuple(self.goal(each) for each in message.goal_constraints),
+            planner_id=message.planner_id or PIPELINES[message.pipeline_id],
+            velocity_scaling=_factor('velocity', message.max_velocity_scaling_factor),
+            acceleration_scaling=_factor('acceleration', message.max_acceleration_scaling_factor),
+            timeout=message.allowed_planning_time or DEFAULT_TIMEOUT,
+            attempts=max(message.num_planning_attempts, 1),
+            constraints=constraints,
+            via=via,
+            max_cartesian_speed=max(message.max_cartesian_speed, 0.0),
+            cartesian_speed_link=message.cartesian_speed_limited_link,
+        )
+
+    def goal(self, message: Any) -> Goal:  # noqa: ANN401
+        """Return a moveit_msgs/Constraints as a goal.
+
+        Raises:
+            PlanningError: It is empty, mixes joints and poses, or contradicts itself.
+        """
+        if message.visibility_constraints:
+            raise _bad_goal('visibility constraints are not supported')
+        positions, turns = message.position_constraints, message.orientation_constraints
+        if message.joint_constraints:
+            if positions or turns:
+                raise _bad_goal('a goal has joint constraints or a pose, not both')
+            return self._joint_goal(message.joint_constraints)
+        if len(positions) > 1 or len(turns) > 1 or not (positions or turns):
+            raise _bad_goal(
+                f'{len(positions)} position and {len(turns)} orientation constraints; a pose has'
+                ' one of each at most, and one of them at least'
+            )
+        return self._pose_goal(positions, turns)
+
+    def constraints(self, message: Any) -> PathConstraints | None:  # noqa: ANN401
+        """Return a moveit_msgs/Constraints of a path; None where it is empty.
+
+        Raises:
+            PlanningError: A joint or link is unknown, or a region or rotation is no such thing.
+        """
+        if message.visibility_constraints:
+            raise _bad_goal('visibility constraints are not supported')
+        joints = self._joint_ranges(message.joint_constraints)
+        turns = [
+            self._of_link(self._orientation(each)) for each in message.orientation_constraints
+        ]
+        places = [
+            region for each in message.position_constraints for region in self._positions_in(each)
+        ]
+        if not (joints or turns or places):
+            return None
+        return PathConstraints(joints, turns, places)
+
+    def pose(self, message: Any, frame: str, what: str) -> Pose:  # noqa: ANN401
+        """Return a geometry_msgs/Pose of a frame in the root link.
+
+        Args:
+            message: The pose.
+            frame: The frame that it is in.
+            what: What it is the pose of.
+
+        Raises:
+            PlanningError: The frame is unknown, or a number is none.
+        """
+        return combined(self._snapshot.frame(frame, self._positions), pose_of(message, what))
+
+    def on_link(self, pose: Pose, frame: str) -> tuple[str, Pose]:
+        """Return the link that carries a frame, and its pose when the frame has a pose.
+
+        Args:
+            pose: Pose of the frame in the root link.
+            frame: A link, an attached body or a subframe of one; empty for the tip.
+
+        Raises:
+            PlanningError: There is no such frame.
+        """
+        if not frame:
+            return self._model.tip, pose
+        try:
+            link, place = self._snapshot.link_of(frame)
+        except PlanningError as error:
+            raise PlanningError(PlanningCode.INVALID_LINK_NAME, f'link_name: {error}') from error
+        return link, combined(pose, inverse(place))
+
+    def _joint_goal(self, messages: Sequence[Any]) -> JointGoal:
+        ranges = self._joint_ranges(messages)
+        wanted = {each.joint_name: each.position for each in messages}
+        positions, tolerance = np.array(self._start), np.zeros(len(self._start))
+        for place, name in enumerate(self._model.joints):
+            if name in ranges:
+                lower, upper = ranges[name]
+                positions[place] = min(max(wanted[name], lower), upper)
+                tolerance[place] = min(positions[place] - lower, upper - positions[place])
+        return JointGoal(frozen(positions), frozen(tolerance))
+
+    def _joint_ranges(self, messages: Sequence[Any]) -> dict[str, tuple[float, float]]:
+        ranges: dict[str, tuple[float, float]] = {}
+        for each in messages:
+            name = each.joint_name
+            if name not in self._model.joints:
+                known = ', '.join(self._model.joints)
+                raise _bad_goal(f'no joint {name!r} in {self._model.group}; joints: {known}')
+            numbers = (each.position, each.tolerance_above, each.tolerance_below)
+            if not all(map(math.isfinite, numbers)) or min(numbers[1:]) < 0.0:
+                raise _bad_goal(
+                    f'joint constraint of {name}: position and tolerances are {numbers}; they must'
+                    ' be finite, the tolerances not negative'
+                )
+            before = ranges.get(name, (-math.inf, math.inf))
+            lower = max(before[0], each.position - each.tolerance_below)
+            upper = min(before[1], each.position + each.tolerance_above)
+            if lower > upper:
+                raise _bad_goal(f'joint constraints of {name} contradict each other')
+            ranges[name] = (lower, upper)
+        return ranges
+
+    def _pose_goal(self, positions: Sequence[Any], turns: Sequence[Any]) -> PoseGoal:
+        names = {each.link_name for each in (*positions, *turns)}
+        if len(names) > 1:
+            raise _bad_goal(
+                f'position of {positions[0].link_name}, orientation of another link:'
+                f' {turns[0].link_name}; a goal is for one link'
+            )
+        frame = next(iter(names))
+        tolerance = frozen(ANY_ORIENTATION)
+        rotation = None
+        if turns:
+            wanted = self._orientation(turns[0])
+            rotation, tolerance = wanted.rotation, wanted.tolerance
+        self.on_link(ORIGIN, frame)  # or it is unknown
+        here = self._snapshot.frame(frame or self._model.tip, self._positions)
+        radius: float | Array = 0.0
+        place, offset = here.position, np.zeros(3)
+        if positions:
+            place, radius, offset = self._region_goal(positions[0])
+        if rotation is None and offset.any():
+            raise _bad_goal(
+                'target_point_offset without an orientation constraint of the link; give it one'
+            )
+        turned = here.rotation if rotation is None else rotation
+        pose = Pose(frozen(turned), frozen(place - turned @ offset))
+        link, in_link = self.on_link(pose, frame)
+        return PoseGoal(in_link, link, radius, tolerance)
+
+    def _region_goal(self, message: Any) -> tuple[Array, float | Array, Array]:  # noqa: ANN401
+        """Return middle, tolerance and the point of the link of a position constraint."""
+        (placed,) = self._positions_in(message, most=1)
+        primitive = message.constraint_region.primitives[0]
+        lengths = [float(each) for each in primitive.dimensions]
+        if primitive.type == SolidPrimitive.SPHERE:
+            return placed.region.pose.position, lengths[0], placed.offset
+        if primitive.type == SolidPrimitive.BOX:
+            # half the edges of the box around it, if it is turned
+            half = np.abs(placed.region.pose.rotation) @ (0.5 * np.array(lengths))
+            if not np.allclose(np.sort(half), np.sort(0.5 * np.array(lengths))):
+                raise _bad_goal(
+                    'the region of a position goal is a box that is turned; use a'
+                    ' sphere, or a box along the axes of the root link'
+                )
+            return placed.region.pose.position, frozen(half), placed.offset
+        raise _bad_goal('the region of a position goal must be a sphere or a box')
+
+    def _positions_in(self, message: Any, most: int = 100) -> Sequence[PositionConstraint]:  # noqa: ANN401
+        region, what = message.constraint_region, f'position constraint of {message.link_name!r}'
+        count = len(region.primitives)
+        if region.meshes or not 1 <= count <= most or len(region.primitive_poses) != count:
+            raise _bad_goal(
+                f'{what}: its region has {count} primitives, {len(region.primitive_poses)} poses'
+                f' and {len(region.meshes)} meshes; give it one primitive with a pose'
+            )
+        offset = placement(xyz(message.target_point_offset), (), what).position
+        link, in_link = self.on_link(Pose(ORIGIN.rotation, -offset), message.link_name)
+        found = []
+        for primitive, pose in zip(region.primitives, region.primitive_poses, strict=True):
+            try:
+                shape = primitive_shape(primitive, what)
+            except SceneError as error:
+                raise _bad_goal(str(error)) from error
+            place = self.pose(pose, message.header.frame_id, what)
+            found.append(
+                PositionConstraint(link, frozen(-in_link.position), PlacedShape(shape, place))
+            )
+        return found
+
+    def _orientation(self, message: Any) -> OrientationConstraint:  # noqa: ANN401
+        what = f'orientation constraint of {message.link_name!r}'
+        tolerance = np.array(
+            [
+                message.absolute_x_axis_tolerance,
+                message.absolute_y_axis_tolerance,
+                message.absolute_z_axis_tolerance,
+            ]
+        )
+        if not (np.isfinite(tolerance).all() and (tolerance >= 0.0).all()):
+            raise _bad_goal(f'{what}: its tolerances are {tolerance.tolist()}')
+        pose = placement(np.zeros(3), xyzw(message.orientation), what)
+        frame = self._snapshot.frame(message.header.frame_id, self._positions)
+        rotation = frame.rotation @ pose.rotation
+        return OrientationConstraint(message.link_name, frozen(rotation), frozen(tolerance))
+
+    def _of_link(self, constraint: OrientationConstraint) -> OrientationConstraint:
+        """Return the constraint of a body or subframe as one of the link that carries it."""
+        pose = Pose(constraint.rotation, ORIGIN.position)
+        link, in_link = self.on_link(pose, constraint.link)
+        return OrientationConstraint(link, in_link.rotation, constraint.tolerance)
+
+    def _via(self, message: Any) -> CircPoint | None:  # noqa: ANN401
+        """Return the point of a circle, which Pilz' planner has as a path constraint."""
+        kinds = [kind for kind in CircPointKind if kind.value == message.name]
+        if not kinds:
+            return None
+        if len(message.position_constraints) != 1:
+            raise _bad_goal(
+                f'path constraint {message.name!r}: CIRC needs one position constraint in it'
+            )
+        region = message.position_constraints[0].constraint_region
+        if len(region.primitive_poses) != 1:
+            raise _bad_goal(f'path constraint {message.name!r}: CIRC needs one primitive_pose')
+        frame = message.position_constraints[0].header.frame_id
+        point = self.pose(region.primitive_poses[0], frame, message.name).position
+        return CircPoint(kinds[0], frozen(point))
+
+
+def _factor(what: str, value: float) -> float:
+    """Return a scaling factor; 0 is one that was not given."""
+    if not 0.0 <= value <= 1.0:
+        raise PlanningError(
+            PlanningCode.FAILURE,
+            f'max_{what}_scaling_factor is {value:g}; it must be above 0 and 1 at most',
+        )
+    return value or 1.0
+
+
+def _bad_goal(reason: str) -> PlanningError:
+    return PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, reason)
