@@ -27,6 +27,7 @@ from .controller_manager import ControllerManager, declare_manager
 from .group_motion import ArmMotion, Offers, ToolMotion
 from .joint_state_broadcaster import JointStateBroadcaster
 from .other_programs import watch_other_programs
+from .scene_listener import SceneListener
 from .upstream_parameters import check_names
 
 if TYPE_CHECKING:
@@ -149,6 +150,7 @@ class CanopenMotion:
             ToolMotion(model, make_node(f'{model.group}_controller'), on_bus)
             for model in models.tools
         ]
+        SceneListener(manager, [arm.drives.gateway for arm in arms])
         self._groups: list[ArmMotion[BusDrives] | ToolMotion[BusDrives]] = [*arms, *tools]
         broadcaster = make_node('joint_state_broadcaster')
         self._broadcaster = JointStateBroadcaster(

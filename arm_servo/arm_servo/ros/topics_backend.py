@@ -36,6 +36,7 @@ from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
 from .group_motion import ArmMotion, Offers
 from .other_programs import watch_other_programs
+from .scene_listener import SceneListener
 from .servo.parameters import PREFIX
 from .upstream_parameters import check_names
 
@@ -202,6 +203,7 @@ class TopicDrives:
             raise_thread_priority(node, loop.priority, 'the motion loop')
 
         node.create_subscription(JointState, loop.joint_topic, receive, 10)
+        SceneListener(node, [self.gateway])
         publish = TopicOutput(node, wanted, list(model.joints), loop.period)
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)
