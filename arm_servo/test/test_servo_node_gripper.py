@@ -17,7 +17,7 @@ from arm_servo.core.requests import PauseRequest, SpeedRequest, TargetRequest
 from arm_servo.exceptions import NotReadyError
 from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
-from arm_servo.ros.gripper.interfaces import ParallelGripper
+from arm_servo.ros.gripper.interfaces import ParallelGripper, SingleGripper
 from arm_servo.ros.gripper.parameters import GripperParameters
 from arm_servo.ros.group_motion import ToolMotion
 from arm_servo.ros.trajectory.controller import TrajectoryController
@@ -31,6 +31,7 @@ class Gripper:
     Attributes:
         drives: The drives.
         ended: How the goals ended, by their names.
+        warnings: What was warned of.
     """
 
     def __init__(self, clock: Any, *, allow_stalling: bool = False) -> None:
@@ -41,7 +42,9 @@ class Gripper:
         clock.monotonic = lambda: self.drives.now
         self.ended: dict[str, str] = {}
         self._made: Any = object.__new__(GripperController)
-        node: Any = SimpleNamespace(get_logger=lambda: SimpleNamespace(warning=lambda _: None))
+        self.warnings: list[str] = []
+        logger = SimpleNamespace(warning=self.warnings.append)
+        node: Any = SimpleNamespace(get_logger=lambda: logger)
         self._made._node = node
         self._made._gateway = self.drives.gateway
         self._made._parameters = GripperParameters(0.002, 0.001, 1.0, allow_stalling)
@@ -58,11 +61,12 @@ class Gripper:
         """Where the joint is commanded to be in [rad]."""
         return float(self.drives.path[-1][0])
 
-    def send(self, name: str, position: float) -> Any:
+    def send(self, name: str, position: float, *, effort: bool = False) -> Any:
         """Send a goal; return its handle."""
         interface: Any = SimpleNamespace(
             name='',
             request=lambda *_: TargetRequest({JOINT: position}, 0.1),
+            asks_effort=lambda _: effort,
             feedback=lambda state: state,
             result=lambda state: state,
         )
@@ -182,6 +186,29 @@ def test_a_goal_with_wrong_numbers_is_refused(
     command = SimpleNamespace(name=names, position=positions, velocity=velocities)
     with pytest.raises(CommandError, match=words):
         ParallelGripper().request(SimpleNamespace(command=command), ['a', 'b'])
+
+
+@pytest.mark.parametrize('effort', [False, True])
+def test_an_effort_is_warned_of_once(clock: Any, effort: bool) -> None:
+    """It limits nothing; the object that does is named."""
+    gripper = Gripper(clock)
+    gripper.send('goal', 0.03, effort=effort)
+    gripper.run(2.0)
+    assert gripper.ended == {'goal': 'succeeded'}
+    assert ['0x6072' in text for text in gripper.warnings] == [True] * effort
+
+
+@pytest.mark.parametrize('effort', [0.0, 5.0])
+def test_both_actions_tell_of_an_effort(effort: float) -> None:
+    """Of a message of theirs; 0 is none."""
+    single, parallel = SingleGripper(), ParallelGripper()
+    goal = single.action.Goal()
+    goal.command.max_effort = effort
+    assert single.asks_effort(goal) == bool(effort)
+    goal = parallel.action.Goal()
+    assert not parallel.asks_effort(goal)
+    goal.command.effort = [0.0, effort]
+    assert parallel.asks_effort(goal) == bool(effort)
 
 
 def test_a_deactivated_controller_moves_no_gripper() -> None:

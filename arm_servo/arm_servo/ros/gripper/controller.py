@@ -30,6 +30,11 @@ WATCH_RATE = 20.0
 START_TIMEOUT = 5.0
 """Time in which the cycle must begin with a goal in [s]."""
 
+NO_EFFORT_LIMIT = (
+    'the effort of the goal limits nothing: drives get positions only; '
+    'set 0x6072 (max torque) of the drive to limit it'
+)
+
 
 @dataclass(slots=True)
 class _Goal:
@@ -49,7 +54,7 @@ class GripperController:
     """``~/gripper_cmd`` and ``~/parallel_gripper_cmd``: positions of the joints of a gripper.
 
     A newer goal, of either action, takes over. The drives are commanded positions: efforts of
-    goals are not limits here.
+    goals are not limits here, which a warning says.
     """
 
     def __init__(
@@ -95,6 +100,8 @@ class GripperController:
         try:
             request = interface.request(handle.request, self._joints)
             self._check_active()
+            if interface.asks_effort(handle.request):
+                self._node.get_logger().warning(NO_EFFORT_LIMIT)
             goal.command = self._gateway.request(request, self._prepare)
         except ArmError as error:
             goal.problem = str(error)

@@ -52,6 +52,9 @@ class GripperInterface(Protocol):
             CommandError: It does not fit the joints.
         """
 
+    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
+        """Whether a goal asks for a limit of effort."""
+
     def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
         """Return a state as feedback."""
 
@@ -68,6 +71,10 @@ class SingleGripper:
     def request(self, goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
         """Return what a goal asks."""
         return TargetRequest(_finite({joints[0]: goal.command.position}))
+
+    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
+        """Whether a goal asks for a limit of effort."""
+        return bool(goal.command.max_effort)
 
     def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
         """Return a state as feedback."""
@@ -103,6 +110,10 @@ class ParallelGripper:
         speeds = [speed for speed in command.velocity if speed > 0.0]
         targets = _finite(dict(zip(names, command.position, strict=True)))
         return TargetRequest(targets, min(speeds, default=math.inf))
+
+    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
+        """Whether a goal asks for a limit of effort."""
+        return any(goal.command.effort)
 
     def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
         """Return a state as feedback."""
