@@ -28,6 +28,8 @@ REST = 3
 TOLERANCE = 20
 """Increments by which a drive may be beside the way that was commanded."""
 TARGETS = struct.Struct('<i')
+TARGET_AT = 3
+"""Place of the target in RPDO 1, behind controlword and mode, as the Panda's bus.yml has it."""
 FRESH = 0.05
 """Age in [s] up to which a statusword counts; a drive that reboots sends none."""
 SILENT = 0.4
@@ -79,7 +81,7 @@ class ArmWatch:
                 limits.upper[at] * INCREMENTS + 1,
                 limits.velocity[at] * INCREMENTS * PERIOD + 1,
             )
-        self._from_master = {rpdo_default(2, node): axis for node, axis in self._axes.items()}
+        self._from_master = {rpdo_default(1, node): axis for node, axis in self._axes.items()}
         self._states = {tpdo_default(1, node): axis for node, axis in self._axes.items()}
         self._positions = {tpdo_default(2, node): axis for node, axis in self._axes.items()}
 
@@ -119,9 +121,9 @@ class ArmWatch:
     def take_from_master(self, frame: Frame) -> None:
         """Look at a frame of the master."""
         axis = self._from_master.get(frame.can_id)
-        if axis is None or len(frame.data) < TARGETS.size:
+        if axis is None or len(frame.data) < TARGET_AT + TARGETS.size:
             return
-        (target,) = TARGETS.unpack_from(frame.data)
+        (target,) = TARGETS.unpack_from(frame.data, TARGET_AT)
         before, axis.target = axis.target, target
         if target != before:
             axis.history.append(f'{frame.timestamp - self._begin:.3f} target {target}')

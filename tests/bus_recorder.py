@@ -28,15 +28,15 @@ class BusRecorder:
         self._thread = threading.Thread(target=self._record, daemon=True)
         self._thread.start()
 
-    def first_after(self, time: float, can_id: int, data: bytes) -> Frame | None:
-        """Return the first frame after a steady time whose data begin with some bytes."""
+    def first_after(self, time: float, can_id: int, data: bytes, at: int = 0) -> Frame | None:
+        """Return the first frame after a steady time with some bytes at a place of its data."""
         return next(
             (
                 frame
                 for frame in self.frames
                 if frame.timestamp >= time
                 and frame.can_id == can_id
-                and frame.data[: len(data)] == data
+                and frame.data[at : at + len(data)] == data
             ),
             None,
         )

@@ -64,12 +64,13 @@ def test_each_bus_has_its_master_in_one_process(isolation: Isolation, tmp_path: 
         assert client.trigger('/left/joint1/position_mode').success
         request = COTargetDouble.Request(target=0.5)
         assert client.call(COTargetDouble, '/left/joint1/target', request).success
+        target = 0x202, (500).to_bytes(4, 'little'), 3  # behind controlword and mode
         client.spin_until(
-            lambda: left.first_after(0.0, 0x302, (500).to_bytes(4, 'little')) is not None,
+            lambda: left.first_after(0.0, *target) is not None,
             5.0,
             'the target on the left bus',
         )
-        assert right.first_after(0.0, 0x302, (500).to_bytes(4, 'little')) is None
+        assert right.first_after(0.0, *target) is None
         assert master.stop() == 0, master.output
         for recorder in (left, right):
             assert recorder.last_states() == dict.fromkeys((2, 3), 'Switch on disabled')

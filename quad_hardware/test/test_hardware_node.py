@@ -206,7 +206,12 @@ def test_a_node_that_ends_in_motion_folds_the_legs_first(
         rig.swing(1.0)
         assert rig.node.stop() == 0
         lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
-        assert [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1)
+        # on a busy machine the robot takes its last frames later than the node ends
+        rig.client.spin_until(
+            lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
+            TIMEOUT,
+            'folded legs',
+        )
 
 
 def test_a_cut_cable_is_survived_without_a_jump(rig: NodeRig) -> None:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import count
 import os
 import sys
 import threading
@@ -16,9 +15,6 @@ from .runner import Runner
 from .spec import ProcessSpec
 from .supervision import Notice, Outcome, Phase, Severity
 from .terminal import LineWriter, Painter, wants_colour
-
-SCREEN = 20
-"""Lines that a person sees at once."""
 
 USAGE_ERROR = 2
 """Exit code of a bring-up when nothing was started."""
@@ -58,15 +54,8 @@ def supervise(
     names = [spec.name for spec in processes]
     painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
     write = LineWriter(sys.stdout)
-    lines = count(1)
-    last_line: dict[str, int] = {}  # of each process
-
-    def show(process: str, line: str) -> None:
-        last_line[process] = next(lines)
-        write(painter.line(process, line))
 
     def notify(notice: Notice) -> None:
-        next(lines)
         write(painter.notice(notice))
 
     manager = ServiceManager()
@@ -82,7 +71,7 @@ def supervise(
     thread = _ShutdownThread(shutdown, notify)
     with Runner(
         processes,
-        show,
+        lambda name, line: write(painter.line(name, line)),
         notify,
         on_interrupt=interrupted,
         on_phase=report,
@@ -91,10 +80,7 @@ def supervise(
         outcome = runner.run()
         thread.join()
     if outcome.exit_code:
-        # what it wrote last is quoted where it is no longer in sight
-        in_sight = next(lines) - last_line.get(outcome.process, 0) <= SCREEN
-        text = outcome.reason if in_sight else explain(outcome)
-        notify(Notice(Severity.ERROR, text))
+        notify(Notice(Severity.ERROR, explain(outcome)))
     return outcome
 
 

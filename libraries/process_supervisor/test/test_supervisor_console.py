@@ -11,7 +11,7 @@ import threading
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import console, LineWriter, Outcome, Shutdown, supervise
+from process_supervisor import LineWriter, Outcome, Shutdown, supervise
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -45,19 +45,6 @@ class CtrlC:
         if self._words in line and self._left:
             self._left -= 1
             ctrl_c()
-
-
-def test_what_is_in_sight_is_not_quoted_at_the_end(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The last words of a process are there once; far above, the end repeats them."""
-    _, lines = run_until(capsys, 'good', 'dies', shutdown=None)
-    assert sum('last words' in line for line in lines) == 1
-    assert lines[-1].endswith('dies ended with exit code 7 before it was ready')
-    monkeypatch.setattr(console, 'SCREEN', 0)
-    _, lines = run_until(capsys, 'good', 'dies', shutdown=None)
-    assert sum('last words' in line for line in lines) == 2
-    assert 'it wrote last' in '\n'.join(lines)
 
 
 def test_systemd_gets_readiness_and_the_stop(
