@@ -70,7 +70,7 @@ class MoveGroup(Node):
         monitor = SceneMonitor(self, robot)
         self._queries = Background(self, 'queries')
         StateServices(self, monitor, self._queries, _robot(description))
-        execution = TrajectoryExecution(self, controllers, lambda: monitor.places, limits)
+        execution = TrajectoryExecution(self, controllers, monitor.received, limits)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
         planning = PlanningThread(self, monitor, self._planning, _robot(description))

@@ -13,20 +13,25 @@ import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from trajectory_msgs.msg import JointTrajectory
 
 from arm_model.ros import seconds
 
 from ..exceptions import PlanningCode, PlanningError
+from .joint_trajectory import check_trajectory, part_of
 
 WATCH_PERIOD = 0.05
 """How often executions are looked at in [s]."""
 
 STOP_TIMEOUT = 5.0
-"""Time in which controllers must have stopped in [s]."""
+"""Time in which controllers must have stopped in [s]; then they are asked again."""
+
+FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
+"""Answers to a cancel of controllers that do not follow the goal any more."""
 
 Done = Callable[[PlanningCode, str], None]
 
@@ -54,6 +59,7 @@ class Execution:
         trajectory: The trajectory_msgs/JointTrajectory.
         done: Called once, with how it ended.
         begin: Steady time of its start in [s].
+        is_over: Whether ``done`` was called; a controller may still be on its way then.
     """
 
     trajectory: Any
@@ -78,7 +84,7 @@ class TrajectoryExecution:
         self,
         node: Node,
         controllers: Mapping[str, Sequence[str]],
-        places: Callable[[], Mapping[str, float]],
+        received: Callable[[Sequence[str]], Mapping[str, float]],
         limits: ExecutionLimits,
     ) -> None:
         """Know the controllers; their actions may come later.
@@ -86,10 +92,11 @@ class TrajectoryExecution:
         Args:
             node: The node.
             controllers: Joints of each controller, by its name.
-            places: Returns where the joints are in [rad], by joint.
+            received: Returns where joints are in [rad], by joint; raises PlanningError where
+                that is not known.
             limits: When an execution is refused or ended.
         """
-        self._node, self._controllers, self._places = node, controllers, places
+        self._node, self._controllers, self._received = node, controllers, received
         self._limits = limits
         self._clients = {
             name: ActionClient(node, FollowJointTrajectory, f'{name}/follow_joint_trajectory')
@@ -112,18 +119,18 @@ class TrajectoryExecution:
             names: Controllers that may follow it; empty for all.
 
         Raises:
-            PlanningError: It does not begin where the robot is, no controller follows it, or
-                one of its joints is on its way already.
+            PlanningError: It is no trajectory, does not begin where the robot is, no controller
+                follows it, or one of its joints is on its way already.
         """
+        check_trajectory(trajectory)
         execution = Execution(trajectory, done)
-        if not trajectory.points:
-            raise PlanningError(PlanningCode.INVALID_MOTION_PLAN, 'the trajectory has no points')
-        self._check_points(trajectory)
         for other in self._running:
             if shared := other.joints & execution.joints:
                 raise PlanningError(
                     PlanningCode.CONTROL_FAILED,
-                    f'{min(shared)} is moved by another execution; stop it first, or wait',
+                    f'{_unconfirmed(other)}; wait, or restart it'
+                    if other.is_over
+                    else f'{min(shared)} is moved by another execution; stop it first, or wait',
                 )
         self._check_start(trajectory)
         parts = self._parts(trajectory, names)
@@ -171,24 +178,11 @@ class TrajectoryExecution:
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
 
-    def _check_points(self, trajectory: Any) -> None:  # noqa: ANN401
-        for number, point in enumerate(trajectory.points):
-            if len(point.positions) != len(trajectory.joint_names):
-                raise PlanningError(
-                    PlanningCode.INVALID_MOTION_PLAN,
-                    f'point {number} has {len(point.positions)} positions of'
-                    f' {len(trajectory.joint_names)} joints',
-                )
-
     def _check_start(self, trajectory: Any) -> None:  # noqa: ANN401
         tolerance = self._limits.start_tolerance
-        places = self._places()
+        places = self._received(trajectory.joint_names)
         start = trajectory.points[0].positions
         for name, wanted in zip(trajectory.joint_names, start, strict=True):
-            if name not in places:
-                raise PlanningError(
-                    PlanningCode.ROBOT_STATE_STALE, f'joint {name}: no position received yet'
-                )
             if tolerance and abs(places[name] - wanted) > tolerance:
                 raise PlanningError(
                     PlanningCode.CONTROL_FAILED,
@@ -216,7 +210,7 @@ class TrajectoryExecution:
                     PlanningCode.CONTROL_FAILED, f'no action {action}; start the controller {name}'
                 )
             left = [joint for joint in left if joint not in joints]
-            parts[name] = _part(trajectory, joints)
+            parts[name] = part_of(trajectory, joints)
         if left:
             known = '; '.join(
                 f'{name}: {", ".join(joints)}' for name, joints in self._controllers.items()
@@ -254,11 +248,15 @@ class TrajectoryExecution:
 
     def _conclude(self, execution: Execution) -> None:
         """End it when all of its controllers have ended."""
-        if execution.waits_for or execution.is_over:
+        if execution.waits_for or execution not in self._running:
             return
-        execution.is_over = True
         self._running.remove(execution)
-        execution.done(*(execution.ending or (PlanningCode.SUCCESS, '')))
+        self._report(execution)
+
+    def _report(self, execution: Execution) -> None:
+        if not execution.is_over:
+            execution.is_over = True
+            execution.done(*(execution.ending or (PlanningCode.SUCCESS, '')))
 
     def _watch(self) -> None:
         now = time.monotonic()
@@ -273,21 +271,34 @@ class TrajectoryExecution:
                     'Controller is taking too long to execute trajectory (the expected upper'
                     f' bound for the trajectory execution was {allowed:.2f} seconds)',
                 )
-            else:  # a controller that does not answer any more
-                execution.waits_for.clear()
-                self._conclude(execution)
+            else:
+                self._give_up(execution)
+
+    def _give_up(self, execution: Execution) -> None:
+        """Report that a controller may still move, and ask it again.
+
+        Its joints are free when it answers, does not know the goal any more, or is gone.
+        """
+        if not execution.is_over and execution.ending is not None:
+            _, why = execution.ending
+            reason = f'{why}; {_unconfirmed(execution)}, its joints are refused until it does'
+            execution.ending = PlanningCode.CONTROL_FAILED, reason
+            self._report(execution)
+        execution.deadline = time.monotonic() + STOP_TIMEOUT
+        for name in list(execution.waits_for):
+            if not self._clients[name].server_is_ready():
+                execution.waits_for.discard(name)
+            elif name in execution.handles:
+                execution.handles[name].cancel_goal_async().add_done_callback(
+                    lambda answer, name=name: self._asked_again(execution, name, answer)
+                )
+        self._conclude(execution)
+
+    def _asked_again(self, execution: Execution, name: str, answer: Any) -> None:  # noqa: ANN401
+        if answer.result().return_code in FORGOTTEN:
+            execution.waits_for.discard(name)
+            self._conclude(execution)
 
 
-def _part(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa: ANN401
-    """Return the trajectory of some of the joints."""
-    names = list(trajectory.joint_names)
-    columns = [names.index(joint) for joint in joints]
-    part = JointTrajectory(joint_names=list(joints))
-    for point in trajectory.points:
-        picked = {
-            kind: [float(values[column]) for column in columns] if len(values) else []
-            for kind in ('positions', 'velocities', 'accelerations')
-            for values in [getattr(point, kind)]
-        }
-        part.points.append(JointTrajectoryPoint(**picked, time_from_start=point.time_from_start))
-    return part
+def _unconfirmed(execution: Execution) -> str:
+    return f'{", ".join(sorted(execution.waits_for))} did not confirm that it stopped'

@@ -81,7 +81,8 @@ class PlanningThread:
             )
         state = message.start_state
         positions = self._monitor.positions(state)
-        self._monitor.check_received(message.group_name, state)
+        joints = self._monitor.robot.model(message.group_name).joints
+        self._monitor.check_received(joints, state.joint_state.name)
         snapshot = self._monitor.start_scene(state, positions)
         if scene_diff is not None and scene_diff.is_diff:
             snapshot = apply_scene(snapshot, scene_diff, positions)

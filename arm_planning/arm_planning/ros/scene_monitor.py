@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 import math
 import time
 from typing import Any
@@ -72,10 +72,17 @@ class SceneMonitor:
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         self._publish()
 
-    @property
-    def places(self) -> Mapping[str, float]:
-        """Return positions of the joints in [rad] that were received, by joint."""
-        return self._places
+    def received(self, joints: Sequence[str]) -> Mapping[str, float]:
+        """Return where joints are in [rad], by joint.
+
+        Args:
+            joints: Their names.
+
+        Raises:
+            PlanningError: One was never received, or is too old.
+        """
+        self.check_received(joints)
+        return {joint: self._places[joint] for joint in joints}
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
         """Return the positions of all joints of the robot in [rad].
@@ -89,18 +96,18 @@ class SceneMonitor:
         given = {} if message is None else joints_of(message, self.robot.all_joints)
         return self.robot.positions({**self._places, **given})
 
-    def check_received(self, group: str, message: Any) -> None:  # noqa: ANN401
-        """Make sure that it is known where the joints of a group are.
+    def check_received(self, joints: Sequence[str], given: Sequence[str] = ()) -> None:
+        """Make sure that it is known where joints are.
 
         Args:
-            group: The group.
-            message: A moveit_msgs/RobotState that may have them.
+            joints: Their names.
+            given: Names of those that need not be received.
 
         Raises:
-            PlanningError: A joint was never received, or is too old.
+            PlanningError: One was never received, or is too old.
         """
-        given, now = set(message.joint_state.name), time.monotonic()
-        for joint in self.robot.model(group).joints:
+        now = time.monotonic()
+        for joint in joints:
             age = now - self._arrivals.get(joint, -math.inf)
             if joint not in given and age > STATE_TIMEOUT:
                 topic = self._node.resolve_topic_name('joint_states')

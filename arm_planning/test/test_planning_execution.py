@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Execution of trajectories, with controllers that misbehave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+import re
+from types import SimpleNamespace
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
+from control_msgs.action import FollowJointTrajectory
+from planning_messages import panda
+import pytest
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_planning import PlanningCode, PlanningError
+from arm_planning.ros import execution, scene_monitor
+from arm_planning.ros.execution import ExecutionLimits, TrajectoryExecution
+from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
+
+JOINTS = ('left', 'right')
+
+
+class Controller:
+    """An action client of a controller that answers as the test wants."""
+
+    def __init__(self) -> None:
+        """Accept what comes."""
+        self.is_ready, self.cancels = True, 0
+        self.result: Future[Any] = Future()
+        self.forgets = False
+
+    def server_is_ready(self) -> bool:
+        """Return whether it runs."""
+        return self.is_ready
+
+    def send_goal_async(self, _goal: Any) -> Future[Any]:
+        """Accept it."""
+        self.result = Future()
+        return answered(self)
+
+    accepted = True
+
+    def get_result_async(self) -> Future[Any]:
+        """Return when it ends."""
+        return self.result
+
+    def cancel_goal_async(self) -> Future[Any]:
+        """Take a cancel."""
+        self.cancels += 1
+        code = CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID if self.forgets else 0
+        return answered(CancelGoal.Response(return_code=code))
+
+    def end(self, status: int = GoalStatus.STATUS_CANCELED) -> None:
+        """Confirm the end."""
+        result = FollowJointTrajectory.Result()
+        self.result.set_result(SimpleNamespace(status=status, result=result))
+
+
+def answered(value: Any) -> Future[Any]:
+    """Return a future that is done."""
+    future: Future[Any] = Future()
+    future.set_result(value)
+    return future
+
+
+class Bench:
+    """An execution with one controller of two joints, which stand at 0."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Put it together."""
+        self.controller = Controller()
+        self.ends: list[tuple[PlanningCode, str]] = []
+        self.watch: Callable[[], None] = lambda: None
+        monkeypatch.setattr(execution, 'ActionClient', lambda *_: self.controller)
+        self.execution = TrajectoryExecution(
+            self,  # type: ignore[arg-type]
+            {'arm': JOINTS},
+            self.received,
+            ExecutionLimits(),
+        )
+
+    def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
+        """Stand in for the node."""
+        self.watch = callback
+
+    def received(self, joints: Sequence[str]) -> Mapping[str, float]:
+        """Return where joints are."""
+        return dict.fromkeys(joints, 0.0)
+
+    def start(self, trajectory: Any = None) -> execution.Execution:
+        """Start a trajectory."""
+        return self.execution.start(
+            motion() if trajectory is None else trajectory,
+            lambda code, reason: self.ends.append((code, reason)),
+        )
+
+    def refusal(self, trajectory: Any = None) -> PlanningError:
+        """Return why a trajectory is refused."""
+        with pytest.raises(PlanningError) as caught:
+            self.start(trajectory)
+        return caught.value
+
+
+@pytest.fixture(name='bench')
+def make_bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """Return a bench."""
+    return Bench(monkeypatch)
+
+
+def motion() -> JointTrajectory:
+    """Return a motion of one second."""
+    points = [
+        JointTrajectoryPoint(
+            positions=[place, place], velocities=[0.0, 0.0], accelerations=[0.0, 0.0]
+        )
+        for place in (0.0, 0.5, 1.0)
+    ]
+    points[1].time_from_start.nanosec = 500_000_000
+    points[2].time_from_start.sec = 1
+    return JointTrajectory(joint_names=list(JOINTS), points=points)
+
+
+def changed(change: Callable[[Any], None]) -> JointTrajectory:
+    """Return the motion with its middle point changed."""
+    trajectory = motion()
+    change(trajectory.points[1])
+    return trajectory
+
+
+@pytest.mark.parametrize(
+    ('trajectory', 'words'),
+    [
+        (changed(lambda p: p.positions.__setitem__(1, float('nan'))), 'positions is nan.*right'),
+        (changed(lambda p: p.velocities.__setitem__(0, float('inf'))), 'velocities is inf.*left'),
+        (changed(lambda p: p.accelerations.pop()), 'point 1 has 1 accelerations of 2 joints'),
+        (changed(lambda p: p.velocities.pop()), 'point 1 has 1 velocities of 2 joints'),
+        (changed(lambda p: p.positions.append(1.0)), 'point 1 has 3 positions of 2 joints'),
+        (changed(lambda p: setattr(p.time_from_start, 'sec', 2)), 'point 2 has .* 1 s'),
+        (changed(lambda p: setattr(p.time_from_start, 'nanosec', 0)), 'point 1 has .* 0 s'),
+        (changed(lambda p: setattr(p.time_from_start, 'sec', -3)), 'point 1 .*not negative'),
+        (JointTrajectory(joint_names=['left', 'left'], points=motion().points), 'left is named'),
+        (JointTrajectory(joint_names=['left']), 'no points'),
+    ],
+)
+def test_what_no_controller_can_follow_is_refused(
+    bench: Bench, trajectory: JointTrajectory, words: str
+) -> None:
+    """Before any controller gets a part of it."""
+    refused = bench.refusal(trajectory)
+    assert refused.code is PlanningCode.INVALID_MOTION_PLAN
+    assert re.search(words, str(refused))
+
+
+def test_a_motion_is_followed(bench: Bench) -> None:
+    """It ends with the controller."""
+    bench.start()
+    assert not bench.ends
+    bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
+    assert bench.ends == [(PlanningCode.SUCCESS, '')]
+    bench.start()
+
+
+def test_a_controller_that_does_not_confirm_keeps_its_joints(bench: Bench) -> None:
+    """The client is answered; the joints are free when the result arrives."""
+    running = bench.start()
+    bench.execution.stop(running)
+    bench.watch()
+    assert not bench.ends
+    running.deadline = 0.0  # STOP_TIMEOUT is over
+    bench.watch()
+    ((code, reason),) = bench.ends
+    assert code is PlanningCode.CONTROL_FAILED
+    assert 'arm did not confirm' in reason
+    assert bench.controller.cancels == 2
+    assert 'arm did not confirm' in str(bench.refusal())
+    bench.controller.end()
+    assert len(bench.ends) == 1
+    bench.start()
+
+
+@pytest.mark.parametrize('fate', ['forgets', 'is_ready'])
+def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: str) -> None:
+    """It knows nothing of the goal any more, or is gone."""
+    running = bench.start()
+    bench.execution.stop(running)
+    setattr(bench.controller, fate, fate == 'forgets')
+    running.deadline = 0.0
+    bench.watch()
+    assert len(bench.ends) == 1
+    bench.controller.is_ready = True
+    bench.start()
+
+
+class QuietNode:
+    """A node without a graph."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what does nothing."""
+        if name == 'resolve_topic_name':
+            return lambda topic: f'/{topic}'
+        return lambda *_: SimpleNamespace(publish=lambda _message: None)
+
+
+def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither those that never came, nor those that are older than a second."""
+    now = 100.0
+    monkeypatch.setattr(scene_monitor, 'time', SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(SceneMonitor, '_publish', lambda _self: None)
+    monitor = SceneMonitor(QuietNode(), panda())  # type: ignore[arg-type]
+    joint = monitor.robot.joints[0]
+    for age, words in ((None, 'not received yet'), (2.0 * STATE_TIMEOUT, '2.0 s old')):
+        if age is not None:
+            monitor._take_joints(JointState(name=[joint], position=[0.5]))
+            assert monitor.received([joint]) == {joint: 0.5}
+            now += age
+        with pytest.raises(PlanningError, match=words) as caught:
+            monitor.received([joint])
+        assert caught.value.code is PlanningCode.ROBOT_STATE_STALE
