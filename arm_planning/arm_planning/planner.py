@@ -19,6 +19,7 @@ from .free.timing import scaled_limits
 from .ik.solver import DEFAULT_TIMEOUT, IkSolver
 from .industrial.limits import CartesianLimits
 from .industrial.planner import IndustrialPlanner, PLANNER_IDS
+from .link_speed import speed_limited
 from .requests import Goal, JointGoal, MotionPlan, MotionRequest
 from .validity import ValidityCheck, Violation
 
@@ -98,11 +99,9 @@ class Planner:
         Raises:
             PlanningError: There is no solution, and why; or a number is not finite.
         """
-        if link not in self._solvers:
-            self._solvers[link] = IkSolver(self._model, link, self._clock)
         scene = self._model.scene if scene is None else scene
         try:
-            return self._solvers[link].solve(pose, seed, scene, timeout, count)
+            return self._solver(link).solve(pose, seed, scene, timeout, count)
         except CommandError as error:
             raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
 
@@ -158,8 +157,22 @@ class Planner:
         with suppress(PlanningError):  # no time is left for further attempts
             while len(paths) < request.attempts:
                 paths.append(free.plan(start, goals, expired))
-        quickest = min(paths, key=lambda path: path.duration)
-        return MotionPlan(quickest, request.planner_id or DEFAULT_PLANNER)
+        notes: tuple[str, ...] = ()
+        if request.max_cartesian_speed:
+            link, most = (
+                self._solver(request.cartesian_speed_link).link,
+                request.max_cartesian_speed,
+            )
+            limited = [speed_limited(path, link, most) for path in paths]
+            quickest, notes = min(limited, key=lambda each: each[0].duration)
+        else:
+            quickest = min(paths, key=lambda path: path.duration)
+        return MotionPlan(quickest, request.planner_id or DEFAULT_PLANNER, notes)
+
+    def _solver(self, link: str) -> IkSolver:
+        if link not in self._solvers:
+            self._solvers[link] = IkSolver(self._model, link, self._clock)
+        return self._solvers[link]
 
     def _checked_in(self, scene: PlanningScene) -> ValidityCheck:
         if self._check is None or self._check.scene is not scene:

@@ -195,3 +195,49 @@ def test_a_pose_out_of_reach_is_refused() -> None:
     far = Pose(ORIGIN.rotation, frozen([3.0, 0.0, 0.5]))
     error = refusal(Planner(robot('panda')), MotionRequest(ready('panda'), [PoseGoal(far)]))
     assert error.code is PlanningCode.NO_IK_SOLUTION
+
+
+@pytest.mark.parametrize('link', ['', 'panda_link4'])
+def test_the_speed_of_a_link_is_limited(link: str) -> None:
+    """max_cartesian_speed holds on a free motion, whose places it leaves as they are."""
+    most, model = 0.1, robot('panda')
+    start = ready('panda')
+    way = np.array([0.8, 0.4, 0.0, -0.4, 0.0, 0.5, 0.0])
+    asked = request(start, frozen(start + way))
+    quick = Planner(model, seed=1).plan(asked).path
+    plan = Planner(model, seed=1).plan(
+        replace(asked, max_cartesian_speed=most, cartesian_speed_link=link)
+    )
+    times = np.linspace(0.0, plan.path.duration, 3000)
+    rows = plan.path.positions(times)
+    places = [model.kinematics.link_pose(link or model.tip, row).position for row in rows]
+    speed = np.linalg.norm(np.diff(places, axis=0), axis=1).max() / times[1]
+    assert 0.99 * most < speed <= most
+    assert any('0.1 m/s' in note for note in plan.notes)
+    share = quick.duration / plan.path.duration
+    assert rows == pytest.approx(quick.positions(times * share), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ('most', 'link', 'code', 'words'),
+    [
+        (float('nan'), '', PlanningCode.INVALID_GOAL_CONSTRAINTS, 'max_cartesian_speed is nan'),
+        (-1.0, '', PlanningCode.INVALID_GOAL_CONSTRAINTS, 'max_cartesian_speed is -1'),
+        (1.0, 'moon', PlanningCode.INVALID_LINK_NAME, "no link 'moon'"),
+    ],
+)
+def test_a_speed_limit_that_is_none_is_refused(
+    most: float, link: str, code: PlanningCode, words: str
+) -> None:
+    """Neither planner ignores it."""
+    start = ready('panda')
+    for planner_id in ('', 'PTP'):
+        asked = replace(
+            request(start, frozen(start + 0.1)),
+            planner_id=planner_id,
+            max_cartesian_speed=most,
+            cartesian_speed_link=link,
+        )
+        error = refusal(Planner(robot('panda')), asked)
+        assert error.code is code
+        assert words in str(error)

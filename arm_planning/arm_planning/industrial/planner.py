@@ -16,6 +16,7 @@ from ..curves import arc_around, arc_through, Curve, Line
 from ..exceptions import PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
 from ..ik.solver import check_pose, IkSolver
+from ..link_speed import speed_limited
 from ..requests import (
     CircPoint,
     CircPointKind,
@@ -29,7 +30,7 @@ from .following import curve_path
 from .limits import CartesianLimits, check_scaling, scaled
 from .ptp import ptp_path
 from .sequence import check_items, check_overlap, joined, SequenceItem
-from .timing import FullSpeedPath, slower, timed
+from .timing import FullSpeedPath, timed
 
 PTP, LIN, CIRC = 'PTP', 'LIN', 'CIRC'
 
@@ -41,9 +42,6 @@ RANGE_TOLERANCE = 1e-6
 
 GOAL_TOLERANCE = 1e-3
 """How far from the goal's joint positions a line may end in [rad], as in Pilz' planner."""
-
-SPEED_SAMPLES = 200
-"""Places at which the speed of a link is looked at, where that is limited."""
 
 POSE = 6
 """Joints that a pose needs: with more of them it does not say where each is."""
@@ -253,29 +251,12 @@ class IndustrialPlanner:
         )
         path, notes = timed(full, limits)
         for request in requests:
-            path, slowed = self._speed_limited(path, request)
+            limited = self._solver(request.cartesian_speed_link).link
+            path, slowed = speed_limited(path, limited, request.max_cartesian_speed)
             notes = (*notes, *slowed)
         self._check_range(path, limits, requests[-1].planner_id)
         self._check_contact(path, scene, link, requests[-1].planner_id)
         return MotionPlan(path, requests[-1].planner_id, notes)
-
-    def _speed_limited(self, path: Path, request: MotionRequest) -> tuple[Path, tuple[str, ...]]:
-        """Return a path slower where its link would be faster than the request allows."""
-        most = request.max_cartesian_speed
-        if most <= 0.0:
-            return path, ()
-        link = self._solver(request.cartesian_speed_link).link
-        times = np.linspace(0.0, path.duration, SPEED_SAMPLES)
-        speeds = []
-        for each in times.tolist():
-            point = path.at(each)
-            _, jacobian = link.pose_and_jacobian(point.position)
-            speeds.append(float(np.linalg.norm(jacobian[:3] @ point.velocity)))
-        factor = max(speeds) / most
-        if factor <= 1.0:
-            return path, ()
-        note = f'slowed to {1.0 / factor:.0%}: link {link.link} may move at {most:g} m/s'
-        return slower(path, factor), (note,)
 
     def _check_range(self, path: Path, limits: JointLimits, name: str) -> None:
         begin = path.at(0.0).position
