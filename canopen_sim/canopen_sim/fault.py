@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import Enum
 
+from arm_canopen.standard.dictionary import object_address
 from arm_canopen.standard.sdo_abort import AbortCode
 
 DELAY = 0.5  # [s] default: longer than the SDO time-out of most masters
@@ -173,7 +174,7 @@ class FaultInjection:
         """Return it in words."""
         parts = [f'{self.fault.label}: {self.fault.value.text}']
         if self.object is not None:
-            parts.append('0x{:04X}:{:02X}'.format(*self.object))
+            parts.append(object_address(*self.object))
         if self.pdo:
             parts.append(f'PDO {self.pdo}')
         if self.axis:

@@ -30,7 +30,7 @@ def add_devices(
     Args:
         host: Gets them.
         bus: The bus.
-        positions: Where axes stand at power-on, by name, in the units of bus.yml [rad or m], as
+        positions: Where axes stand at the start, by name, in the units of bus.yml [rad or m], as
             their absolute encoders report it; the others report 0 increments.
         memory: Makes what a device keeps without power, by node id.
 
@@ -66,7 +66,7 @@ def simulated_devices(
     Args:
         bus_config: The bus.yml.
         bus: Name of the bus, as for :func:`arm_canopen.open_bus`.
-        positions: Where drives stand at power-on, by name, in the units of bus.yml [rad or m].
+        positions: Where drives stand at the start, by name, in the units of bus.yml [rad or m].
 
     Yields:
         What runs them; ``runner.call`` gets at ``runner.host.devices``.

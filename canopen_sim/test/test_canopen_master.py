@@ -205,7 +205,7 @@ def test_objects_are_read_and_written(master: CanopenMaster) -> None:
         sdo.read(0x5FFF)
     with pytest.raises(CodecError):
         sdo.write('Profile velocity', 'fast')
-    with pytest.raises(DriveError, match='methods of the drive'):
+    with pytest.raises(DriveError, match='commands of the drive'):
         sdo.write('Controlword', 0)
     with pytest.raises(SdoAbortError):
         sdo.write('Statusword', 0)

@@ -116,7 +116,7 @@ class Drive:
         if node.emergencies.last is not None:
             parts.append(f'EMCY {node.emergencies.last}')
         if node.left_operational and node.nmt_state is not None:
-            parts.append(f'NMT state {node.nmt_state.name}: call ~/nmt_start_node')
+            parts.append(f'NMT state {node.nmt_state.name}: start it by NMT')
         return '; '.join(parts)
 
     def report(self, severity: Severity, text: str) -> None:
@@ -338,14 +338,14 @@ class Drive:
             self.report(
                 Severity.ERROR,
                 f'left Operation enabled by itself: {self.describe()}; is the voltage or the '
-                'safe torque off gone? Call ~/enable when it is safe',
+                'safe torque off gone? Enable it again when it is safe',
             )
         elif left:
             self.released(Refusal(RefusalCause.NOT_ENABLED, view.state.title))
 
     async def _report_fault(self) -> None:
         await self.view.read_error_code()
-        self.report(Severity.ERROR, f'FAULT: {self.describe()}; call ~/recover')
+        self.report(Severity.ERROR, f'FAULT: {self.describe()}; recover it')
 
     def _on_lost(self, reason: str) -> None:
         view, control = self.view, self.control

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from ..exceptions import DriveError, SdoTimeoutError
 from ..master.scheduler import completed, Promise, Scheduler, Task
+from ..standard.dictionary import object_address
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
@@ -218,7 +219,7 @@ class DriveCommands:
         """
         drive, mode = self.drive, self.drive.control.mode
         if not isinstance(mode, ProfilePosition):
-            raise self._steps.refused('moves only in mode 1; call ~/position_mode first')
+            raise self._steps.refused('moves only in mode 1; select position_mode first')
         self._require_acceptance()
         if drive.control.halted and not drive.control.halt.leaving:
             move = replace(move, immediate=True)  # the halt has ended the moves before it
@@ -307,7 +308,7 @@ class DriveCommands:
             return f'already in mode {number.title}; {drive.describe()}'
         await self._steps.switch(mode)
         enabled = drive.view.state is DriveState.OPERATION_ENABLED
-        hint = '' if enabled else f'; not enabled, call {self._steps.way_to_enable()}'
+        hint = '' if enabled else f'; not enabled, {self._steps.way_to_enable()}'
         return f'{drive.describe()}{hint}'
 
     async def _home_at_init(self) -> str:
@@ -319,8 +320,8 @@ class DriveCommands:
         if not stored:
             return ''
         return (
-            f', not homed: method {stored} is set in the drive (0x6098), but not in bus.yml; call '
-            '~/home if it shall be'
+            f', not homed: method {stored} is set in the drive (0x6098), but not in bus.yml; home '
+            'it if it shall be'
         )
 
     def _set(self, target: float) -> str:
@@ -347,7 +348,7 @@ class DriveCommands:
         if refusal is None:
             return
         if refusal.cause in (RefusalCause.FAULT, RefusalCause.NOT_ENABLED):
-            raise steps.refused(f'takes no target; call {steps.way_to_enable()}')
+            raise steps.refused(f'takes no target; {steps.way_to_enable()}')
         if refusal.cause is RefusalCause.MODE_CHANGE and isinstance(drive.control.mode, NoMode):
             return  # which refuses every target itself
         raise steps.refused(f'takes no target: it {refusal}')
@@ -378,7 +379,9 @@ class DriveCommands:
             why = f'the drive does not have it (0x6502 is 0x{parameters.supported_modes:X})'
         else:
             target = TARGET_OBJECTS.get(number)
-            place = f'0x{drive.objects.at(target[0]):04X}' if target is not None else 'its target'
+            place = (
+                object_address(drive.objects.at(target[0])) if target is not None else 'its target'
+            )
             why = f'{place} is in no RPDO of bus.yml; map it'
         return f'{drive.name} has no mode {number.title}: {why}; it has: {offered}'
 

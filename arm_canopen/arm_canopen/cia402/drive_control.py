@@ -20,7 +20,7 @@ from .state_machine import Command
 from .target_limits import check_target
 
 NOT_TAKEN = (
-    'it has not taken its new target (bit 12); ~/disable and ~/enable make it forget the moves '
+    'it has not taken its new target (bit 12); disable and enable it to make it forget the moves '
     'that it holds'
 )
 

@@ -167,7 +167,7 @@ class NoMode(Mode):
 
     def set_target(self, target: float) -> Promise[None]:
         """Refuse every target."""
-        raise DriveError('no mode of operation is selected; call ~/position_mode or another first')
+        raise DriveError('no mode of operation is selected; select position_mode or another first')
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Command nothing."""

@@ -47,9 +47,7 @@ class Recovery:
         drive = self._drive
         if drive.view.state in FAULTY:
             await drive.view.read_error_code()
-            drive.report(
-                Severity.WARNING, f'not enabled again: {drive.describe()}; call ~/recover'
-            )
+            drive.report(Severity.WARNING, f'not enabled again: {drive.describe()}; recover it')
             return
         try:
             await self._enable_in(mode)

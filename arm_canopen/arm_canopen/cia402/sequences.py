@@ -261,15 +261,15 @@ class DriveSequences:
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""
         if self.drive.view.state in FAULTY:
-            raise self.refused('is faulted; call ~/recover first')
+            raise self.refused('is faulted; recover it first')
 
     def refused(self, what: str) -> DriveError:
         """Return an error with what went wrong, and the state of the drive."""
         return DriveError(f'{self.drive.name} {what}: {self.drive.describe()}')
 
     def way_to_enable(self) -> str:
-        """Name the service that enables the drive."""
-        return '~/recover' if self.drive.view.state in FAULTY else '~/init or ~/enable'
+        """Name what enables the drive."""
+        return 'recover it' if self.drive.view.state in FAULTY else 'init or enable it'
 
     def _why(self) -> str:
         """Name the condition outside of the bus keeps the drive from being enabled."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
 from ..standard.datatypes import DataType, encode
+from ..standard.dictionary import object_address
 from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index, PDO_COUNT_MAX
 from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
@@ -70,7 +71,7 @@ class BootWrite:
     @property
     def place(self) -> str:
         """The object, for messages."""
-        return f'0x{self.index:04X}:{self.subindex:02X}'
+        return object_address(self.index, self.subindex)
 
     @property
     def is_own_timer(self) -> bool:

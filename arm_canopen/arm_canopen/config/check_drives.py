@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ..standard.dictionary import object_address
 from ..standard.drive import mode_title
 from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
@@ -67,7 +68,8 @@ def _check_interpolation_period(subject: Subject, offset: int) -> None:
     )
     subject.findings.warning(
         place,
-        f'0x{index:04X} (interpolation period) {says} {period * 1e3:g} ms, but SYNC comes every '
+        f'{object_address(index)} (interpolation period) {says} {period * 1e3:g} ms, but SYNC '
+        'comes every '
         f'{wanted * 1e3:g} ms: in the modes 7 to 10 the drive would stop or jerk between two '
         'set-points',
         remedy,
@@ -122,7 +124,7 @@ def _check_support(subject: Subject, used: UsedMode) -> None:
         subject.findings.warning(
             subject.place(used.key),
             f'mode {used.mode.value} ({mode_title(used.mode).lower()}) is not among the modes '
-            f'that the EDS names in 0x{index:04X} (0x{supported:X})',
+            f'that the EDS names in {object_address(index)} (0x{supported:X})',
             'take another mode, or read the drive with `canopen read`: EDS files err here',
         )
 

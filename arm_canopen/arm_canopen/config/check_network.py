@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import math
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
+from ..standard.dictionary import object_address
 from ..standard.nmt import ConsumerHeartbeatTime
 from ..standard.objects import Index
 from .boot_plan import boot_writes, WATCH_KEY
@@ -191,7 +192,7 @@ def check_writes(subject: Subject) -> None:
         if write.data != kept.data and write.location.line:
             subject.findings.warning(
                 Place(subject.bus.file, write.location.line, key=write.location.key),
-                f'0x{write.index:04X}:{write.subindex:02X} is written again in line '
+                f'{object_address(write.index, write.subindex)} is written again in line '
                 f'{kept.location.line} with another value',
                 'keep one of them, unless the device needs both in this order',
             )

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..standard.dictionary import object_address
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
 from .drive_model import DriveConfig
@@ -115,4 +116,4 @@ class Subject:
 def object_name(index: int) -> str:
     """Name an object of the standards, for messages: ``0x607A (target position)``."""
     first = 0x6000 + (index - 0x6000) % AXIS_OFFSET if index >= 0x6000 else index
-    return f'0x{index:04X} ({Index(first).name.lower().replace("_", " ")})'
+    return f'{object_address(index)} ({Index(first).name.lower().replace("_", " ")})'

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ..standard.dictionary import ObjectDictionary
+from ..standard.dictionary import object_address, ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, Index
 from .document import YamlMap
 from .eds import Eds
@@ -140,7 +140,9 @@ def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> 
     """Refuse the drive profile's driver for a device that is no drive."""
     missing = [index for index in DRIVE_OBJECTS if not config.dictionary.has_index(index)]
     if config.is_drive and missing:
-        names = ' and '.join(f'0x{index:04X} ({index.name.lower()})' for index in missing)
+        names = ' and '.join(
+            f'{object_address(index)} ({index.name.lower()})' for index in missing
+        )
         findings.error(
             section.entries['driver'].place,
             f'{config.driver} is for CiA 402 drives, but the EDS has no {names}',
@@ -155,6 +157,7 @@ def _check_axes(config: NodeConfig, section: YamlMap, findings: Findings) -> Non
         if config.is_drive and not config.dictionary.has_index(index):
             findings.error(
                 section.entries['num_channels'].place,
-                f'the EDS has no axis {axis.channel}: 0x{index:04X} (controlword) is missing',
+                f'the EDS has no axis {axis.channel}: {object_address(index)} (controlword) is '
+                'missing',
                 'correct num_channels, or use the EDS that fits the device',
             )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
-from ..standard.dictionary import ObjectDictionary
+from ..standard.dictionary import object_address, ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, Index
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .device_reader import DeviceDraft
@@ -189,7 +189,8 @@ def _check_drive_pdos(draft: DeviceDraft, config: NodeConfig, findings: Findings
         if not _is_mapped(draft.pdos, direction, index):
             findings.warning(
                 draft.section.place,
-                f'no enabled {direction.title} carries 0x{index:04X} ({first.name.lower()}); '
+                f'no enabled {direction.title} carries {object_address(index)} '
+                f'({first.name.lower()}); '
                 f'{axis.name or "the drive"} cannot be {verb} in the cycle',
                 f'map it below {direction.name}',
             )

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..standard.datatypes import DataType, UNSIGNED_BITS
+from ..standard.dictionary import object_address
 from ..standard.objects import is_signed
 from ..standard.pdo import MappedObject
 from .findings import Findings
@@ -24,7 +25,7 @@ def check_drive_types(pdos: Sequence[PdoDraft], findings: Findings) -> None:
         for mapped in _unsigned(pdo):
             findings.error(
                 pdo.place,
-                f'{pdo.title} carries 0x{mapped.index:04X}:{mapped.subindex:02X} as '
+                f'{pdo.title} carries {object_address(mapped.index, mapped.subindex)} as '
                 f'{mapped.data_type.name}, which holds no negative value',
                 'correct its DataType in the EDS (0x0003 INTEGER16, 0x0004 INTEGER32), or the '
                 'length in the default mapping',

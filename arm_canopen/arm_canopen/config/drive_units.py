@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 import math
 
+from ..standard.dictionary import object_address
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
 from .boot_plan import is_requested
@@ -159,8 +160,8 @@ def _check_profile_velocity(subject: Subject, axis: DriveConfig) -> None:
     if subject.value(index) == 0 and (is_used or (written and axis.position_mode is None)):
         subject.findings.warning(
             subject.object_place(index, 0),
-            f'0x{index:04X} (profile velocity) is 0: in mode 1 the drive would not move, so its '
-            'targets are refused',
+            f'{object_address(index)} (profile velocity) is 0: in mode 1 the drive would not '
+            'move, so its targets are refused',
             'write the speed of its moves, in velocity units of the drive',
         )
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import re
 
 from ..standard.datatypes import DataType, integer_range, REAL_FORMATS, Value
-from ..standard.dictionary import AccessType, ObjectCode, ObjectEntry
+from ..standard.dictionary import AccessType, object_address, ObjectCode, ObjectEntry
 from .eds_ini import IniFile, IniSection
 from .eds_values import EdsValue, parse_integer, parse_value
 
@@ -225,5 +225,5 @@ def _plain_number(value: EdsValue | None) -> int | float | None:
 
 
 def _hexadecimal(indices: list[int]) -> str:
-    shown = ', '.join(f'0x{index:04X}' for index in indices[:8])
+    shown = ', '.join(object_address(index) for index in indices[:8])
     return shown if len(indices) <= 8 else f'{shown} and {len(indices) - 8} more'

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..exceptions import CodecError, Problem
 from ..standard.datatypes import DataType, decode, Value
-from ..standard.dictionary import ObjectDictionary
+from ..standard.dictionary import object_address, ObjectDictionary
 from ..standard.objects import AXIS_OFFSET, COMMANDS
 from ..standard.pdo import MappedObject
 from .drive_model import DriveConfig
@@ -177,7 +177,7 @@ class NodeConfig:
             try:
                 return decode(known_type, write.data)
             except CodecError as error:
-                place = f'0x{index:04X}:{subindex:02X}'
+                place = object_address(index, subindex)
                 raise CodecError(f'{self.name}: the write of {place} at boot: {error}') from None
         return None if entry is None else entry.default
 

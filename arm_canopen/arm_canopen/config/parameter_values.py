@@ -64,7 +64,7 @@ def _data(entry: ObjectEntry, eds: Eds, findings: Findings) -> bytes | None:
     place = Place(eds.path, entry.line, key=f'[{entry.index:04X}]')
     if is_drive(eds.dictionary) and _is_command(entry.index):
         what = f'the ParameterValue of {entry} is a command, which is not written at boot'
-        findings.warning(place, what, 'remove it; commands are given by the services')
+        findings.warning(place, what, 'remove it; the drive gets its commands at run time')
         return None
     if entry.default is None:
         return None

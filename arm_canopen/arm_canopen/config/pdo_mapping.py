@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..standard.datatypes import bit_length, DataType, SIGNED_BITS
-from ..standard.dictionary import ObjectDictionary, ObjectEntry
+from ..standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, is_signed, PDO_BITS_MAX
 from ..standard.pdo import MappedObject
 from .device_keys import MAPPING_KEYS
@@ -89,7 +89,7 @@ def _from_word(
     entry = dictionary.get(index, subindex)
     if entry is not None and bit_length(entry.data_type) == bits:
         return MappedObject(index, subindex, entry.data_type)
-    name = f'0x{index:04X}:{subindex:02X}'
+    name = object_address(index, subindex)
     what = f'{name}, which is not there' if entry is None else f'{entry} with {bits} bits'
     # an object of a drive whose sign the standard knows is not read without it
     signed = is_signed(index, subindex) and dictionary.has_index(Index.CONTROLWORD)
@@ -162,10 +162,13 @@ def _dummy(direction: Direction, index: int, eds: Eds) -> MappedObject:
     """Map a gap: a data type in place of an object (CiA 301, 7.4.7.1)."""
     name = DataType(index).name
     if direction is not RPDO:
-        raise RefusedError(f'the gap 0x{index:04X} ({name}) is for RPDOs only', 'remove the entry')
+        raise RefusedError(
+            f'the gap {object_address(index)} ({name}) is for RPDOs only', 'remove the entry'
+        )
     if index not in eds.dummy_types:
         raise RefusedError(
-            f'the device does not take the gap 0x{index:04X} ({name}; DummyUsage in its EDS)',
+            f'the device does not take the gap {object_address(index)} ({name}; DummyUsage in '
+            'its EDS)',
             'take another type',
         )
     return MappedObject(index, 0, DataType(index))

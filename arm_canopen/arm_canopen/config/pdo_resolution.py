@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ..standard.dictionary import object_address
 from ..standard.objects import PDO_COUNT_MAX
 from ..standard.pdo import SYNCHRONOUS_MAX
 from .document import Item, Scalar, YamlList, YamlMap
@@ -179,8 +180,8 @@ class PdoReader:
             if (communication, subindex) not in self._eds.dictionary:
                 self._findings.error(
                     section.entries[key.name].place,
-                    f'the device cannot do this: 0x{communication:04X}:{subindex:02X} is not in '
-                    'its EDS',
+                    f'the device cannot do this: {object_address(communication, subindex)} is not '
+                    'in its EDS',
                     'remove the key',
                 )
         transmission = values.get('transmission')
@@ -226,7 +227,7 @@ def _no_such_pdo(
     known = ', '.join(str(known) for known in numbers) or 'none'
     index = direction.communication + number - 1
     return RefusedError(
-        f'{direction.title} {number} (0x{index:04X}) is not in the EDS',
+        f'{direction.title} {number} ({object_address(index)}) is not in the EDS',
         f'take one that the device has: {known}',
     )
 

@@ -16,7 +16,7 @@ from ..standard.datatypes import (
     SIGNED_BITS,
     Value,
 )
-from ..standard.dictionary import ObjectDictionary, ObjectEntry
+from ..standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ..standard.objects import Index, PDO_COUNT_MAX
 from . import scalars
 from .device_keys import SDO_KEYS
@@ -136,12 +136,13 @@ def _check_purpose(index: int, subindex: int) -> None:
     for first, name in PDO_OBJECTS:
         if first <= index < first + PDO_COUNT_MAX:
             raise RefusedError(
-                f'0x{index:04X} configures a PDO, and the master would not know of it',
+                f'{object_address(index)} configures a PDO, and the master would not know of it',
                 f'set it below {name}: {index - first + 1}:',
             )
     if key := OWN_KEYS.get((index, subindex)):
         raise RefusedError(
-            f'0x{index:04X} is written by the master, which has to know it', f'set {key} instead'
+            f'{object_address(index)} is written by the master, which has to know it',
+            f'set {key} instead',
         )
 
 
@@ -157,7 +158,7 @@ def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> Objec
     others = ', '.join(str(other.subindex) for other in dictionary.subindices(index))
     hint = f'; its sub-indices are {others}' if others else ''
     raise RefusedError(
-        f'object 0x{index:04X}:{subindex:02X} is not in the EDS {dictionary.source}',
+        f'object {object_address(index, subindex)} is not in the EDS {dictionary.source}',
         f'correct index and sub_index{hint}, or use the EDS that fits the device',
     )
 

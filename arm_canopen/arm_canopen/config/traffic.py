@@ -135,7 +135,7 @@ def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float
     master = subject.bus.master
     if direction is not TPDO:
         if not subject.node.is_drive:
-            return 0.0, 'when ~/tpdo publishes it'
+            return 0.0, 'when a value is sent'
         return 1 / master.cycle_period, 'every cycle'
     if pdo.transmission <= SYNCHRONOUS_MAX:
         if not master.sync_period:

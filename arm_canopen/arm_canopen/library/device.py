@@ -12,7 +12,7 @@ from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.status import node_status, NodeStatus
 from ..standard.datatypes import decode, encode, Value
-from ..standard.dictionary import ObjectEntry
+from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.nmt import NmtCommand
 
 
@@ -116,4 +116,4 @@ class CanopenDevice:
 
 
 def _path(target: int | str, subindex: int) -> str:
-    return target if isinstance(target, str) else f'0x{target:04X}:{subindex:02X}'
+    return target if isinstance(target, str) else object_address(target, subindex)

@@ -195,7 +195,7 @@ class BootProcess:
                 f'{node.name} (node {node.config.node_id}) is to be kept alive '
                 '(reset_communication: false), but does not send its NMT state: neither by a '
                 'heartbeat nor as an answer to node guarding; it is left alone. Reset it by '
-                '~/nmt_reset_node, or give it a heartbeat'
+                'NMT, or give it a heartbeat'
             ) from None
         return node.nmt_state is NmtState.OPERATIONAL
 
@@ -211,8 +211,8 @@ class BootProcess:
         if differences:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) runs with other PDOs: '
-                f'{"; ".join(differences)}; it is left alone. Reset it by ~/nmt_reset_node to '
-                'have it configured'
+                f'{"; ".join(differences)}; it is left alone. Reset it by NMT to have it '
+                'configured'
             )
         await preset_outputs(node)
         reason = f' ({BootFault.RUNNING})' if node.nmt_state is NmtState.OPERATIONAL else ''

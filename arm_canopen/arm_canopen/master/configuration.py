@@ -18,6 +18,7 @@ from ..config.boot_plan import (
 )
 from ..config.model import BusConfig, SdoWrite
 from ..exceptions import SdoAbortError, SdoError
+from ..standard.dictionary import object_address
 from ..standard.objects import Index, PDO_COUNT_MAX
 from .events import EventKind, Severity
 from .remote_node import RemoteNode
@@ -109,7 +110,7 @@ class Configurator:
         Raises:
             SdoError: The device refused, or does not answer.
         """
-        self._on_write(f'0x{write.index:04X}:{write.subindex:02X}')
+        self._on_write(object_address(write.index, write.subindex))
         address, repeat = (write.index, write.subindex), write.index not in ONCE
         await self._node.sdo.write(*address, write.data, self._sdo_timeout, repeat=repeat)
 

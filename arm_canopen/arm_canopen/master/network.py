@@ -17,6 +17,7 @@ from ..can.frame import Frame
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..standard.cob_id import CAN_ID_MASK, CobId
+from ..standard.dictionary import object_address
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
 from ..standard.pdo import Number
 from .boot_manager import BootManager
@@ -266,7 +267,7 @@ class Network:
         return self._nmt.send(command, node_id)
 
     def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
-        """Send an object by the RPDOs that carry it, for ``~/tpdo``.
+        """Send an object by the RPDOs that carry it.
 
         An event-driven RPDO leaves at once, one that waits for SYNC with the next cycle, and those
         of a drive in every cycle anyway.
@@ -279,7 +280,7 @@ class Network:
             raise CanopenError(f'{what} is not operational, so no RPDO is sent')
         outputs = node.image.store(index, subindex, value)
         if not outputs:
-            raise CanopenError(f'0x{index:04X}:{subindex:02X} is in no RPDO of {node.name}')
+            raise CanopenError(f'{object_address(index, subindex)} is in no RPDO of {node.name}')
         for output in outputs:
             if output.cyclic or output.synchronous:
                 output.due = True

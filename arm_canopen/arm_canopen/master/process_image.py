@@ -17,6 +17,7 @@ from ..config.model import PdoConfig
 from ..config.tpdo_freshness import longest_silence, loss_unnoticed
 from ..exceptions import CodecError
 from ..standard.datatypes import DataType, integer_range
+from ..standard.dictionary import object_address
 from ..standard.pdo import MappedObject, Number, PdoCodec, SYNCHRONOUS_MAX
 from .scheduler import completed, Promise
 
@@ -321,7 +322,7 @@ class OutputWriter:
         if not self._low <= value <= self._high:
             mapped = self._mapped
             raise CodecError(
-                f'0x{mapped.index:04X}:{mapped.subindex:02X} cannot hold {value} '
+                f'{object_address(mapped.index, mapped.subindex)} cannot hold {value} '
                 f'({mapped.data_type.name}: {self._low:g} to {self._high:g})'
             )
         for values, position in self._places:

@@ -13,7 +13,7 @@ from ..config.model import NodeConfig
 from ..config.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
 from ..exceptions import CodecError, DriveError, SdoError
 from ..standard.datatypes import DataType, decode, encode, Value
-from ..standard.dictionary import ObjectEntry
+from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import find_object
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, SdoWriter
@@ -121,9 +121,9 @@ class RemoteObjects:
         entry = self.config.dictionary.get(index, subindex)
         if entry is None:
             raise SdoError(
-                f'{self.name} has no object 0x{index:04X}:{subindex:02X} in '
-                f'{self.config.eds.name}; the services of the master node, whose requests name '
-                'the data type, reach it all the same'
+                f'{self.name} has no object {object_address(index, subindex)} in '
+                f'{self.config.eds.name}; add it to the EDS, or access it by a request that names '
+                'the data type'
             )
         return entry
 
@@ -135,8 +135,8 @@ class RemoteObjects:
         """
         if index in self.config.commanded_indices:
             raise DriveError(
-                f'0x{index:04X} of {self.name} is written by its driver in each cycle; use the '
-                'services or methods of the drive'
+                f'{object_address(index)} of {self.name} is written by its driver in each cycle; '
+                'use the commands of the drive'
             )
 
     def limits(self, index: int, subindex: int = 0) -> Limits:

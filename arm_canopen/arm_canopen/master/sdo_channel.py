@@ -11,6 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 from ..can.frame import Frame
 from ..exceptions import CodecError, SdoAbortError, SdoTimeoutError
 from ..standard.cob_id import CobId
+from ..standard.dictionary import object_address
 from ..standard.sdo import (
     Abort,
     decode_response,
@@ -260,4 +261,4 @@ def _ends_of_waits(timeout: float, *, repeat: bool) -> Iterator[float]:
 
 def _place(address: Address) -> str:
     index, subindex = address
-    return f'object 0x{index:04X}:{subindex:02X}'
+    return f'object {object_address(index, subindex)}'

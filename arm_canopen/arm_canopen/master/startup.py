@@ -118,7 +118,7 @@ class Startup:
         elif self._config.stop_all_nodes:
             self._report_error(
                 f'{node.name} is mandatory and lost: all devices are stopped; start them by '
-                '~/nmt_start_node when it is back'
+                'NMT when it is back'
             )
             self._send_nmt(NmtCommand.STOP, ALL_NODES)
         else:

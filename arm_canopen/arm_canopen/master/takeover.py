@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ..exceptions import BootError, CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode
+from ..standard.dictionary import object_address
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
 from ..standard.pdo import MappedObject, Number
@@ -104,4 +105,4 @@ async def _present(node: RemoteNode, mapped: MappedObject, timeout: float) -> Nu
 
 
 def _place(mapped: MappedObject) -> str:
-    return f'0x{mapped.index:04X}:{mapped.subindex:02X}'
+    return object_address(mapped.index, mapped.subindex)

@@ -24,6 +24,7 @@ from ..master.process_image import ReceivedTpdo
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
+from ..standard.dictionary import object_address
 from ..standard.nmt import NmtCommand, NmtState
 from .deferred_service import DeferredServices
 from .object_services import ObjectServices
@@ -155,7 +156,7 @@ class DeviceNode(Node):
         except CanopenError as error:
             self.get_logger().warning(f'~/tpdo: {error}')
             return
-        place = f'0x{message.index:04X}:{message.subindex:02X}'
+        place = object_address(message.index, message.subindex)
         mapped = self.device.image.mapped_output(message.index, message.subindex)
         if mapped is None:
             self.get_logger().warning(f'~/tpdo: {place} is in no RPDO of the device; map it')

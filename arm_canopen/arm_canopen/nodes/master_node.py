@@ -17,6 +17,7 @@ from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.datatypes import byte_length, DataType
+from ..standard.dictionary import object_address
 from ..standard.nmt import ALL_NODES, NmtCommand
 from .deferred_service import DeferredServices
 from .device_node import answer_read, answer_write
@@ -69,8 +70,8 @@ class MasterServices:
             data = await client.read(request.index, request.subindex, SDO_TIMEOUT)
             if len(data) != byte_length(data_type):
                 raise CanopenError(
-                    f'0x{request.index:04X}:{request.subindex:02X} of node {request.nodeid} has '
-                    f'{len(data)} bytes, {data_type.name} has {byte_length(data_type)}'
+                    f'{object_address(request.index, request.subindex)} of node {request.nodeid} '
+                    f'has {len(data)} bytes, {data_type.name} has {byte_length(data_type)}'
                 )
             return raw_from_bytes(data)
 

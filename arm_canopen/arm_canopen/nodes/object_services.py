@@ -15,7 +15,7 @@ from ..config.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
-from ..standard.dictionary import ObjectEntry
+from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import object_path
 
 Transfer = tuple[ObjectEntry, bytes]
@@ -88,6 +88,6 @@ class ObjectServices:
             return
         response.index, response.subindex = entry.address
         written = text_from_bytes(entry.data_type, data)
-        address = f'0x{entry.index:04X}:{entry.subindex:02X}'
+        address = object_address(entry.index, entry.subindex)
         response.success = True
         response.message = f'{address} {object_path(entry)} = {written}'

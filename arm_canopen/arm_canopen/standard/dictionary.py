@@ -11,6 +11,19 @@ from enum import Enum, IntEnum
 from .datatypes import DataType, Value
 
 
+def object_address(index: int, subindex: int | None = None) -> str:
+    """Return an object as every message names it.
+
+    Args:
+        index: Object index.
+        subindex: Sub-index, None for the object as a whole.
+
+    Returns:
+        ``0x607D:02``, or ``0x607D`` for the whole.
+    """
+    return f'0x{index:04X}' if subindex is None else f'0x{index:04X}:{subindex:02X}'
+
+
 class AccessType(Enum):
     """Who may read or write an object (CiA 306-1, AccessType)."""
 
@@ -102,7 +115,7 @@ class ObjectEntry:
 
     def __str__(self) -> str:
         """Name the object as a person would: ``0x6041:00 Statusword``."""
-        return f'0x{self.index:04X}:{self.subindex:02X} {self.name}'
+        return f'{object_address(self.index, self.subindex)} {self.name}'
 
 
 class ObjectDictionary:

@@ -17,7 +17,7 @@ import difflib
 import re
 
 from ..exceptions import ObjectError
-from .dictionary import ObjectDictionary, ObjectEntry
+from .dictionary import object_address, ObjectDictionary, ObjectEntry
 
 NUMBER = re.compile(r'(?:0x)?([0-9a-f]{4})(?::(?:0x)?([0-9a-f]{1,2}))?', re.IGNORECASE)
 SIMILAR_MAX = 4
@@ -53,9 +53,11 @@ def _by_number(dictionary: ObjectDictionary, index: int, subindex: int) -> Objec
         return entry
     others = dictionary.subindices(index)
     if not others:
-        raise ObjectError(f'there is no object 0x{index:04X} in {dictionary.source}')
+        raise ObjectError(f'there is no object {object_address(index)} in {dictionary.source}')
     names = ', '.join(str(other) for other in others)
-    raise ObjectError(f'0x{index:04X} has no sub-index 0x{subindex:02X}; it has: {names}')
+    raise ObjectError(
+        f'{object_address(index)} has no sub-index 0x{subindex:02X}; it has: {names}'
+    )
 
 
 def _by_name(dictionary: ObjectDictionary, path: str) -> ObjectEntry:
@@ -93,6 +95,8 @@ def _begins(name: str, wanted: str) -> bool:
 
 
 def _listed(entries: list[ObjectEntry]) -> str:
-    shown = [f'0x{e.index:04X}:{e.subindex:02X} {object_path(e)}' for e in entries[:SIMILAR_MAX]]
+    shown = [
+        f'{object_address(e.index, e.subindex)} {object_path(e)}' for e in entries[:SIMILAR_MAX]
+    ]
     more = len(entries) - len(shown)
     return ', '.join(shown) + (f' and {more} more' if more else '')

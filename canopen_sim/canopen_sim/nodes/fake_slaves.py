@@ -27,7 +27,7 @@ example:
 
 parameters:
   bus_config          bus.yml whose devices are simulated (required)
-  positions.<drive>   where a drive stands at power-on in the units of bus.yml [rad or m], as an
+  positions.<drive>   where a drive stands at the start in the units of bus.yml [rad or m], as an
                       absolute encoder reports it (default: 0 increments)
 """
 

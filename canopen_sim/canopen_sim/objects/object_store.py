@@ -21,7 +21,7 @@ from arm_canopen.standard.datatypes import (
     REAL_FORMATS,
     Value,
 )
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from arm_canopen.standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from arm_canopen.standard.pdo import Number
 from arm_canopen.standard.sdo_abort import abort_text, AbortCode
 
@@ -200,7 +200,7 @@ class ObjectStore:
             return variable
         known = self.dictionary.has_index(index)
         code = AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT
-        raise refusal(code, f'0x{index:04X}:{subindex:02X}')
+        raise refusal(code, object_address(index, subindex))
 
     def integer(self, index: int, subindex: int = 0, *, default: int = 0) -> Integer:
         """Bind an integer object, for the device's own use.

@@ -80,7 +80,7 @@ def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None
     assert net.drives[Y].view.state is DriveState.FAULT
     assert net.drives[X].view.state is DriveState.OPERATION_ENABLED
     assert any('table_y: FAULT' in text for text in net.reported())
-    with pytest.raises(DriveError, match='table_y takes no target; call ~/recover'):
+    with pytest.raises(DriveError, match='table_y takes no target; recover it'):
         net.commands[Y].set_target(0.1)
     net.commands[X].set_target(0.3)
     net.run(2.0)

@@ -112,7 +112,7 @@ def test_a_device_with_other_pdos_is_left_alone() -> None:
     assert network.net.frames(0x205) == []
     (reported,) = network.net.reported(Severity.WARNING)
     assert '0x1A00:02 is 0x606C0020 instead of 0x60640020' in reported
-    assert '~/nmt_reset_node' in reported
+    assert 'Reset it by NMT' in reported
     network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     network.net.run(3.0)
     assert network.net.network.nodes[NODE].online

@@ -25,7 +25,7 @@ from arm_canopen.config.shared_keys import (
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
 from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType
+from arm_canopen.standard.dictionary import AccessType, object_address
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
 from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
 from arm_canopen.standard.pdo import MappedObject
@@ -241,7 +241,7 @@ def _mirrored(
 
 def _value(node: NodeConfig, mapped: MappedObject, access: AccessType) -> DcfEntry:
     entry = node.dictionary.get(mapped.index, mapped.subindex)
-    name = entry.name if entry is not None else f'0x{mapped.index:04X}:{mapped.subindex:02X}'
+    name = entry.name if entry is not None else object_address(mapped.index, mapped.subindex)
     return DcfEntry(f'{node.name}: {name}', mapped.data_type, access, mappable=True)
 
 

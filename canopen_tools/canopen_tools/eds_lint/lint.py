@@ -18,7 +18,12 @@ from arm_canopen.config.findings import Findings, Place
 from arm_canopen.exceptions import ConfigError, Problem
 from arm_canopen.standard.datatypes import bit_length
 from arm_canopen.standard.device_profile import is_drive
-from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
+from arm_canopen.standard.dictionary import (
+    AccessType,
+    object_address,
+    ObjectDictionary,
+    ObjectEntry,
+)
 from arm_canopen.standard.objects import Index
 
 from .lists import check_info, check_lists
@@ -86,8 +91,7 @@ class _Linter:
             if address not in self._dictionary:
                 self._findings.error(
                     Place(self._path),
-                    f'0x{address[0]:04X}:{address[1]:02X} ({title}) is missing; every device has '
-                    'it',
+                    f'{object_address(*address)} ({title}) is missing; every device has it',
                     'add it, or request from the vendor a complete file',
                 )
         indices = dict.fromkeys(entry.index for entry in self._dictionary)
@@ -107,7 +111,7 @@ class _Linter:
             return
         first = entries[0]
         if first.subindex != 0:
-            self._add_error(first, '', f'0x{index:04X} has no sub-index 0', 'add it')
+            self._add_error(first, '', f'{object_address(index)} has no sub-index 0', 'add it')
             return
         count = first.default
         if not isinstance(count, int) or any(index in indices for indices in COUNTED_BY_USE):

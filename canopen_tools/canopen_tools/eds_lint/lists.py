@@ -10,7 +10,7 @@ from arm_canopen.config.eds_ini import IniFile, IniSection
 from arm_canopen.config.eds_values import parse_integer
 from arm_canopen.config.findings import Findings, Place
 from arm_canopen.config.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.dictionary import object_address, ObjectDictionary
 from arm_canopen.standard.objects import Index
 
 MANDATORY_INDICES = (Index.DEVICE_TYPE, Index.ERROR_REGISTER, Index.IDENTITY)
@@ -98,13 +98,13 @@ def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:
             if index in seen:
                 findings.warning(
                     place,
-                    f'0x{index:04X} is listed a second time, first in [{seen[index]}]',
+                    f'{object_address(index)} is listed a second time, first in [{seen[index]}]',
                     'remove it',
                 )
             elif proper_list(index) != title:
                 findings.warning(
                     place,
-                    f'0x{index:04X} does not belong here',
+                    f'{object_address(index)} does not belong here',
                     f'move it to [{proper_list(index)}]',
                 )
             seen.setdefault(index, title)

@@ -10,7 +10,7 @@ from arm_canopen.config.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.pdo_mapping import eds_mapping
 from arm_canopen.config.pdo_resolution import PREDEFINED_MAX
 from arm_canopen.standard.cob_id import COB_ID_INVALID
-from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard.dictionary import object_address, ObjectEntry
 
 
 def check_pdo_objects(eds: Eds, findings: Findings) -> None:
@@ -29,8 +29,8 @@ def check_pdo_objects(eds: Eds, findings: Findings) -> None:
             if not eds.dictionary.has_index(index):
                 findings.error(
                     Place(eds.path, key=f'[{index:04X}]'),
-                    f'{direction.title} {number} has a mapping (0x{mapping:04X}), but no '
-                    f'communication parameter 0x{index:04X}',
+                    f'{direction.title} {number} has a mapping ({object_address(mapping)}), but '
+                    f'no communication parameter {object_address(index)}',
                     'add it',
                 )
 
@@ -69,7 +69,7 @@ def _check_mapping(eds: Eds, direction: Direction, number: int, findings: Findin
     if not entries:
         findings.error(
             Place(eds.path, key=f'[{index:04X}]'),
-            f'{direction.title} {number} has no mapping: 0x{index:04X} is missing',
+            f'{direction.title} {number} has no mapping: {object_address(index)} is missing',
             'add it',
         )
         return

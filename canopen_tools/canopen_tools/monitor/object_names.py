@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen.standard.dictionary import object_address, ObjectDictionary
 from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
 
 _PDO_RECORDS: tuple[tuple[Index, str], ...] = (
@@ -33,7 +33,7 @@ class ObjectNames:
 
     def title(self, index: int, subindex: int) -> str:
         """Return address and name, e.g. ``0x6041:00 Statusword``."""
-        return f'0x{index:04X}:{subindex:02X} {self.name(index, subindex)}'.rstrip()
+        return f'{object_address(index, subindex)} {self.name(index, subindex)}'.rstrip()
 
     def data_type(self, index: int, subindex: int) -> DataType | None:
         """Return the type of an object, None when it is unknown."""

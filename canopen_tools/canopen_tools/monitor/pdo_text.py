@@ -7,6 +7,7 @@ from __future__ import annotations
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import NodeConfig, PdoConfig
 from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.dictionary import object_address
 from arm_canopen.standard.pdo import PdoCodec
 
 from .description import Description, FrameKind
@@ -31,7 +32,7 @@ class PdoDescriber:
         self._node_id = node.node_id
         self._codec = PdoCodec(pdo.mapping)
         self._titles = [
-            names.name(entry.index, entry.subindex) or f'0x{entry.index:04X}:{entry.subindex:02X}'
+            names.name(entry.index, entry.subindex) or object_address(entry.index, entry.subindex)
             for entry in pdo.mapping
         ]
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
 from arm_canopen.standard.datatypes import byte_length, DataType, decode, Value
+from arm_canopen.standard.dictionary import object_address
 from arm_canopen.standard.drive import Controlword, drive_state, mode_title
 from arm_canopen.standard.emcy import error_code_text, error_register_text
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
@@ -80,7 +81,7 @@ def _cob_id_text(cob_id: int) -> str:
 
 
 def _mapping_text(word: int) -> str:
-    return f'0x{word >> 16:04X}:{word >> 8 & 0xFF:02X} ({word & 0xFF} bit)'
+    return f'{object_address(word >> 16, word >> 8 & 0xFF)} ({word & 0xFF} bit)'
 
 
 def _hex_text(number: int) -> str:
