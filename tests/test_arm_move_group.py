@@ -19,9 +19,11 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.srv import (
     ApplyPlanningScene,
+    GetCartesianPath,
     GetMotionPlan,
     GetPlanningScene,
     GetPositionFK,
+    GetPositionIK,
     GetStateValidity,
     QueryPlannerInterfaces,
 )
@@ -69,6 +71,7 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         _back_to_ready(arm)
         _plans_for_move_group_interface(arm)
         _plans_and_executes_for_pymoveit2(arm)
+        _solves_and_follows_lines(arm)
         _cancels_a_move(arm)
         _says_why_no_plan(arm)
 
@@ -316,6 +319,32 @@ def _plans_and_executes_for_pymoveit2(arm: MovingArm) -> None:
     goal = ExecuteTrajectory.Goal(trajectory=answer.trajectory)
     status, result = ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal).wait()
     assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+
+
+def _solves_and_follows_lines(arm: MovingArm) -> None:
+    """compute_ik from the present state, and a Cartesian path there that is executed."""
+    fk = GetPositionFK.Request(fk_link_names=['panda_link8'])
+    here = arm.client.call(GetPositionFK, '/compute_fk', fk).pose_stamped[0]
+    here.pose.position.z -= 0.05
+    ik = GetPositionIK.Request()
+    ik.ik_request.group_name, ik.ik_request.pose_stamped = 'panda_arm', here
+    ik.ik_request.avoid_collisions = True
+    solved = arm.client.call(GetPositionIK, '/compute_ik', ik)
+    assert solved.error_code.val == MoveItErrorCodes.SUCCESS, solved.error_code.message
+    assert 'panda_joint7' in solved.solution.joint_state.name
+    asked = GetCartesianPath.Request(group_name='panda_arm', max_step=0.01)
+    asked.header.frame_id, asked.waypoints = 'panda_link0', [here.pose]
+    asked.avoid_collisions, asked.start_state.is_diff = True, True
+    line = arm.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+    assert line.fraction == 1.0, line.error_code.message
+    status, result = execute(arm, line.solution).wait()
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+    there = arm.client.call(GetPositionFK, '/compute_fk', fk).pose_stamped[0].pose.position
+    assert there.z == pytest.approx(here.pose.position.z, abs=2e-3)
+    here.pose.position.z += 5.0
+    refused = arm.client.call(GetPositionIK, '/compute_ik', ik).error_code
+    assert refused.val == MoveItErrorCodes.NO_IK_SOLUTION
+    assert 'out of reach' in refused.message
 
 
 def _cancels_a_move(arm: MovingArm) -> None:

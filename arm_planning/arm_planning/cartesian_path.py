@@ -26,12 +26,15 @@ from arm_model import (
     Pose,
     RobotModel,
 )
+from arm_trajectory import Path, quintics, Segment
 
 from .curves import Line
 from .exceptions import PlanningCode, PlanningError
 from .ik.link_kinematics import LinkKinematics
 from .ik.numeric import descend
 from .ik.solver import check_pose
+from .industrial.ptp import standstill
+from .industrial.timing import FullSpeedPath, timed
 
 MIN_STEPS_FOR_JUMPS = 10
 """Steps of a path at least for which a jump is judged by the mean step, as in MoveIt."""
@@ -135,6 +138,39 @@ def cartesian_path(
     if reason:
         reason = f'the path ends at {fraction:.1%}: {reason}'
     return CartesianPath(frozen(positions), fraction, reason)
+
+
+def timed_rows(rows: Array, limits: JointLimits) -> Path:
+    """Return a jerk-limited path from rest to rest through joint positions.
+
+    It is smooth, so that it leaves the lines at their corners, by a quarter of a step at most.
+
+    Args:
+        rows: Joint positions in [rad] (k, n), as dense as the path is to be close to the lines.
+        limits: Limits of the joints, scaled.
+    """
+    steps = np.diff(rows, axis=0)
+    lasts = (np.abs(steps) / limits.velocity).max(axis=1)
+    moves = lasts > 0.0
+    if not moves.any():
+        return standstill(rows[0]).path
+    rows, steps, lasts = np.concatenate((rows[:1], rows[1:][moves])), steps[moves], lasts[moves]
+    slopes = steps / lasts[:, None]
+    around = (lasts[1:] + lasts[:-1])[:, None]
+    velocity = np.concatenate(
+        (slopes[:1], (slopes[:-1] * lasts[1:, None] + slopes[1:] * lasts[:-1, None]) / around)
+    )
+    velocity = np.concatenate((velocity, slopes[-1:]))
+    acceleration = np.zeros_like(velocity)
+    acceleration[1:-1] = 2.0 * np.diff(slopes, axis=0) / around
+    starts = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
+    pieces = quintics(lasts, rows, velocity, acceleration)
+    path = Path(
+        [Segment(*each) for each in zip(starts.tolist(), lasts.tolist(), pieces, strict=True)]
+    )
+    most = float((limits.acceleration / limits.velocity).min())
+    jerk = float((limits.jerk / limits.velocity).min())
+    return timed(FullSpeedPath(path, most, jerk), limits)[0]
 
 
 class _Follower:

@@ -26,6 +26,7 @@ from node_runner import (
 from ..ros.background import Background
 from ..ros.execute_action import ExecuteAction
 from ..ros.execution import ExecutionLimits, TrajectoryExecution
+from ..ros.kinematic_services import KinematicServices
 from ..ros.move_action import MoveAction
 from ..ros.planning import PlanningThread
 from ..ros.robot_groups import RobotGroups
@@ -69,7 +70,9 @@ class MoveGroup(Node):
         semantic.publish(String(data=description.srdf))
         monitor = SceneMonitor(self, robot)
         self._queries = Background(self, 'queries')
-        StateServices(self, monitor, self._queries, _robot(description))
+        queried = _robot(description)
+        StateServices(self, monitor, self._queries, queried)
+        KinematicServices(self, monitor, self._queries, queried)
         execution = TrajectoryExecution(self, controllers, monitor.received, limits)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')

@@ -50,7 +50,11 @@ PIPELINES: Mapping[str, str] = {'': '', OMPL: '', PILZ: 'PTP'}
 
 
 class RequestReader:
-    """Reads requests of one group in one scene, with the robot at one place."""
+    """Reads requests of one group in one scene, with the robot at one place.
+
+    Attributes:
+        start: Where the joints of the group are in [rad].
+    """
 
     def __init__(self, model: RobotModel, snapshot: SceneSnapshot, positions: Array) -> None:
         """Read for a group.
@@ -62,7 +66,7 @@ class RequestReader:
         """
         self._model, self._snapshot, self._positions = model, snapshot, positions
         place = dict(zip(snapshot.scene.kinematics.joints, positions.tolist(), strict=True))
-        self._start = frozen([place[name] for name in model.joints])
+        self.start = frozen([place[name] for name in model.joints])
 
     def request(self, message: Any) -> MotionRequest:  # noqa: ANN401  # messages have no type
         """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is.
@@ -83,11 +87,13 @@ class RequestReader:
         via = self._via(message.path_constraints)
         constraints = None if via else self.constraints(message.path_constraints)
         return MotionRequest(
-            start=self._start,
+            start=self.start,
             goals=tuple(self.goal(each) for each in message.goal_constraints),
             planner_id=message.planner_id or PIPELINES[message.pipeline_id],
-            velocity_scaling=_factor('velocity', message.max_velocity_scaling_factor),
-            acceleration_scaling=_factor('acceleration', message.max_acceleration_scaling_factor),
+            velocity_scaling=scaling_factor('velocity', message.max_velocity_scaling_factor),
+            acceleration_scaling=scaling_factor(
+                'acceleration', message.max_acceleration_scaling_factor
+            ),
             timeout=message.allowed_planning_time or DEFAULT_TIMEOUT,
             attempts=max(message.num_planning_attempts, 1),
             constraints=constraints,
@@ -169,7 +175,7 @@ class RequestReader:
     def _joint_goal(self, messages: Sequence[Any]) -> JointGoal:
         ranges = self._joint_ranges(messages)
         wanted = {each.joint_name: each.position for each in messages}
-        positions, tolerance = np.array(self._start), np.zeros(len(self._start))
+        positions, tolerance = np.array(self.start), np.zeros(len(self.start))
         for place, name in enumerate(self._model.joints):
             if name in ranges:
                 lower, upper = ranges[name]
@@ -305,8 +311,16 @@ class RequestReader:
         return CircPoint(kinds[0], frozen(point))
 
 
-def _factor(what: str, value: float) -> float:
-    """Return a scaling factor; 0 is one that was not given."""
+def scaling_factor(what: str, value: float) -> float:
+    """Return a scaling factor; 0 is one that was not given.
+
+    Args:
+        what: Velocity or acceleration.
+        value: The factor of the message.
+
+    Raises:
+        PlanningError: It is negative, or above 1.
+    """
     if not 0.0 <= value <= 1.0:
         raise PlanningError(
             PlanningCode.FAILURE,

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a state heeds constraints of joints, orientations and positions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from arm_model import (
+    Array,
+    Box,
+    combined,
+    Cone,
+    Cylinder,
+    inverse,
+    ORIGIN,
+    PlacedShape,
+    Pose,
+    RobotModel,
+    Sphere,
+)
+
+from .exceptions import PlanningCode, PlanningError
+from .ik.link_kinematics import LinkKinematics, pose_error
+from .requests import OrientationConstraint, PathConstraints, PositionConstraint
+
+TOLERANCE = 1e-6
+"""Rounding beyond a constraint that is let pass in [rad] and [m]."""
+
+
+class ConstraintCheck:
+    """Looks at states of one arm; belongs to one thread."""
+
+    def __init__(self, model: RobotModel, constraints: PathConstraints) -> None:
+        """Prepare.
+
+        Args:
+            model: The arm.
+            constraints: What must hold.
+
+        Raises:
+            PlanningError: A link is unknown, or no joint moves it.
+        """
+        self._joints = tuple(model.joints)
+        self._constraints = constraints
+        names = {each.link for each in constraints.orientations}
+        names |= {each.link for each in constraints.positions}
+        self._links = {name: LinkKinematics(model, name) for name in names}
+
+    def violated(self, positions: Array) -> str:
+        """Return what a state violates, in words; empty for nothing.
+
+        Args:
+            positions: Joint positions in [rad] (n).
+        """
+        place = dict(zip(self._joints, positions.tolist(), strict=True))
+        for name, (lower, upper) in self._constraints.joints.items():
+            if not lower - TOLERANCE <= place[name] <= upper + TOLERANCE:
+                return (
+                    f'{name} is at {place[name]:.4f}, its constraint is {lower:.4f}..{upper:.4f}'
+                )
+        poses = {name: link.pose(positions) for name, link in self._links.items()}
+        for turn in self._constraints.orientations:
+            if off := _turned(turn, poses[turn.link]):
+                return off
+        for point in self._constraints.positions:
+            if off := _outside(point, poses[point.link]):
+                return off
+        return ''
+
+
+def _turned(constraint: OrientationConstraint, pose: Pose) -> str:
+    wanted = Pose(constraint.rotation, pose.position)
+    # the rotation vector about the axes that are wanted
+    off = np.abs(constraint.rotation.T @ pose_error(wanted, pose)[3:])
+    if (off <= constraint.tolerance + TOLERANCE).all():
+        return ''
+    angles = ', '.join(f'{each:.3f}' for each in off.tolist())
+    allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
+    return f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed'
+
+
+def _outside(constraint: PositionConstraint, pose: Pose) -> str:
+    point = pose.position + pose.rotation @ constraint.offset
+    if _holds(constraint.region, point):
+        return ''
+    x, y, z = point.tolist()
+    return f'link {constraint.link} is outside of its region, at ({x:.3f}, {y:.3f}, {z:.3f})'
+
+
+def _holds(region: PlacedShape, point: Array) -> bool:
+    """Return whether a region holds a point of the root link."""
+    in_region = combined(inverse(region.pose), Pose(ORIGIN.rotation, point)).position
+    height = float(in_region[2])
+    aside = float(np.hypot(in_region[0], in_region[1]))
+    match region.shape:
+        case Box(x, y, z):
+            return bool((np.abs(in_region) <= 0.5 * np.array([x, y, z]) + TOLERANCE).all())
+        case Sphere(radius):
+            return float(np.linalg.norm(in_region)) <= radius + TOLERANCE
+        case Cylinder(radius, length):
+            return aside <= radius + TOLERANCE and abs(height) <= 0.5 * length + TOLERANCE
+        case Cone(radius, length):
+            # its tip is above its middle
+            at_height = radius * (0.5 - height / length)
+            return aside <= at_height + TOLERANCE and abs(height) <= 0.5 * length + TOLERANCE
+    raise PlanningError(
+        PlanningCode.INVALID_GOAL_CONSTRAINTS,
+        f'the region of a position constraint is a {type(region.shape).__name__}; use a box,'
+        ' sphere, cylinder or cone',
+    )

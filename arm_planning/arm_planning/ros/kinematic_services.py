@@ -1,0 +1,241 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Services of inverse kinematics: compute_ik and compute_cartesian_path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.srv import GetCartesianPath, GetPositionIK
+from rclpy.node import Node
+
+from arm_model import Array, CommandError, JointLimits, PlanningScene, RobotModel
+from arm_model.ros import seconds
+from arm_trajectory import Path
+
+from ..cartesian_path import cartesian_path, JumpThresholds, timed_rows
+from ..constraints import ConstraintCheck
+from ..exceptions import PlanningCode, PlanningError
+from ..ik.link_kinematics import LinkKinematics
+from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
+from ..industrial.limits import scaled
+from ..link_speed import speed_limited
+from ..validity import ValidityCheck
+from .background import Background, error_code
+from .motion_request import RequestReader, scaling_factor
+from .robot_groups import RobotGroups
+from .robot_state import state_message, trajectory_message
+from .scene_changes import scene_for
+from .scene_monitor import SceneMonitor
+from .scene_snapshot import SceneSnapshot
+
+CANDIDATES = 8
+"""Solutions of inverse kinematics among which one that heeds constraints is looked for."""
+
+
+class KinematicServices:
+    """Answers in a thread of its own, with a robot of its own."""
+
+    def __init__(
+        self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
+    ) -> None:
+        """Offer the services.
+
+        Args:
+            node: The node.
+            monitor: The scene and where the joints are.
+            background: The thread.
+            robot: The robot, for that thread alone.
+        """
+        self._node, self._monitor = node, monitor
+        self._kinematics = GroupKinematics(robot)
+        background.serve(GetPositionIK, 'compute_ik', self._ik, _refuse)
+        background.serve(
+            GetCartesianPath, 'compute_cartesian_path', self._cartesian_path, _refuse_path
+        )
+
+    def _ik(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401  # messages have no type
+        asked = request.ik_request
+        return self._prepared(self._kinematics.ik, asked, asked.robot_state)
+
+    def _cartesian_path(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
+        return self._prepared(self._kinematics.cartesian_path, request, request.start_state)
+
+    def _prepared(self, answer: Any, request: Any, state: Any) -> Callable[[], Any]:  # noqa: ANN401
+        """Return what answers from the scene and the joints as they are now."""
+        positions = self._monitor.positions(state)
+        joints = self._monitor.robot.model(request.group_name).joints
+        self._monitor.check_received(joints, state.joint_state.name)
+        snapshot = self._monitor.start_scene(state, positions)
+        stamp = self._node.get_clock().now().to_msg()
+
+        def stamped() -> Any:  # noqa: ANN401
+            response, message = answer(request, snapshot, positions)
+            message.joint_state.header.stamp = stamp
+            return response
+
+        return stamped
+
+
+class GroupKinematics:
+    """Answers of one robot; belongs to one thread."""
+
+    def __init__(self, robot: RobotGroups) -> None:
+        """Solve nothing yet.
+
+        Args:
+            robot: The robot, for this thread alone.
+        """
+        self._robot = robot
+        self._solvers: dict[tuple[str, str], IkSolver] = {}
+
+    def ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
+        """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state.
+
+        Args:
+            request: The request.
+            snapshot: The scene.
+            positions: Positions of all joints of the robot in [rad], of which it begins.
+
+        Raises:
+            PlanningError: There is no solution, or the request is refused.
+        """
+        model = self._robot.model(request.group_name)
+        reader = RequestReader(model, snapshot, positions)
+        name, stamped = _one_pose(request)
+        pose = reader.pose(stamped.pose, stamped.header.frame_id, 'pose_stamped')
+        link, pose = reader.on_link(pose, name)
+        constraints = reader.constraints(request.constraints)
+        scene = scene_for(snapshot, model.scene) if request.avoid_collisions else None
+        timeout = seconds(request.timeout) or DEFAULT_TIMEOUT
+        solver = self._solver(model, link)
+        count = 1 if constraints is None else CANDIDATES
+        try:
+            found = solver.solve(pose, reader.start, scene, timeout, count)
+        except CommandError as error:
+            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
+        if constraints is not None:
+            found = _heeding(ConstraintCheck(model, constraints), found)
+        everywhere = {
+            **dict(zip(self._robot.joints, positions.tolist(), strict=True)),
+            **dict(zip(model.joints, found[0].tolist(), strict=True)),
+        }
+        solution = state_message(
+            self._robot.joints, self._robot.positions(everywhere), snapshot.root
+        )
+        return GetPositionIK.Response(solution=solution, error_code=error_code()), solution
+
+    def cartesian_path(
+        self,
+        request: Any,  # noqa: ANN401
+        snapshot: SceneSnapshot,
+        positions: Array,
+    ) -> tuple[Any, Any]:
+        """Return the GetCartesianPath.Response to a request, and its start state.
+
+        A path that ends early has the code SUCCESS, its fraction, and the reason as message.
+
+        Args:
+            request: The request.
+            snapshot: The scene.
+            positions: Positions of all joints of the robot in [rad], where it begins.
+
+        Raises:
+            PlanningError: The request is refused, or the path between its places is not valid.
+        """
+        model = self._robot.model(request.group_name)
+        reader = RequestReader(model, snapshot, positions)
+        frame = request.header.frame_id
+        on_links = [
+            reader.on_link(reader.pose(each, frame, f'way-point {number}'), request.link_name)
+            for number, each in enumerate(request.waypoints)
+        ]
+        link = on_links[0][0] if on_links else ''
+        constraints = reader.constraints(request.path_constraints)
+        check = None if constraints is None else ConstraintCheck(model, constraints)
+        scene = scene_for(snapshot, model.scene) if request.avoid_collisions else None
+        found = cartesian_path(
+            model,
+            reader.start,
+            [pose for _, pose in on_links],
+            request.max_step,
+            link=link,
+            jumps=JumpThresholds(
+                request.jump_threshold,
+                request.revolute_jump_threshold,
+                request.prismatic_jump_threshold,
+            ),
+            scene=scene,
+            is_valid=None if check is None else lambda state: not check.violated(state),
+        )
+        limits = scaled(
+            model.limits,
+            scaling_factor('velocity', request.max_velocity_scaling_factor),
+            scaling_factor('acceleration', request.max_acceleration_scaling_factor),
+        )
+        path = timed_rows(found.positions, limits)
+        if scene is not None:
+            _check_between(path, limits, scene)
+        speed_link = LinkKinematics(model, request.cartesian_speed_limited_link)
+        path, _ = speed_limited(path, speed_link, max(request.max_cartesian_speed, 0.0))
+        start = state_message(self._robot.joints, positions, snapshot.root)
+        response = GetCartesianPath.Response(
+            start_state=start,
+            solution=trajectory_message(model.joints, path, snapshot.root),
+            fraction=found.fraction,
+            error_code=error_code(reason=found.reason),
+        )
+        return response, start
+
+    def _solver(self, model: RobotModel, link: str) -> IkSolver:
+        key = model.group, link
+        if key not in self._solvers:
+            self._solvers[key] = IkSolver(model, link)
+        return self._solvers[key]
+
+
+def _one_pose(request: Any) -> tuple[str, PoseStamped]:  # noqa: ANN401
+    """Return link and pose of a moveit_msgs/PositionIKRequest."""
+    names, poses = request.ik_link_names, request.pose_stamped_vector
+    if not names and not poses:
+        return request.ik_link_name, request.pose_stamped
+    if len(names) != 1 or len(poses) != 1:
+        raise PlanningError(
+            PlanningCode.INVALID_LINK_NAME,
+            f'{len(names)} ik_link_names and {len(poses)} poses; the pose of one link of a group'
+            ' is solved, others in a request of their own',
+        )
+    return names[0], poses[0]
+
+
+def _heeding(check: ConstraintCheck, found: list[Array]) -> list[Array]:
+    """Return the solutions that heed constraints."""
+    heeding = [each for each in found if not check.violated(each)]
+    if not heeding:
+        raise PlanningError(
+            PlanningCode.NO_IK_SOLUTION,
+            f'{len(found)} solutions violate the constraints; in the nearest'
+            f' {check.violated(found[0])}',
+        )
+    return heeding
+
+
+def _check_between(path: Path, limits: JointLimits, scene: PlanningScene) -> None:
+    violation = ValidityCheck(limits, scene).path(path)
+    if violation is not None:
+        raise PlanningError(
+            PlanningCode.INVALID_MOTION_PLAN,
+            f'between two places of the path {violation.reason}; take a smaller max_step, or'
+            ' keep farther away',
+        )
+
+
+def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401
+    response.error_code = error_code(error.code, str(error))
+
+
+def _refuse_path(response: Any, error: PlanningError) -> None:  # noqa: ANN401
+    _refuse(response, error)
+    response.fraction = -1.0

@@ -1,0 +1,266 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""compute_ik and compute_cartesian_path: what is answered, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from moveit_msgs.msg import (
+    Constraints,
+    JointConstraint,
+    MoveItErrorCodes,
+    OrientationConstraint,
+    PositionConstraint,
+    PositionIKRequest,
+)
+from moveit_msgs.srv import GetCartesianPath
+import numpy as np
+from planning_messages import box, panda, pose_at
+import pytest
+from shape_msgs.msg import SolidPrimitive
+
+from arm_model import Array, frozen, ORIGIN, Pose
+from arm_planning import PlanningCode, PlanningError
+from arm_planning.ros.geometry import pose_message
+from arm_planning.ros.kinematic_services import GroupKinematics
+from arm_planning.ros.scene_changes import apply_object
+from arm_planning.ros.scene_snapshot import SceneSnapshot
+
+MODEL = panda().model('panda_arm')
+READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+PLACES = panda().positions(dict(zip(MODEL.joints, READY, strict=True)))
+SCENE = SceneSnapshot.of(panda().scene)
+KINEMATICS = GroupKinematics(panda())
+TIP = MODEL.kinematics.link_pose('panda_link8', frozen(READY))
+
+
+def moved(*way: float) -> Pose:
+    """Return the pose of the tip, moved."""
+    return Pose(TIP.rotation, frozen(TIP.position + np.array(way)))
+
+
+def ik_request(pose: Pose, **fields: Any) -> PositionIKRequest:
+    """Return a request for the tip."""
+    request = PositionIKRequest(group_name='panda_arm', **fields)
+    request.pose_stamped = PoseStamped(pose=pose_message(pose))
+    request.pose_stamped.header.frame_id = 'panda_link0'
+    request.timeout.nanosec = 500_000_000
+    return request
+
+
+def solved(request: PositionIKRequest, scene: SceneSnapshot = SCENE) -> Array:
+    """Return the joints of the arm that answer a request."""
+    response, _ = KINEMATICS.ik(request, scene, PLACES)
+    assert response.error_code.val == MoveItErrorCodes.SUCCESS
+    state = response.solution.joint_state
+    assert set(state.name) == set(panda().joints)
+    place = dict(zip(state.name, state.position, strict=True))
+    return frozen([place[name] for name in MODEL.joints])
+
+
+def refused(work: Any, *arguments: Any) -> PlanningError:
+    """Return why something is refused."""
+    with pytest.raises(PlanningError) as caught:
+        work(*arguments, SCENE, PLACES)
+    return caught.value
+
+
+def test_a_solution_has_the_pose() -> None:
+    """Of the tip, and of a link that is named alone or in the lists."""
+    wanted = moved(0.05, 0.1, -0.05)
+    single, listed = ik_request(wanted), ik_request(wanted, ik_link_names=['panda_link8'])
+    listed.pose_stamped_vector = [listed.pose_stamped]
+    for request in (single, ik_request(wanted, ik_link_name='panda_link8'), listed):
+        found = MODEL.kinematics.link_pose('panda_link8', solved(request))
+        assert found.position == pytest.approx(wanted.position, abs=1e-6)
+        assert found.rotation == pytest.approx(wanted.rotation, abs=1e-6)
+
+
+def test_a_pose_counts_in_its_frame() -> None:
+    """The hand of the robot is a frame as the root is."""
+    request = ik_request(Pose(ORIGIN.rotation, frozen([0.0, 0.0, -0.05])))
+    request.pose_stamped.header.frame_id = 'panda_link8'
+    found = MODEL.kinematics.link_pose('panda_link8', solved(request))
+    assert found.position == pytest.approx(TIP.position - 0.05 * TIP.rotation[:, 2], abs=1e-6)
+
+
+def test_collisions_are_avoided_where_that_is_asked() -> None:
+    """A box about the goal: no solution, with the name of the box."""
+    at = moved(0.1, 0.0, 0.0)
+    scene = apply_object(SCENE, box('crate', *at.position.tolist(), edge=0.1), PLACES)
+    solved(ik_request(at), scene)
+    with pytest.raises(PlanningError, match='crate') as caught:
+        KINEMATICS.ik(ik_request(at, avoid_collisions=True), scene, PLACES)
+    assert caught.value.code is PlanningCode.NO_IK_SOLUTION
+
+
+def joint_constraint(position: float, tolerance: float = 0.2) -> Constraints:
+    """Return a constraint of joint 1."""
+    limits = JointConstraint(joint_name='panda_joint1', position=position)
+    limits.tolerance_above = limits.tolerance_below = tolerance
+    return Constraints(joint_constraints=[limits])
+
+
+def region(y: float) -> Constraints:
+    """Return a constraint of the tip to a ball beside where it is."""
+    message = PositionConstraint(link_name='panda_link8')
+    message.header.frame_id = 'panda_link0'
+    x, middle, z = TIP.position.tolist()
+    message.constraint_region.primitives = [
+        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.02])
+    ]
+    message.constraint_region.primitive_poses = [pose_at(x, middle + y, z)]
+    return Constraints(position_constraints=[message])
+
+
+def turned(tolerance: float, x: float) -> Constraints:
+    """Return a constraint of the tip's orientation."""
+    message = OrientationConstraint(link_name='panda_link8')
+    message.header.frame_id = 'panda_link8'
+    message.orientation.x, message.orientation.w = np.sin(0.5 * x), np.cos(0.5 * x)
+    message.absolute_x_axis_tolerance = tolerance
+    message.absolute_y_axis_tolerance = message.absolute_z_axis_tolerance = 0.01
+    return Constraints(orientation_constraints=[message])
+
+
+@pytest.mark.parametrize(
+    ('heeded', 'violated', 'words'),
+    [
+        (joint_constraint(0.0), joint_constraint(2.5), 'panda_joint1 is at'),
+        (region(0.0), region(0.3), 'outside of its region'),
+        (turned(0.11, 0.1), turned(0.09, 0.1), 'is turned by'),
+    ],
+)
+def test_solutions_heed_constraints(
+    heeded: Constraints, violated: Constraints, words: str
+) -> None:
+    """Of joints, places and orientations."""
+    solved(ik_request(TIP, constraints=heeded))
+    reason = refused(KINEMATICS.ik, ik_request(TIP, constraints=violated))
+    assert reason.code is PlanningCode.NO_IK_SOLUTION
+    assert words in str(reason)
+
+
+@pytest.mark.parametrize(
+    ('change', 'code'),
+    [
+        ({'group_name': 'legs'}, PlanningCode.INVALID_GROUP_NAME),
+        ({'ik_link_name': 'moon'}, PlanningCode.INVALID_LINK_NAME),
+        ({'ik_link_names': ['a', 'b']}, PlanningCode.INVALID_LINK_NAME),
+        (
+            {'pose_stamped': PoseStamped(pose=pose_at(float('nan'), 0.0, 0.0))},
+            PlanningCode.FAILURE,
+        ),
+        ({'pose_stamped': PoseStamped(pose=pose_at(9.0, 0.0, 0.0))}, PlanningCode.NO_IK_SOLUTION),
+    ],
+)
+def test_what_is_no_pose_is_refused(change: dict[str, Any], code: PlanningCode) -> None:
+    """With MoveIt's codes."""
+    request = ik_request(TIP)
+    for name, value in change.items():
+        setattr(request, name, value)
+    assert refused(KINEMATICS.ik, request).code is code
+
+
+def path_request(*poses: Pose, **fields: Any) -> GetCartesianPath.Request:
+    """Return a request through poses of the tip."""
+    request = GetCartesianPath.Request(group_name='panda_arm', max_step=0.01, **fields)
+    request.header.frame_id = 'panda_link0'
+    request.waypoints = [pose_message(each) for each in poses]
+    return request
+
+
+def places_of(response: Any) -> tuple[Array, Array]:
+    """Return times and places of the tip at the points of a solution."""
+    points = response.solution.joint_trajectory.points
+    times = [each.time_from_start.sec + 1e-9 * each.time_from_start.nanosec for each in points]
+    rows = [frozen(each.positions) for each in points]
+    tip = [MODEL.kinematics.link_pose('panda_link8', row).position for row in rows]
+    return np.array(times), np.array(tip)
+
+
+def test_a_path_goes_around_a_corner() -> None:
+    """Along both lines, from rest to rest within the limits of the joints."""
+    corner, end = moved(0.0, 0.1, 0.0), moved(0.0, 0.1, -0.1)
+    response, _ = KINEMATICS.cartesian_path(path_request(corner, end), SCENE, PLACES)
+    assert response.fraction == 1.0
+    assert (response.error_code.val, response.error_code.message) == (1, '')
+    assert set(response.start_state.joint_state.name) == set(panda().joints)
+    times, tip = places_of(response)
+    assert (np.diff(times) > 0.0).all()
+    assert tip[0] == pytest.approx(TIP.position, abs=1e-6)
+    assert tip[-1] == pytest.approx(end.position, abs=1e-6)
+    off = np.minimum(
+        np.linalg.norm(tip[:, [0, 2]] - corner.position[[0, 2]], axis=1),
+        np.linalg.norm(tip[:, :2] - corner.position[:2], axis=1),
+    )
+    assert off.max() < 0.25 * 0.01  # of max_step: the corner is passed on a smooth curve
+    straight = np.linalg.norm(tip - corner.position, axis=1) > 0.03
+    assert off[straight].max() < 2e-4
+    assert np.linalg.norm(tip - corner.position, axis=1).min() < 2e-3
+    points = response.solution.joint_trajectory.points
+    speeds = np.array([each.velocities for each in points])
+    bends = np.array([each.accelerations for each in points])
+    assert np.abs(speeds[[0, -1]]).max() < 1e-6
+    assert (np.abs(speeds) <= MODEL.limits.velocity * (1 + 1e-6)).all()
+    assert (np.abs(bends) <= MODEL.limits.acceleration * (1 + 1e-6)).all()
+
+
+def test_a_path_is_slower_by_its_factors_and_its_speed() -> None:
+    """Scaling factors of the joints, and max_cartesian_speed of the tip."""
+    end = moved(0.0, 0.2, 0.0)
+
+    def lasts(**fields: Any) -> float:
+        response, _ = KINEMATICS.cartesian_path(path_request(end, **fields), SCENE, PLACES)
+        return float(places_of(response)[0][-1])
+
+    assert lasts(max_velocity_scaling_factor=0.1) > 1.5 * lasts()
+    assert lasts(max_cartesian_speed=0.05) > 4.0  # [s] 0.2 m at 0.05 m/s
+
+
+def test_a_path_ends_in_front_of_what_it_must_not_touch() -> None:
+    """The fraction says how far, the message why; without avoid_collisions it goes on."""
+    x, y, z = moved(0.0, 0.25, 0.0).position.tolist()
+    scene = apply_object(SCENE, box('crate', x, y, z, edge=0.1), PLACES)
+    end = moved(0.0, 0.2, 0.0)
+    free, _ = KINEMATICS.cartesian_path(path_request(end), scene, PLACES)
+    assert free.fraction == 1.0
+    blocked, _ = KINEMATICS.cartesian_path(path_request(end, avoid_collisions=True), scene, PLACES)
+    assert blocked.error_code.val == MoveItErrorCodes.SUCCESS
+    assert 0.0 < blocked.fraction < 1.0
+    assert 'crate' in blocked.error_code.message
+    _, tip = places_of(blocked)
+    assert tip[-1][1] == pytest.approx(0.2 * blocked.fraction + TIP.position[1], abs=1e-6)
+    held, _ = KINEMATICS.cartesian_path(
+        path_request(end, path_constraints=joint_constraint(0.0, 0.02)), SCENE, PLACES
+    )
+    assert 0.0 < held.fraction < 1.0
+
+
+def test_a_path_to_where_the_arm_is_stands_still() -> None:
+    """It is complete, and has one place."""
+    response, _ = KINEMATICS.cartesian_path(path_request(TIP), SCENE, PLACES)
+    assert response.fraction == 1.0
+    _, tip = places_of(response)
+    assert tip == pytest.approx(np.array([TIP.position] * len(tip)), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('change', 'code'),
+    [
+        ({'group_name': 'legs'}, PlanningCode.INVALID_GROUP_NAME),
+        ({'link_name': 'moon'}, PlanningCode.INVALID_LINK_NAME),
+        ({'max_step': 0.0}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
+        ({'waypoints': []}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
+        ({'max_velocity_scaling_factor': 2.0}, PlanningCode.FAILURE),
+        ({'waypoints': [pose_at(0.0, float('inf'), 0.0)]}, PlanningCode.FAILURE),
+    ],
+)
+def test_what_is_no_path_is_refused(change: dict[str, Any], code: PlanningCode) -> None:
+    """With MoveIt's codes."""
+    request = path_request(moved(0.0, 0.1, 0.0))
+    for name, value in change.items():
+        setattr(request, name, value)
+    assert refused(KINEMATICS.cartesian_path, request).code is code
