@@ -66,6 +66,7 @@ setup(
         'motion': [
             'numpy>=1.26',
             sibling('arm_model'),
+            sibling('arm_planning'),
             sibling('arm_servo'),
             sibling('arm_trajectory'),
         ],

@@ -10,7 +10,10 @@ from setuptools import find_packages, setup
 # colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
-EXECUTABLES = ['move_group = arm_planning.nodes.move_group:main']
+EXECUTABLES = [
+    'move_group = arm_planning.nodes.move_group:main',
+    'srdf = arm_planning.aliases:srdf',  # a program of arm_bringup
+]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 

@@ -22,6 +22,7 @@ from .exceptions import (
 from .frame_tree import FrameTree
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits
+from .link_pairs import LinkPairs, sample_link_pairs
 from .model import RobotModel
 from .names import ArmNames, names_of
 from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
@@ -55,6 +56,7 @@ __all__ = [
     'LeastClearance',
     'LimitsError',
     'LinkNameError',
+    'LinkPairs',
     'Mask',
     'Mesh',
     'ModelError',
@@ -80,6 +82,7 @@ __all__ = [
     'padded',
     'pose_quality',
     'rotation_of',
+    'sample_link_pairs',
     'start_pose',
     'turned_twists',
 ]

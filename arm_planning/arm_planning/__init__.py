@@ -22,9 +22,12 @@ from .requests import (
     PoseGoal,
     PositionConstraint,
 )
+from .srdf import make_srdf, SrdfDraft
+from .srdf import SAMPLES as SRDF_SAMPLES
 from .validity import ValidityCheck, Violation
 
 __all__ = [
+    'SRDF_SAMPLES',
     'CircPoint',
     'CircPointKind',
     'Goal',
@@ -38,6 +41,8 @@ __all__ = [
     'PlanningError',
     'PoseGoal',
     'PositionConstraint',
+    'SrdfDraft',
     'ValidityCheck',
     'Violation',
+    'make_srdf',
 ]

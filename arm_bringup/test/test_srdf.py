@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The SRDFs of the robots are those that ``ros2 run arm_planning srdf`` makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from arm_bringup.srdf import main
+
+ROBOTS = Path(__file__).parents[1] / 'robots'
+SAMPLES = ('--samples', '3000')
+
+
+@pytest.mark.parametrize(
+    ('name', 'arguments'),
+    [('panda', ['--xacro-arg', 'fingers:=true']), ('prbt', []), ('gp110', [])],
+)
+def test_they_are_up_to_date(name: str, arguments: list[str], tmp_path: Path) -> None:
+    """Byte by byte; after a change of shapes or ranges the command refreshes them."""
+    made = tmp_path / 'made.srdf'
+    assert main([str(ROBOTS / name), *arguments, *SAMPLES, '--output', str(made)]) == 0
+    assert made.read_text() == (ROBOTS / name / f'{name}.srdf').read_text()
+
+
+def test_a_xacro_file_is_enough(capsys: pytest.CaptureFixture[str]) -> None:
+    """The SRDF goes to stdout, the report to stderr."""
+    assert main([str(ROBOTS / 'gp110' / 'gp110.urdf.xacro'), *SAMPLES]) == 0
+    out, err = capsys.readouterr()
+    assert '<chain base_link=' in out
+    assert 'pose ready found' in err
+
+
+def test_a_robot_that_is_not_there(capsys: pytest.CaptureFixture[str]) -> None:
+    """It is refused with its path."""
+    assert main(['./nothing']) == 2
+    assert 'nothing does not exist' in capsys.readouterr().err
