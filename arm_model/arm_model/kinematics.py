@@ -5,15 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import copy
 from dataclasses import dataclass
 from functools import lru_cache
+import math
 
 import numpy as np
 import pinocchio as pin
 from urdf_reader import KinematicTree, Mimic
 
 from .arrays import Array, frozen, Mask, Native
-from .exceptions import ModelError
+from .exceptions import CommandError, ModelError
 from .pose import Pose
 
 CONTINUOUS_BOUND = 1e9
@@ -41,7 +43,7 @@ class RelativeMotion:
 
 
 class Kinematics:
-    """Joints of a group with the mimic joints that follow them; all other joints stand still.
+    """Joints of a group with the mimic joints that follow them; the others stand somewhere.
 
     It is not changed once it is made, so any thread may read it. Columns are in the order of
     ``native``: joints of the group and followers. ``expanded`` and ``projected`` lead from the
@@ -52,6 +54,8 @@ class Kinematics:
         joints: Joints of the group, in the order of ``native``; of a chain, from the base out.
         root: The link that stands still, in which the poses of ``native`` are.
         frames: Number of each link's frame in ``native``, by link.
+        others: Where the joints beside the group stand in [rad], by joint; without those that
+            follow others.
     """
 
     def __init__(self, tree: KinematicTree, group: Sequence[str]) -> None:
@@ -59,17 +63,27 @@ class Kinematics:
 
         Args:
             tree: The description.
-            group: Joints that move; the others stand at 0, or at the limit next to it.
+            group: Joints that move; the others stand at 0, or at the limit next to it, until
+                :meth:`with_others` says where.
 
         Raises:
             ModelError: The description makes no kinematic tree.
         """
-        full = _full(tree)
+        self._full = full = _full(tree)
         mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
         moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
-        locked = [number for number in range(1, full.njoints) if full.names[number] not in moving]
-        places = _places(full, mimics)
-        self.native: Native = pin.buildReducedModel(full, locked, places)
+        standing = [joint.name for joint in tree.movable() if joint.name not in moving]
+        self._mimics: Mapping[str, Mimic] = mimics
+        self._locked = [
+            number for number in range(1, full.njoints) if full.names[number] not in moving
+        ]
+        nearest = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
+        standing_at = {
+            name: float(nearest[full.idx_qs[full.getJointId(name)]])
+            for name in standing
+            if name not in mimics
+        }
+        self._stand(standing_at)
         self.root = tree.root
         self.frames: Mapping[str, int] = {
             frame.name.removeprefix(LINK): number
@@ -85,7 +99,26 @@ class Kinematics:
             self._factors[row, self.joints.index(followed.source)] = followed.multiplier
             self._offsets[row] = followed.offset
         self._plain = len(columns) == len(self.joints)
-        self.relative_motion = lru_cache(maxsize=None)(self._relative_motion)
+
+    def with_others(self, places: Mapping[str, float]) -> Kinematics:
+        """Return the same group with joints beside it elsewhere.
+
+        Args:
+            places: Where they stand in [rad], by joint; those that are left out stay. Joints that
+                are not among :attr:`others` count nothing, so the state of a robot will do.
+
+        Raises:
+            CommandError: A position is not finite.
+        """
+        others = {name: float(places.get(name, place)) for name, place in self.others.items()}
+        for name, place in others.items():
+            if not math.isfinite(place):
+                raise CommandError(f'{name}: its position is {place}; it must be finite')
+        if others == self.others:
+            return self
+        moved = copy.copy(self)
+        moved._stand(others)  # noqa: SLF001  # its own copy
+        return moved
 
     def expanded(self, positions: Array) -> Array:
         """Return the positions of all columns.
@@ -121,6 +154,19 @@ class Kinematics:
     def parent_joint(self, link: str) -> int:
         """Return the number of the joint that moves a link; 0 for a link that stands still."""
         return int(self.native.frames[self.frames[link]].parentJoint)
+
+    def _stand(self, others: Mapping[str, float]) -> None:
+        """Fix the joints beside the group at places."""
+        full, places = self._full, pin.neutral(self._full)
+        self.others = others
+        for name, place in others.items():
+            places[full.idx_qs[full.getJointId(name)]] = place
+        for name, mimic in self._mimics.items():
+            if mimic.source in others:
+                place = mimic.multiplier * others[mimic.source] + mimic.offset
+                places[full.idx_qs[full.getJointId(name)]] = place
+        self.native: Native = pin.buildReducedModel(full, self._locked, places)
+        self.relative_motion = lru_cache(maxsize=None)(self._relative_motion)
 
     def _relative_motion(self, body: int, other: int) -> RelativeMotion:
         """Return how the joints between two bodies move them, by the joints that move these.
@@ -163,15 +209,6 @@ def _full(tree: KinematicTree) -> Native:
         if frame.type == pin.FrameType.BODY:
             frame.name = LINK + frame.name
     return model
-
-
-def _places(full: Native, mimics: Mapping[str, Mimic]) -> Array:
-    """Return where joints stand that do not move, for pinocchio."""
-    places: Array = np.clip(pin.neutral(full), full.lowerPositionLimit, full.upperPositionLimit)
-    index = {name: full.idx_qs[number] for number, name in enumerate(full.names)}
-    for name, mimic in mimics.items():
-        places[index[name]] = mimic.multiplier * places[index[mimic.source]] + mimic.offset
-    return places
 
 
 def _between(model: Native, first: int, second: int) -> tuple[list[int], list[int]]:

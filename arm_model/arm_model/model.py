@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import copy
 from itertools import combinations
 import math
 from pathlib import Path
@@ -148,9 +149,8 @@ class RobotModel:
             source = joint.name if joint.mimic is None else joint.mimic.source
             if source not in self.joints:
                 moved.setdefault(source, []).append(joint.name)
-        ranges = self._tree.ranges()
         assumed = [
-            f'{name} at {min(max(ranges[name].lower, 0.0), ranges[name].upper):g}'
+            f'{name} at {self.kinematics.others[name]:g}'
             for name, joints in moved.items()
             if not checked.isdisjoint(_moved_by(self._tree, self.scene.link_shapes, joints))
         ]
@@ -308,6 +308,31 @@ class RobotModel:
             known = ', '.join(self.limits.names)
             raise CommandError(f'there is no joint {joint!r} in {self.group}; joints: {known}')
         return self.limits.names.index(joint)
+
+    def with_others(self, places: Mapping[str, float]) -> RobotModel:
+        """Return a model of the group with joints beside it elsewhere; its scene goes along.
+
+        Args:
+            places: Where they stand in [rad], by joint; those that are left out stay. Joints of
+                the group count nothing, so the state of the whole robot will do.
+
+        Raises:
+            CommandError: A position is not finite.
+        """
+        kinematics = self.kinematics.with_others(places)
+        if kinematics is self.kinematics:
+            return self
+        moved = copy.copy(self)
+        moved._use(kinematics, self.scene.with_others(kinematics))  # noqa: SLF001  # its own copy
+        return moved
+
+    def _use(self, kinematics: Kinematics, scene: PlanningScene) -> None:
+        """Take over kinematics and scene of the same group."""
+        self.kinematics, self.scene = kinematics, scene
+        self._model = kinematics.native
+        self._data = self._model.createData()
+        self._at = b''  # positions of the kinematics that are cached
+        self._clearances = Clearances(scene)
 
     def _update(self, positions: Array) -> None:
         at = positions.tobytes()

@@ -12,7 +12,7 @@ from model_robots import two_arms
 import numpy as np
 import pytest
 
-from arm_model import Array
+from arm_model import Array, Clearances, CommandError
 
 STEP = 1e-6
 
@@ -72,3 +72,39 @@ def test_arms_are_parted_by_their_own_joints_and_not_by_the_torso() -> None:
     assert signs['torso'] == 0.0
     assert {signs[name] for name in ('left_1', 'left_2', 'left_3')} == {-1.0}
     assert {signs[name] for name in ('right_1', 'right_2')} == {1.0}
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_joints_beside_a_group_stand_where_they_are_said_to(seed: int) -> None:
+    """Poses and distances are those of the whole robot; the first model stays as it is."""
+    left, both = two_arms('left'), two_arms()
+    everywhere = anywhere(seed, len(both))
+    state = dict(zip(both.joints, everywhere.tolist(), strict=True))
+    here = np.array([state[name] for name in left.joints])
+    before = left.kinematics.link_pose('right_2_link', here)
+    moved = left.with_others(state)
+    assert moved.kinematics.others == {name: state[name] for name in left.kinematics.others}
+    for link in moved.frames:
+        pose = moved.kinematics.link_pose(link, here)
+        whole = both.kinematics.link_pose(link, everywhere)
+        assert pose.position == pytest.approx(whole.position, abs=1e-12)
+        assert pose.rotation == pytest.approx(whole.rotation, abs=1e-12)
+    distances = dict(
+        zip(both.pairs, Clearances(both.scene).least(everywhere, math.inf), strict=True)
+    )
+    for pair, distance in zip(
+        moved.pairs, Clearances(moved.scene).least(here, math.inf), strict=True
+    ):
+        assert distance == pytest.approx(distances[pair], abs=1e-9)
+    assert moved.clearance(here) == pytest.approx(min(distances[pair] for pair in moved.pairs))
+    again = left.kinematics.link_pose('right_2_link', here)
+    assert again.position.tolist() == before.position.tolist()
+
+
+def test_nothing_is_made_anew_where_no_joint_beside_the_group_has_moved() -> None:
+    """A place that is no number is refused by the joint's name."""
+    left = two_arms('left')
+    assert left.with_others({'left_1': 0.5, 'right_1': 0.0}) is left
+    with pytest.raises(CommandError, match='right_1: its position is nan'):
+        left.with_others({'right_1': math.nan})

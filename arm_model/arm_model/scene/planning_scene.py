@@ -239,6 +239,22 @@ class PlanningScene:
             (self.attached_bodies if attached_bodies is None else attached_bodies).values(),
         )
 
+    def with_others(self, kinematics: Kinematics) -> PlanningScene:
+        """Return the scene with joints beside the group elsewhere; what they carry goes along.
+
+        Args:
+            kinematics: Of :meth:`Kinematics.with_others`.
+        """
+        if kinematics is self.kinematics:
+            return self
+        return PlanningScene(
+            kinematics,
+            self.link_shapes,
+            self.allowed,
+            self.objects.values(),
+            self.attached_bodies.values(),
+        )
+
     def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
         """Return the scene with another matrix of what may touch.
 

@@ -89,7 +89,7 @@ class GroupKinematics:
             robot: The robot, for this thread alone.
         """
         self._robot = robot
-        self._solvers: dict[tuple[str, str], IkSolver] = {}
+        self._solvers: dict[tuple[str, str], tuple[RobotModel, IkSolver]] = {}
 
     def ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
         """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state.
@@ -102,7 +102,7 @@ class GroupKinematics:
         Raises:
             PlanningError: There is no solution, or the request is refused.
         """
-        model = self._robot.model(request.group_name)
+        model = self._robot.model_at(request.group_name, positions)
         reader = RequestReader(model, snapshot, positions)
         name, stamped = _one_pose(request)
         pose = reader.pose(stamped.pose, stamped.header.frame_id, 'pose_stamped')
@@ -145,7 +145,7 @@ class GroupKinematics:
         Raises:
             PlanningError: The request is refused, or the path between its places is not valid.
         """
-        model = self._robot.model(request.group_name)
+        model = self._robot.model_at(request.group_name, positions)
         reader = RequestReader(model, snapshot, positions)
         frame = request.header.frame_id
         on_links = [
@@ -191,9 +191,10 @@ class GroupKinematics:
 
     def _solver(self, model: RobotModel, link: str) -> IkSolver:
         key = model.group, link
-        if key not in self._solvers:
-            self._solvers[key] = IkSolver(model, link)
-        return self._solvers[key]
+        known = self._solvers.get(key)
+        if known is None or known[0] is not model:  # joints beside the group have moved
+            known = self._solvers[key] = model, IkSolver(model, link)
+        return known[1]
 
 
 def _one_pose(request: Any) -> tuple[str, PoseStamped]:  # noqa: ANN401

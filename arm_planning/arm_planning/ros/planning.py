@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 import time
 from typing import Any
 
@@ -14,7 +15,7 @@ from moveit_msgs.msg import RobotState as StateMessage
 from moveit_msgs.srv import GetMotionPlan, QueryPlannerInterfaces
 from rclpy.node import Node
 
-from arm_model import Array
+from arm_model import Array, RobotModel
 from node_runner import LATCHED
 
 from ..exceptions import PlanningCode, PlanningError
@@ -44,6 +45,37 @@ class PlannedMotion:
     planning_time: float
 
 
+class GroupPlanners:
+    """The planner of each group of a robot, made anew when joints beside it have moved."""
+
+    def __init__(self, robot: RobotGroups) -> None:
+        """Make none yet.
+
+        Args:
+            robot: The robot.
+        """
+        self._robot = robot
+        self._planners: dict[str, tuple[RobotModel, Planner]] = {}
+        self._seeds = count()
+
+    def at(self, group: str, positions: Array) -> tuple[RobotModel, Planner]:
+        """Return model and planner of a group, with the joints beside it where they are.
+
+        Args:
+            group: Its name.
+            positions: Positions of all joints of the robot in [rad].
+
+        Raises:
+            PlanningError: There is no such group, or it cannot be moved.
+        """
+        model = self._robot.model_at(group, positions)
+        known = self._planners.get(group)
+        if known is None or known[0] is not model:
+            # another seed: a plan that was not found is not searched for in the same way again
+            known = self._planners[group] = model, Planner(model, seed=next(self._seeds))
+        return known
+
+
 class PlanningThread:
     """Plans in a thread of its own, with a robot of its own."""
 
@@ -59,7 +91,7 @@ class PlanningThread:
             robot: The robot, for that thread alone.
         """
         self._monitor, self._robot = monitor, robot
-        self._planners: dict[str, Planner] = {}
+        self._planners = GroupPlanners(robot)
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
         background.serve(GetMotionPlan, 'plan_kinematic_path', self._serve, _refuse)
         node.create_service(QueryPlannerInterfaces, 'query_planner_interface', _interfaces)
@@ -104,9 +136,8 @@ class PlanningThread:
 
     def _plan(self, message: Any, snapshot: SceneSnapshot, positions: Array) -> PlannedMotion:  # noqa: ANN401
         begin = time.monotonic()
-        model = self._robot.model(message.group_name)
+        model, planner = self._planners.at(message.group_name, positions)
         request = RequestReader(model, snapshot, positions).request(message)
-        planner = self._planners.setdefault(message.group_name, Planner(model))
         plan = planner.plan(request, scene_for(snapshot, model.scene))
         start = state_message(self._robot.joints, positions, snapshot.root)
         trajectory = trajectory_message(model.joints, plan.path, snapshot.root)

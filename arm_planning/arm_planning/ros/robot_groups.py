@@ -65,6 +65,7 @@ class RobotGroups:
             [min(max(ranges[name].lower, 0.0), ranges[name].upper) for name in self.joints]
         )
         self._models: dict[str, RobotModel] = {}
+        self._placed: dict[str, RobotModel] = {}
         first = self.model(next(iter(joints), self.names[0])).scene
         self.scene = PlanningScene(self.kinematics, first.link_shapes, first.allowed)
 
@@ -101,6 +102,23 @@ class RobotGroups:
                     PlanningCode.INVALID_GROUP_NAME, f'group {group!r} cannot be moved: {error}'
                 ) from error
         return self._models[group]
+
+    def model_at(self, group: str, positions: Array) -> RobotModel:
+        """Return the model of a group with the joints beside it where they are.
+
+        It is the same one for as long as these stay.
+
+        Args:
+            group: Its name.
+            positions: Positions of all joints of the robot in [rad].
+
+        Raises:
+            PlanningError: There is no such group, or it cannot be moved.
+        """
+        before = self._placed.get(group, self.model(group))
+        places = dict(zip(self.joints, positions.tolist(), strict=True))
+        self._placed[group] = before.with_others(places)
+        return self._placed[group]
 
     def positions(self, by_joint: Mapping[str, float]) -> Array:
         """Return the positions of all joints; those that are not given stand at 0 or nearby.

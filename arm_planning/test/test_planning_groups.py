@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Plans of a group among the joints beside it: they are where the robot has them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from model_robots import two_arms_texts
+from moveit_msgs.msg import PositionIKRequest
+import numpy as np
+import pytest
+
+from arm_model import (
+    Array,
+    AttachedBody,
+    Box,
+    Clearances,
+    CollisionObject,
+    Contact,
+    PlacedShape,
+    Pose,
+)
+from arm_planning import JointGoal, MotionRequest
+from arm_planning.ros.geometry import pose_message
+from arm_planning.ros.kinematic_services import GroupKinematics
+from arm_planning.ros.planning import GroupPlanners
+from arm_planning.ros.robot_groups import RobotGroups
+from arm_planning.ros.scene_changes import scene_for
+from arm_planning.ros.scene_snapshot import SceneSnapshot
+
+ACROSS = np.pi / 2
+"""Where right_2 holds its bar across the left arm in [rad]."""
+
+STATES = 100
+MOTIONS = 6
+SHARES = np.linspace(0.0, 1.0, 50).tolist()
+"""Where a straight motion is looked at."""
+
+STEP = 0.01
+"""Time between two looks at a motion in [s]."""
+
+SLACK = 1e-3
+"""How much less a pair may keep than nothing in [m], for looks between the planner's."""
+
+
+@cache
+def robot() -> RobotGroups:
+    """Return two arms on a torso."""
+    return RobotGroups(*two_arms_texts())
+
+
+@cache
+def snapshot() -> SceneSnapshot:
+    """Return the scene in which the right arm holds a bar of 0.4 m."""
+    forward = Pose(np.eye(3), np.array([0.25, 0.0, 0.0]))
+    bar = CollisionObject('bar', PlacedShape(Box(0.4, 0.02, 0.02), forward))
+    links = frozenset({'right_1_link', 'right_2_link', 'torso_link'})
+    return SceneSnapshot.of(robot().scene.with_attached(AttachedBody(bar, 'right_2_link', links)))
+
+
+@cache
+def clearances() -> Clearances:
+    """Return what measures the whole robot."""
+    return Clearances(snapshot().scene)
+
+
+def contacts(positions: Array) -> list[Contact]:
+    """Return contacts of the whole robot."""
+    return clearances().contacts(positions)
+
+
+def anywhere(draw: np.random.Generator) -> Array:
+    """Return all joints, with the bar across the left arm."""
+    places = dict(zip(robot().joints, draw.uniform(-1.2, 1.2, len(robot().joints)), strict=True))
+    places |= {'right_1': 0.0, 'right_2': draw.normal(ACROSS, 0.3), 'left_3': 0.0}
+    return robot().positions(places)
+
+
+def moved(positions: Array, left: Array) -> Array:
+    """Return the robot with its left arm elsewhere."""
+    joints = robot().model('left').joints
+    by_joint = dict(zip(robot().joints, positions.tolist(), strict=True))
+    return robot().positions({**by_joint, **dict(zip(joints, left.tolist(), strict=True))})
+
+
+def test_a_group_touches_what_the_whole_robot_touches() -> None:
+    """Wherever the joints beside it are: the same bodies, as far as the group moves them."""
+    draw, planners, with_bar = np.random.default_rng(1), GroupPlanners(robot()), 0
+    for _ in range(STATES):
+        positions = anywhere(draw)
+        model, _planner = planners.at('left', positions)
+        scene = scene_for(snapshot(), model.scene)
+        left = np.array([positions[robot().joints.index(name)] for name in model.joints])
+        found = {each.bodies for each in Clearances(scene).contacts(left)}
+        assert found == {each.bodies for each in contacts(positions) if each.bodies in scene.pairs}
+        with_bar += any('bar' in bodies for bodies in found)
+    assert with_bar > STATES / 20
+
+
+def test_plans_lead_around_the_other_arm() -> None:
+    """Where it is now: also where the straight way is free with all joints beside at 0."""
+    draw, planners, in_the_way = np.random.default_rng(2), GroupPlanners(robot()), 0
+    for _ in range(MOTIONS):
+        start = anywhere(draw)
+        goal = anywhere(draw)
+        model, planner = planners.at('left', start)
+        places = [robot().joints.index(name) for name in model.joints]
+        scene = scene_for(snapshot(), model.scene)
+        ends = start[places], goal[places]
+        if any(planner.is_valid(end, scene) for end in ends):
+            continue
+        straight = [moved(start, ends[0] + share * (ends[1] - ends[0])) for share in SHARES]
+        in_the_way += any(contacts(each) for each in straight)
+        plan = planner.plan(MotionRequest(ends[0], (JointGoal(ends[1]),)), scene)
+        for time in np.arange(0.0, plan.path.duration, STEP).tolist():
+            there = moved(start, plan.path.at(time).position)
+            assert all(each.depth < SLACK for each in contacts(there))
+    assert in_the_way
+
+
+def test_a_planner_is_kept_while_nothing_beside_its_group_moves() -> None:
+    """The group itself may move."""
+    planners, rest = GroupPlanners(robot()), robot().positions({})
+    _model, planner = planners.at('left', rest)
+    assert planners.at('left', moved(rest, np.array([0.3, 0.2, 0.1])))[1] is planner
+    model, another = planners.at('left', robot().positions({'torso': 0.4}))
+    assert another is not planner
+    assert model.kinematics.others['torso'] == 0.4
+
+
+def test_inverse_kinematics_has_the_torso_where_it_is() -> None:
+    """A pose in the root link is reached by the whole robot, before and after the torso turned."""
+    kinematics, link = GroupKinematics(robot()), 'left_3_link'
+    for torso in (0.4, -0.7):
+        here = robot().positions({'torso': torso})
+        wanted = robot().kinematics.link_pose(link, moved(here, np.array([0.3, -0.5, 0.2])))
+        request = PositionIKRequest(group_name='left', ik_link_name=link)
+        request.pose_stamped.pose = pose_message(wanted)
+        _response, state = kinematics.ik(request, snapshot(), here)
+        by_joint = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
+        found = robot().kinematics.link_pose(link, robot().positions(by_joint))
+        assert found.position == pytest.approx(wanted.position, abs=1e-5)
+        assert by_joint['torso'] == torso
