@@ -28,7 +28,7 @@ from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
 from .groups import moved_groups, MovedGroups
-from .motion import choose_master, motion_files
+from .motion import choose_master, motion_files, planning_files
 from .session import (
     add_arguments,
     locate,
@@ -70,6 +70,11 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         help='enable the drives as soon as they have booted, so that they follow trajectories and '
         'jogging',
     )
+    parser.add_argument(
+        '--plan',
+        action='store_true',
+        help='start move_group with the arm: motions among obstacles, for clients of MoveIt',
+    )
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument(
         '--drives-only',
@@ -96,6 +101,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments, ros = parse(sys.argv[1:] if argv is None else argv)
     try:
+        if arguments.plan and (arguments.drives_only or arguments.controller_only):
+            raise RobotError('--plan needs the whole arm: leave --drives-only and its like out')
         if arguments.controller_only:
             return _controllers(arguments, ros)
         return _arm(arguments, ros)
@@ -110,11 +117,22 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
         master, no_motion = choose_master(locate(arguments), find_executable)
     files = no_files
     if not no_motion:
-        files = partial(motion_files, groups=moved_groups(locate(arguments)))
+        files = partial(
+            planning_files if arguments.plan else motion_files,
+            groups=moved_groups(locate(arguments)),
+        )
+    elif arguments.plan:
+        raise RobotError(f'--plan: nothing would execute a plan: {no_motion}')
     with session(
-        arguments, ros, simulate=arguments.simulate, master=master, master_files=files
+        arguments,
+        ros,
+        simulate=arguments.simulate,
+        master=master,
+        master_files=files,
+        plan=arguments.plan,
     ) as arm:
         offered = f'no motion ({no_motion})' if no_motion else 'trajectories and jogging'
+        offered += ', planning' if arguments.plan else ''
         place = f' in namespace /{arm.ros.namespace}' if arm.ros.namespace else ''
         _say(f'{arm.robot.name} on CAN bus {arm.bus}{place}: {offered}')
         if arm.start:

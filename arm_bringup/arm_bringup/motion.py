@@ -12,6 +12,9 @@ from collections.abc import Sequence
 import json
 from pathlib import Path
 
+import urdf_reader
+from urdf_reader import find_group, parse_srdf, read_urdf
+
 from process_supervisor import (
     EVERY_NODE,
     Executable,
@@ -22,7 +25,7 @@ from process_supervisor import (
     StartError,
 )
 
-from .description import read_semantic
+from .description import read_description, read_semantic
 from .exceptions import RobotError
 from .groups import MovedGroups
 from .robots import Robot
@@ -73,6 +76,35 @@ def motion_files(
     if not robot.controllers.is_file():
         return [path]
     return [path, namespaced_parameters(robot.controllers, ros, folder)]
+
+
+def planning_files(
+    robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups
+) -> Sequence[Path]:
+    """Write the parameter files of :func:`motion_files`, and that of move_group's controllers.
+
+    Args:
+        robot: A robot with an SRDF and limits.
+        folder: Where to.
+        ros: Options of all nodes.
+        groups: Its groups that are moved.
+
+    Raises:
+        RobotError: A group is not in the description, or a file cannot be read.
+    """
+    try:
+        tree, semantic = read_urdf(read_description(robot)), parse_srdf(read_semantic(robot))
+        joints = {group: find_group(tree, semantic, group).joints for group in groups.arms}
+    except urdf_reader.DescriptionError as error:
+        raise RobotError(f'{robot.name}: {error}') from error
+    names = {group: f'{group}_controller' for group in groups.arms}
+    names[groups.names[0]] = controller_name(robot, groups)
+    manager: dict[str, object] = {'controller_names': list(names.values())}
+    manager |= {names[group]: {'joints': list(each)} for group, each in joints.items()}
+    values = {'ros__parameters': {'moveit_simple_controller_manager': manager}}
+    path = folder / 'planning.yaml'
+    path.write_text(json.dumps({f'{EVERY_NODE}/move_group': values}), encoding='utf-8')
+    return [*motion_files(robot, folder, ros, groups), path]
 
 
 def controller_name(robot: Robot, groups: MovedGroups) -> str:

@@ -203,6 +203,7 @@ def session(
     master: Executable,
     master_parameters: Mapping[str, str] | None = None,
     master_files: Callable[[Robot, Path, RosOptions], Sequence[Path]] = no_files,
+    plan: bool = False,
 ) -> Iterator[Session]:
     """Prepare a bring-up; the bus and the namespace are its own as long as the block runs.
 
@@ -213,6 +214,7 @@ def session(
         master: What runs the bus.
         master_parameters: ROS parameters for it beside the usual ones.
         master_files: Makes parameter files for it, in a folder that lasts as long as the block.
+        plan: With move_group.
 
     Raises:
         RobotError: The robot folder is unknown or incomplete.
@@ -244,6 +246,7 @@ def session(
             dict(master_parameters or {}),
             master_files(robot, Path(folder), ros),
             ros,
+            plan,
         )
         processes = arm_processes(wanted, parameters, find_executable)
         mode_service = stream_mode_service(config)

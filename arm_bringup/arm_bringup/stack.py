@@ -25,6 +25,8 @@ MASTER = Executable('arm_canopen', 'master')
 """What runs the bus unless something else is asked for."""
 MOTION_NODE = Executable('arm_servo', 'motion_node')
 """Trajectories and jogging: with the master in it, or for drives that another process has."""
+PLANNER = Executable('arm_planning', 'move_group')
+"""Motions among obstacles, for clients of MoveIt."""
 
 TF_RATE = '100.0'
 """Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
@@ -47,6 +49,7 @@ class Stack:
         master_parameters: ROS parameters for it beside the usual ones.
         master_files: Parameter files for it beside the usual one.
         ros: Options of all nodes.
+        plan: With move_group, which has the files of the master.
     """
 
     robot: Robot
@@ -58,6 +61,7 @@ class Stack:
     master_parameters: Mapping[str, str] = field(default_factory=dict)
     master_files: Sequence[Path] = ()
     ros: RosOptions = field(default_factory=RosOptions)
+    plan: bool = False
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -79,6 +83,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
         _slaves(stack, bus, find),
         _master(stack, bus, parameters, find),
         _state_publisher(stack, parameters, find),
+        _planner(stack, parameters, find),
     ]
     return [spec for spec in everything if spec is not None]
 
@@ -117,6 +122,19 @@ def _master(
         notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=MASTER_FIRST,
+    )
+
+
+def _planner(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec | None:
+    if not stack.plan:
+        return None
+    return ProcessSpec(
+        name='planner',
+        argv=node_argv(PLANNER, find, {}, (parameters, *stack.master_files), stack.ros),
+        environment=LOG_FORMAT,
+        notifies_ready=True,
+        ready_timeout=stack.ready_timeout,
+        stop_order=THEN_LISTENERS,
     )
 
 

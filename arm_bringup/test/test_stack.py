@@ -13,7 +13,7 @@ from rclpy.node import Node
 import yaml
 
 from arm_bringup.groups import MovedGroups
-from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files
+from arm_bringup.motion import choose_master, MAKE_MOVE, motion_files, planning_files
 from arm_bringup.robots import Robot
 from arm_bringup.stack import arm_processes, controller_process, MASTER, MOTION_NODE, Stack
 from node_runner import init_ros
@@ -196,3 +196,40 @@ def test_a_workspace_that_is_not_built_says_so(tmp_path: Path) -> None:
         arm_processes(stack, PARAMETERS, lambda package, name: None)
     with pytest.raises(StartError, match=r'fake_slaves does not exist.*make build'):
         arm_processes(stack, PARAMETERS, lambda package, name: tmp_path / name)
+
+
+def test_move_group_has_what_the_master_has(tmp_path: Path) -> None:
+    """It is one process more, with the same description and groups, and ends before the drives."""
+    files = (Path('/r/motion.yaml'),)
+    stack = Stack(ROBOT, 'can0', simulate=True, master=MOTION_NODE, master_files=files, plan=True)
+    found = processes(tmp_path, stack, 'arm_servo', 'arm_planning')
+    assert set(found) == {'slaves', 'master', 'planner'}
+    argv = found['planner'].argv
+    named = [Path(argv[n + 1]) for n, word in enumerate(argv) if word == '--params-file']
+    assert named == [PARAMETERS, *files]
+    assert found['master'].stop_order < found['planner'].stop_order < found['slaves'].stop_order
+    with pytest.raises(StartError, match='arm_planning'):
+        processes(tmp_path, stack, 'arm_servo')
+
+
+def test_move_group_knows_the_controller_by_its_name(tmp_path: Path) -> None:
+    """Also where controllers.yaml gives it another one than that of the group."""
+    robot = my_robot(tmp_path)
+    joint = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+    robot.description.write_text(
+        '<robot name="my"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
+        f'<parent link="a"/><child link="b"/>{joint}</joint></robot>'
+    )
+    robot.semantic.write_text(
+        '<robot name="my"><group name="arm"><joint name="j"/></group></robot>'
+    )
+    manager = {'controller_name': 'mine'}
+    robot.controllers.write_text(json.dumps({'controller_manager': {'ros__parameters': manager}}))
+    *_, file = planning_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
+    (values,) = yaml.safe_load(file.read_text()).values()
+    assert values['ros__parameters'] == {
+        'moveit_simple_controller_manager': {
+            'controller_names': ['mine'],
+            'mine': {'joints': ['j']},
+        }
+    }
