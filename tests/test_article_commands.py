@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from isolation import Isolation, reserve
 import pytest
-from simulated_arm import SimulatedArm
-
-if TYPE_CHECKING:
-    from isolation import Isolation
+from processes import RunningProcess
+from sensor_msgs.msg import JointState
+from simulated_arm import panda_bus, SimulatedArm
 
 pytestmark = pytest.mark.scenario
 
@@ -19,11 +18,27 @@ TRIGGER = 'std_srvs/srv/Trigger'
 TARGET = 'canopen_interfaces/srv/COTargetDouble'
 
 
-@pytest.fixture
-def arm(isolation: Isolation) -> Iterator[SimulatedArm]:
-    """Boot the arm."""
-    with SimulatedArm(isolation) as arm:
+@pytest.fixture(scope='module')
+def reserved() -> Iterator[Isolation]:
+    """Give all tests of this module one ROS domain and one CAN bus."""
+    with reserve() as isolation:
+        yield isolation
+
+
+@pytest.fixture(scope='module')
+def arm(reserved: Isolation) -> Iterator[SimulatedArm]:
+    """Boot the arm, for all tests of this module."""
+    with SimulatedArm(reserved) as arm:
         yield arm
+
+
+@pytest.fixture(scope='module')
+def publisher(arm: SimulatedArm) -> RunningProcess:
+    """Publish the joint states of its first joint."""
+    description = f'robot_description:={one_joint_urdf()}'
+    publisher = arm.start('canopen_joint_state_publisher', '-p', description)
+    publisher.wait_until_ready()
+    return publisher
 
 
 def call(arm: SimulatedArm, *arguments: str) -> str:
@@ -33,12 +48,9 @@ def call(arm: SimulatedArm, *arguments: str) -> str:
     return process.output
 
 
+@pytest.mark.usefixtures('publisher')
 def test_article_moves_a_joint(arm: SimulatedArm) -> None:
     """init, position_mode and target answer as described, and the joint goes to 10."""
-    publisher = arm.start(
-        'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
-    )
-    publisher.wait_until_ready()
     answer = call(arm, '/panda_joint1/init', TRIGGER)
     assert 'success=True' in answer
     assert 'Operation enabled' in answer
@@ -49,8 +61,6 @@ def test_article_moves_a_joint(arm: SimulatedArm) -> None:
     assert 'success=True' in again
     assert 'already in mode' in again
     assert 'success=True' in call(arm, '/panda_joint1/target', TARGET, '{ target: 10.0 }')
-    from sensor_msgs.msg import JointState
-
     states = arm.client.listen(JointState, '/joint_states')
     arm.client.spin_until(
         lambda: bool(states) and abs(states[-1].position[0] - 10.0) < 1e-3, 30.0, 'arrival at 10'
@@ -59,15 +69,13 @@ def test_article_moves_a_joint(arm: SimulatedArm) -> None:
     assert states[-1].header.stamp.sec > 0
 
 
+@pytest.mark.usefixtures('publisher')
 def test_joint_states_come_at_the_rate_of_sync(arm: SimulatedArm) -> None:
     """``ros2 topic hz /joint_states`` shows the SYNC rate of 100 Hz."""
-    publisher = arm.start(
-        'canopen_joint_state_publisher', '-p', f'robot_description:={one_joint_urdf()}'
-    )
-    publisher.wait_until_ready()
     hz = arm.run('ros2', 'topic', 'hz', '/joint_states')
     # once is enough: a machine that pauses slows everything for a while, SYNC included
     hz.wait_for(r'average rate: (9[0-9]|10[0-9])\.', 40.0)
+    hz.stop()
 
 
 def test_refusals_say_why(arm: SimulatedArm) -> None:
@@ -80,12 +88,10 @@ def test_refusals_say_why(arm: SimulatedArm) -> None:
     assert 'in no RPDO' in refused
 
 
-def test_candump_explains_the_bus(arm: SimulatedArm, isolation: Isolation) -> None:
+def test_candump_explains_the_bus(arm: SimulatedArm, reserved: Isolation) -> None:
     """Candump shows SYNC, PDOs by name, and the SDO that a service causes."""
-    from simulated_arm import panda_bus
-
     candump = arm.run(
-        *('ros2', 'run', 'arm_canopen', 'candump', isolation.bus),
+        *('ros2', 'run', 'arm_canopen', 'candump', reserved.bus),
         *('--bus-config', str(panda_bus())),
     )
     candump.wait_for('SYNC')
@@ -96,6 +102,7 @@ def test_candump_explains_the_bus(arm: SimulatedArm, isolation: Isolation) -> No
     assert 'success=True' in answer
     assert f'data={0x00020192}' in answer
     candump.wait_for('SDO.*panda_joint1.*0x1000')
+    candump.stop()
 
 
 def one_joint_urdf() -> str:

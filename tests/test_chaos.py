@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""An arm and a quadruped in motion get over everything that may be drawn, once each.
+"""An arm and a quadruped in motion get over disturbances: killed, stopped, a bad line, a full CPU.
 
-``make chaos`` does it for longer, in an order and at moments of chance.
+``make chaos`` does all of them for longer, in an order and at moments of chance.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.scenario, pytest.mark.timeout(400)]
 
-SEED = 20
+SEED = 30
 
 
-@pytest.mark.parametrize(('robot', 'events'), [(ArmVictim, 8), (QuadVictim, 6)])
+@pytest.mark.parametrize(('robot', 'events'), [(ArmVictim, 5), (QuadVictim, 4)])
 def test_nothing_moves_unasked_and_all_recovers(
     isolation: Isolation,
     tmp_path: Path,

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 from simulated_arm import panda_bus
-from test_article_commands import TARGET, TRIGGER
 from user_mode_linux import run_in_guest, what_is_missing
 
 from arm_canopen.can.interfaces import can_interfaces
@@ -62,6 +61,8 @@ def copy_robot(folder: Path) -> Path:
     bus = robot / 'bus.yml'
     slow = bus.read_text().replace('sync_period: 10000', 'sync_period: 50000')
     bus.write_text(slow.replace('period: 10 ', 'period: 50 '))
+    settings = robot / 'robot.yaml'  # so that no pose is looked for, which takes a guest long
+    settings.write_text('start_positions: {panda_joint4: -1.5}\n')
     return robot
 
 
@@ -69,7 +70,9 @@ def copy_robot(folder: Path) -> Path:
 @pytest.mark.timeout(500)
 def test_bring_up_on_vcan0_seen_by_candump(isolation: Isolation, tmp_path: Path) -> None:
     """All drives boot, one moves, and can-utils' candump sees the same frames as ours."""
+    from canopen_interfaces.srv import COTargetDouble
     from processes import RunningProcess
+    from ros_client import RosClient
 
     log = tmp_path / 'real.log'
 
@@ -81,15 +84,12 @@ def test_bring_up_on_vcan0_seen_by_candump(isolation: Isolation, tmp_path: Path)
         options = ['--simulate', '--can', 'vcan0', '--timeout', '60']
         with start('ros2', 'run', 'arm_bringup', 'bringup', robot, *options) as bringup:
             bringup.wait_for('all is ready', 90.0)
-            for service, service_type, request in (
-                ('init', TRIGGER, '{}'),
-                ('position_mode', TRIGGER, '{}'),
-                ('target', TARGET, '{ target: 0.2 }'),
-            ):
-                call = [f'/{JOINT}/{service}', service_type, request]
-                with start('ros2', 'service', 'call', *call) as process:
-                    assert process.wait(120.0) == 0, process.output
-                    assert 'success=True' in process.output
+            with RosClient(isolation.domain_id) as client:
+                for service in ('init', 'position_mode'):
+                    answer = client.trigger(f'/{JOINT}/{service}', 120.0)
+                    assert answer.success, answer.message
+                target = COTargetDouble.Request(target=0.2)
+                assert client.call(COTargetDouble, f'/{JOINT}/target', target, 120.0).success
             with start('ros2', 'run', 'arm_canopen', 'candump', 'vcan0', '-n', '40') as ours:
                 assert ours.wait(60.0) == 0, ours.output
             assert bringup.stop(30.0) == 0, bringup.output

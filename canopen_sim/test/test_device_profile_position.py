@@ -330,7 +330,7 @@ def test_selecting_the_mode_in_motion_stops(rig: Rig) -> None:
 @given(
     targets=st.lists(st.integers(-3000, 3000), min_size=1, max_size=4),
     pauses=st.lists(st.floats(0.0, 1.5), min_size=4, max_size=4),
-    velocity=st.integers(50, 5000),
+    velocity=st.integers(500, 5000),
     acceleration=st.integers(500, 50_000),
     deceleration=st.integers(500, 50_000),
 )
