@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
 
 import numpy as np
@@ -13,7 +14,6 @@ from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
 from .ik.link_kinematics import LinkKinematics
-from .industrial.timing import slower
 
 SAMPLES = 200
 """Places at which the speed is looked at, and again between the two beside the greatest."""
@@ -45,6 +45,27 @@ def speed_limited(path: Path, link: LinkKinematics, most: float) -> tuple[Path, 
         return path, ()
     note = f'slowed to {1.0 / factor:.0%}: link {link.link} may move at {most:g} m/s'
     return slower(path, factor), (note,)
+
+
+def slower(path: Path, factor: float) -> Path:
+    """Return the same path with more time everywhere.
+
+    Args:
+        path: The path.
+        factor: How many times the time.
+    """
+    powers = (factor ** -np.arange(6.0))[:, None]
+    return Path(
+        [
+            replace(
+                each,
+                start=each.start * factor,
+                duration=each.duration * factor,
+                coefficients=each.coefficients * powers,
+            )
+            for each in path.segments
+        ]
+    )
 
 
 def _greatest_speed(path: Path, link: LinkKinematics) -> float:

@@ -11,6 +11,8 @@ import numpy as np
 from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Segment, Timing
 
+from ..link_speed import slower
+
 MAX_SPACING = 0.05
 """Greatest length of a segment of a path that is not straight in [s]."""
 
@@ -101,27 +103,6 @@ def _within(path: Path, limits: JointLimits) -> tuple[Path, Demand]:
     if scaled is None:
         scaled = slower(path, timing.demand.time_factor * SLOWER_MARGIN)
     return scaled, timing.plainest
-
-
-def slower(path: Path, factor: float) -> Path:
-    """Return the same path with more time everywhere.
-
-    Args:
-        path: The path.
-        factor: How many times the time.
-    """
-    powers = (factor ** -np.arange(6.0))[:, None]
-    return Path(
-        [
-            replace(
-                each,
-                start=each.start * factor,
-                duration=each.duration * factor,
-                coefficients=each.coefficients * powers,
-            )
-            for each in path.segments
-        ]
-    )
 
 
 def _from_rest_to_rest(full: FullSpeedPath) -> Path:
