@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from isolation import Isolation, reserve
-import pytest
 from processes import RunningProcess
+import pytest
 from sensor_msgs.msg import JointState
 from simulated_arm import panda_bus, SimulatedArm
 

@@ -199,7 +199,7 @@ def test_an_effort_is_warned_of_once(clock: Any, effort: bool) -> None:
 
 
 @pytest.mark.parametrize('effort', [0.0, 5.0])
-def test_both_actions_tell_of_an_effort(effort: float) -> None:
+def test_both_actions_report_an_effort(effort: float) -> None:
     """Of a message of theirs; 0 is none."""
     single, parallel = SingleGripper(), ParallelGripper()
     goal = single.action.Goal()
