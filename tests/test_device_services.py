@@ -58,7 +58,7 @@ def test_objects_are_read_and_written_by_name(isolation: Isolation) -> None:
             (read(arm, 'Contrlword'), '0x6040:00 Controlword'),
             (write(arm, 'Profile velocity', 'fast'), "'fast'"),
             (write(arm, 'Statusword', '1'), 'read'),
-            (write(arm, 'Controlword', '15'), 'services'),
+            (write(arm, 'Controlword', '15'), 'written by its driver'),
         ):
             assert not refused.success
             assert words in refused.message
