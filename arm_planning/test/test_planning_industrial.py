@@ -239,9 +239,9 @@ def test_a_line_through_a_singularity_is_refused_with_its_place() -> None:
     with pytest.raises(PlanningError, match=r'of the way'):
         planner('prbt').plan(request('prbt', 'LIN', far))
     bent = frozen([0.0, 0.3, 0.6, 0.3, 0.7, 0.0])
-    stretched = PoseGoal(tip('prbt').pose(frozen([0.0, 0.4, 0.0, 0.3, 0.7, 0.0])))
+    extended = PoseGoal(tip('prbt').pose(frozen([0.0, 0.4, 0.0, 0.3, 0.7, 0.0])))
     with pytest.raises(PlanningError, match=r'beyond 100% of the way'):
-        planner('prbt').plan(MotionRequest(bent, [stretched], 'LIN'))
+        planner('prbt').plan(MotionRequest(bent, [extended], 'LIN'))
     here = frozen([0.0, 0.5, 1.2, 0.3, 1.0, 0.2])
     pose = tip('prbt').pose(here)
     near = Pose(pose.rotation, pose.position + np.array([0.0, 0.03, 0.0]))

@@ -3,11 +3,11 @@
 r"""Joint positions along a curve of a link.
 
 Joints follow the curve with :math:`q' = J^+ \nu`, where :math:`\nu` is the derivative of the
-curve. The parameter of the result is time at the full speed along the curve, stretched where a
+curve. The parameter of the result is time at the full speed along the curve, scaled where a
 joint would be too fast: by :math:`(1 + \sum_i |q'_i / v_i|^p)^{1/p}`, a smooth maximum.
 
 From place to place a polynomial of fifth degree in this time meets positions and two derivatives
-of the joints. How far it leads the link off the curve depends on the stretch too: what is measured
+of the joints. How far it leads the link off the curve depends on the scaling too: what is measured
 is the polynomial of the result, and the places are so dense that the link stays at the curve.
 """
 
@@ -160,7 +160,7 @@ class _Tracer:
         return places
 
     def timed(self, places: Sequence[_Place]) -> Trace:
-        """Return the path through places, stretched where joints would be too fast."""
+        """Return the path through places, its time scaled where joints would be too fast."""
         durations, pieces = self._pieces(places)
         ratio = np.abs([each.first for each in places]) / self._speed
         joint = int(ratio.max(axis=0).argmax())
@@ -178,23 +178,23 @@ class _Tracer:
         shares = np.array([each.share for each in places])
         ratio = np.abs(first) / self._speed
         power = (ratio**SHARPNESS).sum(axis=1)
-        stretch = (1.0 + power) ** (1.0 / SHARPNESS)
+        scaling = (1.0 + power) ** (1.0 / SHARPNESS)
         slope = (
             (ratio ** (SHARPNESS - 1) * np.sign(first) * second / self._speed).sum(axis=1)
-            * stretch
+            * scaling
             / (1.0 + power)
         )
         steps = np.diff(shares)
         durations = self._duration * (
-            0.5 * steps * (stretch[1:] + stretch[:-1]) - steps**2 * np.diff(slope) / 12.0
+            0.5 * steps * (scaling[1:] + scaling[:-1]) - steps**2 * np.diff(slope) / 12.0
         )
         durations = np.maximum(durations, self._duration * steps)  # never faster than the curve
         ones = np.ones_like(shares)
         pairs = (q, shares), (first, ones), (second, 0.0 * ones)
         positions, first, second = (np.column_stack(pair) for pair in pairs)
-        scale = self._duration * stretch[:, None]
+        scale = self._duration * scaling[:, None]
         velocity = first / scale
-        acceleration = (second - first * (slope / stretch)[:, None]) / scale**2
+        acceleration = (second - first * (slope / scaling)[:, None]) / scale**2
         return durations, quintics(durations, positions, velocity, acceleration)
 
     def _place(self, share: float, positions: Array) -> _Place:

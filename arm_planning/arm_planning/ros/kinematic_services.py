@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from moveit_msgs.srv import GetCartesianPath, GetPositionIK
 from rclpy.node import Node
 
-from arm_model import Array, CommandError, JointLimits, PlanningScene, RobotModel
+from arm_model import Array, CommandError, PlanningScene, RobotModel
 from arm_model.ros import seconds
 from arm_trajectory import Path
 
@@ -65,10 +65,7 @@ class KinematicServices:
 
     def _prepared(self, answer: Any, request: Any, state: Any) -> Callable[[], Any]:  # noqa: ANN401
         """Return what answers from the scene and the joints as they are now."""
-        positions = self._monitor.positions(state)
-        joints = self._monitor.robot.model(request.group_name).joints
-        self._monitor.check_received(joints, state.joint_state.name)
-        snapshot = self._monitor.start_scene(state, positions)
+        snapshot, positions = self._monitor.start(state, request.group_name)
         stamp = self._node.get_clock().now().to_msg()
 
         def stamped() -> Any:  # noqa: ANN401
@@ -170,16 +167,7 @@ class GroupKinematics:
             scene=scene,
             is_valid=None if check is None else lambda state: not check.violated(state),
         )
-        limits = scaled(
-            model.limits,
-            scaling_factor('velocity', request.max_velocity_scaling_factor),
-            scaling_factor('acceleration', request.max_acceleration_scaling_factor),
-        )
-        path = timed_rows(found.positions, limits)
-        if scene is not None:
-            _check_between(path, limits, scene)
-        speed_link = LinkKinematics(model, request.cartesian_speed_limited_link)
-        path, _ = speed_limited(path, speed_link, max(request.max_cartesian_speed, 0.0))
+        path = _timed(request, model, found.positions, scene)
         start = state_message(self._robot.joints, positions, snapshot.root)
         response = GetCartesianPath.Response(
             start_state=start,
@@ -223,14 +211,32 @@ def _heeding(check: ConstraintCheck, found: list[Array]) -> list[Array]:
     return heeding
 
 
-def _check_between(path: Path, limits: JointLimits, scene: PlanningScene) -> None:
-    violation = ValidityCheck(limits, scene).path(path)
+def _timed(
+    request: Any,  # noqa: ANN401
+    model: RobotModel,
+    rows: Array,
+    scene: PlanningScene | None,
+) -> Path:
+    """Return the path through joint positions as fast as a request allows.
+
+    Raises:
+        PlanningError: A factor or speed is refused, or it is not valid between the positions.
+    """
+    limits = scaled(
+        model.limits,
+        scaling_factor('velocity', request.max_velocity_scaling_factor),
+        scaling_factor('acceleration', request.max_acceleration_scaling_factor),
+    )
+    path = timed_rows(rows, limits)
+    violation = None if scene is None else ValidityCheck(limits, scene).path(path)
     if violation is not None:
         raise PlanningError(
             PlanningCode.INVALID_MOTION_PLAN,
             f'between two places of the path {violation.reason}; take a smaller max_step, or'
             ' keep farther away',
         )
+    link = LinkKinematics(model, request.cartesian_speed_limited_link)
+    return speed_limited(path, link, max(request.max_cartesian_speed, 0.0))[0]
 
 
 def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401

@@ -111,11 +111,7 @@ class PlanningThread:
             raise PlanningError(
                 PlanningCode.INVALID_GROUP_NAME, f'group_name is empty; groups: {known}'
             )
-        state = message.start_state
-        positions = self._monitor.positions(state)
-        joints = self._monitor.robot.model(message.group_name).joints
-        self._monitor.check_received(joints, state.joint_state.name)
-        snapshot = self._monitor.start_scene(state, positions)
+        snapshot, positions = self._monitor.start(message.start_state, message.group_name)
         if scene_diff is not None and scene_diff.is_diff:
             snapshot = apply_scene(snapshot, scene_diff, positions)
         return lambda: self._plan(message, snapshot, positions)

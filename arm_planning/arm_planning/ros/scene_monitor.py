@@ -81,7 +81,7 @@ class SceneMonitor:
         Raises:
             PlanningError: One was never received, or is too old.
         """
-        self.check_received(joints)
+        self._check_received(joints)
         return {joint: self._places[joint] for joint in joints}
 
     def positions(self, message: Any = None) -> Array:  # noqa: ANN401  # messages have no type
@@ -96,42 +96,24 @@ class SceneMonitor:
         given = {} if message is None else joints_of(message, self.robot.all_joints)
         return self.robot.positions({**self._places, **given})
 
-    def check_received(self, joints: Sequence[str], given: Sequence[str] = ()) -> None:
-        """Make sure that it is known where joints are.
+    def start(self, state: Any, group: str = '') -> tuple[SceneSnapshot, Array]:  # noqa: ANN401
+        """Return the scene in which a request begins, and the positions of all joints in [rad].
 
         Args:
-            joints: Their names.
-            given: Names of those that need not be received.
+            state: A moveit_msgs/RobotState; the joints that it leaves out are where they are, and
+                its attached bodies come to those of the scene.
+            group: Group whose joints must be known; empty for none.
 
         Raises:
-            PlanningError: One was never received, or is too old.
+            PlanningError: The state or a body is refused, or a joint is unknown or too old.
         """
-        now = time.monotonic()
-        for joint in joints:
-            age = now - self._arrivals.get(joint, -math.inf)
-            if joint not in given and age > STATE_TIMEOUT:
-                topic = self._node.resolve_topic_name('joint_states')
-                since = f'{age:.1f} s old' if math.isfinite(age) else 'not received yet'
-                raise PlanningError(
-                    PlanningCode.ROBOT_STATE_STALE,
-                    f'joint {joint}: its position on {topic} is {since}; start what publishes it,'
-                    ' or give the start state',
-                )
-
-    def start_scene(self, message: Any, positions: Array) -> SceneSnapshot:  # noqa: ANN401
-        """Return the scene with the attached bodies that a moveit_msgs/RobotState has besides.
-
-        Args:
-            message: The state.
-            positions: Positions of all joints of the robot in [rad].
-
-        Raises:
-            PlanningError: A body is refused.
-        """
+        positions = self.positions(state)
+        if group:
+            self._check_received(self.robot.model(group).joints, state.joint_state.name)
         snapshot = self.snapshot
-        for body in message.attached_collision_objects:
+        for body in state.attached_collision_objects:
             snapshot = apply_attached(snapshot, body, positions)
-        return snapshot
+        return snapshot, positions
 
     def state(self, positions: Array | None = None) -> StateMessage:
         """Return where all joints are as a moveit_msgs/RobotState, with attached bodies.
@@ -144,6 +126,20 @@ class SceneMonitor:
         message.joint_state.header.stamp = self._node.get_clock().now().to_msg()
         message.attached_collision_objects = attached_messages(self.snapshot)
         return message
+
+    def _check_received(self, joints: Sequence[str], given: Sequence[str] = ()) -> None:
+        """Refuse joints that were never received or are too old, and are not given."""
+        now = time.monotonic()
+        for joint in joints:
+            age = now - self._arrivals.get(joint, -math.inf)
+            if joint not in given and age > STATE_TIMEOUT:
+                topic = self._node.resolve_topic_name('joint_states')
+                since = f'{age:.1f} s old' if math.isfinite(age) else 'not received yet'
+                raise PlanningError(
+                    PlanningCode.ROBOT_STATE_STALE,
+                    f'joint {joint}: its position on {topic} is {since}; start what publishes it,'
+                    ' or give the start state',
+                )
 
     def _take_joints(self, message: JointState) -> None:
         now = time.monotonic()

@@ -43,8 +43,7 @@ class StateServices:
         background.serve(GetStateValidity, 'check_state_validity', self._validity, lambda *_: None)
 
     def _fk(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401  # messages have no type
-        positions = self._monitor.positions(request.robot_state)
-        snapshot = self._monitor.start_scene(request.robot_state, positions)
+        snapshot, positions = self._monitor.start(request.robot_state)
         stamp = self._node.get_clock().now().to_msg()
         return lambda: fk_response(request, snapshot, positions, stamp)
 
@@ -56,8 +55,7 @@ class StateServices:
                 PlanningCode.INVALID_GOAL_CONSTRAINTS,
                 'constraints are not evaluated; leave them empty',
             )
-        positions = self._monitor.positions(request.robot_state)
-        snapshot = self._monitor.start_scene(request.robot_state, positions)
+        snapshot, positions = self._monitor.start(request.robot_state)
         return lambda: self._validity_response(request.group_name, snapshot, positions)
 
     def _validity_response(self, group: str, snapshot: SceneSnapshot, positions: Array) -> Any:  # noqa: ANN401
