@@ -44,7 +44,9 @@ ROSDEP = {
 STARTED = {'arm_bringup': {'canopen_sim', 'robot_viewer'}}
 STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'}}
 """Packages whose executables a bring-up starts; it imports nothing of them."""
-OPTIONAL = {'arm_bringup': {'arm_model', 'arm_servo', 'arm_trajectory', 'python3-numpy'}}
+OPTIONAL = {
+    'arm_bringup': {'arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'python3-numpy'}
+}
 """Packages that are used where they are built, and that colcon need not build for this one."""
 PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
