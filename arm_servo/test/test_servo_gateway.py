@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from itertools import pairwise
@@ -24,9 +25,10 @@ from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Prepared
-from arm_servo.core.requests import JogRequest, PauseRequest, SpeedRequest
+from arm_servo.core.requests import JogRequest, PauseRequest, SpeedRequest, StopRequest
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.single_target import SingleTarget
+from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_servo.jog.servo_source import JointCommand
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
@@ -394,6 +396,55 @@ def test_a_jog_that_has_expired_is_refused_and_does_not_end_a_trajectory() -> No
     with pytest.raises(NotReadyError, match=r'expired 0\.06 s'):
         late.result(0.0)
     assert drives.gateway.snapshot.source is Source.TRAJECTORY
+
+
+@pytest.mark.parametrize(
+    'stops', [[StopRequest()], [PauseRequest(), PauseRequest(is_paused=False)]]
+)
+def test_a_jog_does_not_overtake_a_stop_that_comes_while_its_drives_are_fetched(
+    stops: Sequence[StopRequest | PauseRequest],
+) -> None:
+    """The stop was called later: the arm stays where it is, also when a pause is over by then."""
+    drives = ready()
+    before = drives.path[-1].tolist()
+
+    def stop() -> None:
+        for request in stops:
+            drives.gateway.command(request)
+
+    command = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.4}, 'velocities'))
+    jogged = drives.gateway.command(JogRequest(command, drives.now + 1.0), stop)
+    drives.run(20)
+    with pytest.raises(NotReadyError, match='stopped before it had begun'):
+        jogged.result(0.0)
+    assert drives.path[-1].tolist() == before
+
+
+def test_the_time_in_which_drives_are_fetched_is_no_age_of_a_jog() -> None:
+    """The cycle did not stand still; the jog itself says how long it counts."""
+    drives = ready()
+
+    def fetch() -> None:
+        drives.now += 2.0 * MAX_CYCLE_AGE
+
+    command = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.4}, 'velocities'))
+    jogged = drives.gateway.command(JogRequest(command, drives.now + 5.0), fetch)
+    drives.run(2)
+    assert jogged.exception(0.0) is None
+    assert drives.gateway.snapshot.source is Source.JOG
+
+
+def test_a_zero_stops_its_jog_however_late_the_cycle_carries_it_out() -> None:
+    """A stop is never refused, while the jog before it goes on to count."""
+    drives = ready()
+    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
+    drives.run(50)
+    zero = jog(drives.gateway, {JOINT: 0.0}, drives.now)
+    drives.now += 2.0 * MAX_CYCLE_AGE
+    drives.run(100)
+    assert zero.exception(0.0) is None
+    assert drives.gateway.snapshot.source is Source.NONE
+    assert drives.path[-1].tolist() == drives.path[-2].tolist()
 
 
 @pytest.mark.parametrize('is_overridden', [False, True])

@@ -64,7 +64,8 @@ class CommandGateway:
         self.model: RobotModel = core.model
         self._core = core
         self._orders = OrderQueue()
-        self._order = CommandOrder(clock)
+        self._clock = clock
+        self._order = CommandOrder()
         self._motions = MotionQueue(core, self._orders, self._order, worker, clock)
         self._scenes = SceneExchange(core, self._orders, worker)
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
@@ -94,6 +95,7 @@ class CommandGateway:
             Nothing once it counts; the ArmError with which it was refused.
         """
         future: Future[None] = Future()
+        number = self._order.number()  # first: a stop during what follows counts
         try:
             prepared = self._core.prepare(request)
             if isinstance(request, JogRequest) and len(self._orders) >= MAX_QUEUED_JOGS:
@@ -102,7 +104,7 @@ class CommandGateway:
         except ArmError as error:
             future.set_exception(error)
             return future
-        number, since = self._order.number()
+        since = self._clock()
         if isinstance(request, StopRequest):
             self._order.void(request.sources or MOTIONS, request.reason)
         elif isinstance(request, PauseRequest) and request.is_paused:
@@ -110,7 +112,7 @@ class CommandGateway:
 
         def commit(cycle: Cycle) -> bool:
             try:
-                if isinstance(request, JogRequest) and not self._core.ignores(request):
+                if isinstance(request, JogRequest) and not request.is_zero:
                     self._order.admit(Source.JOG, number, since, cycle)
                 self._core.commit(prepared, cycle.now)
             except Exception as error:  # noqa: BLE001  # its future carries it

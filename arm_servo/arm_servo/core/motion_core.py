@@ -295,11 +295,6 @@ class MotionCore:
         elif prepared.motion is not None and prepared.basis is not None:
             self._begin(prepared.motion, prepared.basis, elapsed)
 
-    def ignores(self, request: JogRequest) -> bool:
-        """Whether a jog asks for standing still, and its client is not jogging."""
-        jogs = self.source is Source.JOG and self._arbiter.jogger == request.client
-        return request.is_zero and not jogs
-
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Come to rest, a trajectory on its path, because something has gone wrong.
 
@@ -384,19 +379,22 @@ class MotionCore:
             self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
 
     def _jog(self, request: JogRequest, now: float) -> None:
-        """Jog from now on; the safety filter sees every step."""
-        state = self.state
-        if self.ignores(request):
-            return
-        if now > request.expires:
+        """Jog from now on; the safety filter sees every step.
+
+        A zero is a stop: it is not refused, and ends only the jog of its client.
+        """
+        if request.is_zero:
+            if self.source is not Source.JOG or self._arbiter.jogger != request.client:
+                return
+        elif now > request.expires:
             raise NotReadyError(
                 f'expired {now - request.expires:.2f} s before the cycle; send commands more'
                 ' often than they expire (incoming_command_timeout)'
             )
-        if self._paused:
+        elif self._paused:
             raise CommandError(PAUSED)
-        command = in_base(self._model, state.position, request)
-        if not request.is_zero:  # that ends the jog, and no other command
+        command = in_base(self._model, self.state.position, request)
+        if not request.is_zero:
             self._changed('a jog took over')
         self._arbiter.jog(command, request.expires, request.client)
 

@@ -147,7 +147,7 @@ class MotionQueue:
             get_ready: Gets the drives back.
         """
         with self._lock:
-            command = MotionCommand(request, *self._order.number(), rest, get_ready)
+            command = MotionCommand(request, self._order.number(), self._clock(), rest, get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)

@@ -62,22 +62,17 @@ class CommandOrder:
         refused: When a motion was refused last, as the arm did not follow, in [s].
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        """Begin.
-
-        Args:
-            clock: Steady time, the one of the cycle.
-        """
+    def __init__(self) -> None:
+        """Begin with nothing void."""
         self.refused = -math.inf
-        self._clock = clock
         self._lock = threading.Lock()  # held for a few instructions only
         self._numbers = count(1)
         self._void_up_to: dict[Source, tuple[int, str]] = dict.fromkeys(MOTIONS, (0, ''))
 
-    def number(self) -> tuple[int, float]:
-        """Return the number of a command that comes now, and the time of that."""
+    def number(self) -> int:
+        """Return the number of a command that comes now."""
         with self._lock:
-            return next(self._numbers), self._clock()
+            return next(self._numbers)
 
     def void(self, sources: Iterable[Source], reason: str, number: int | None = None) -> None:
         """Refuse what was requested for some sources before a number.
