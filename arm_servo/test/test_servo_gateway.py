@@ -25,7 +25,13 @@ from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Prepared
-from arm_servo.core.requests import JogRequest, PauseRequest, SpeedRequest, StopRequest
+from arm_servo.core.requests import (
+    DisplacementRequest,
+    JogRequest,
+    PauseRequest,
+    SpeedRequest,
+    StopRequest,
+)
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.single_target import SingleTarget
 from arm_servo.core.snapshot import MAX_CYCLE_AGE
@@ -643,3 +649,33 @@ def test_a_goal_that_is_refused_takes_no_drive_from_anyone(is_wrong: bool) -> No
     else:
         assert command.future.result(0.0) is not None
         assert len(drives.attachments) == before + 1
+
+
+def test_a_motion_that_a_stop_made_void_takes_no_drive_from_anyone() -> None:
+    """The stop came while it was tried from where the arm stands."""
+    worker = SteppedWorker()
+    drives = ready(worker)
+    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
+    drives.run(3)
+    before = len(drives.attachments)
+    command = drives.gateway.request(wave(drives, 20), drives.attach)
+    drives.gateway.command(StopRequest())
+    while worker.run():
+        drives.run()
+    assert isinstance(command.future.exception(0.0), NotReadyError)
+    assert len(drives.attachments) == before
+
+
+def test_a_motion_is_tried_from_where_the_arm_is_when_its_turn_comes() -> None:
+    """The one before has got the drives back, and leads to where there is room for this one."""
+    drives = ready()
+    begin = drives.path[-1][0]
+    drives.source.released(JOINT, Refusal(RefusalCause.SINGLE_TARGET))
+    drives.run(3)
+    room = begin - drives.gateway.model.limits.lower[0]
+    there = drives.gateway.request(DisplacementRequest({JOINT: 0.3}), drives.attach)
+    back = drives.gateway.request(DisplacementRequest({JOINT: -room - 0.1}), drives.attach)
+    drives.run(600)
+    assert there.future.exception(0.0) is None
+    assert back.future.exception(0.0) is None
+    assert drives.path[-1][0] == pytest.approx(begin - room + 0.2, abs=1e-6)

@@ -66,7 +66,9 @@ class CommandGateway:
         self._orders = OrderQueue()
         self._clock = clock
         self._order = CommandOrder()
-        self._motions = MotionQueue(core, self._orders, self._order, worker, clock)
+        self._motions = MotionQueue(
+            core, self._orders, self._order, worker, clock, rest=self._rest
+        )
         self._scenes = SceneExchange(core, self._orders, worker)
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
 
@@ -137,9 +139,7 @@ class CommandGateway:
             get_ready: Gets back drives that others have, where the arm does not follow; called in
                 any thread, and only for a motion that is not refused from where the arm stands.
         """
-        snapshot = self._snapshot
-        rest = snapshot.reference if snapshot.blocked else None
-        return self._motions.request(request, rest, get_ready)
+        return self._motions.request(request, get_ready)
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
         """End a motion: before its begin it does not begin, later the arm comes to rest.
@@ -258,3 +258,8 @@ class CommandGateway:
         self._order.void(MOTIONS, reason)
         self._motions.clear(reason)
         self.idle(now, self._snapshot.measured, reason)
+
+    def _rest(self) -> RobotState | None:
+        """Return where the arm stands while others have its drives; None where it follows."""
+        snapshot = self._snapshot
+        return snapshot.reference if snapshot.blocked else None

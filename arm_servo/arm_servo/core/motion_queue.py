@@ -65,8 +65,6 @@ class MotionCommand:
         request: What is asked.
         number: Its place among all commands and stops.
         requested: Steady time of the request in [s].
-        rest: Where the arm stands while others have its drives: from there the motion is tried
-            before the drives are taken from them. None where the arm follows.
         get_ready: Gets the drives back.
         future: Its execution, or None for a single target, once it began; else why it is refused.
         ended: How it ended, whatever became of it; set once, at the latest when the cycle fails.
@@ -79,7 +77,6 @@ class MotionCommand:
     request: MotionRequest
     number: int
     requested: float
-    rest: RobotState | None = None
     get_ready: Callable[[], None] = lambda: None
     future: Future[Execution | None] = field(default_factory=Future)
     ended: Future[Outcome] = field(default_factory=Future)
@@ -119,6 +116,8 @@ class MotionQueue:
         order: CommandOrder,
         worker: Executor,
         clock: Callable[[], float],
+        *,
+        rest: Callable[[], RobotState | None],
     ) -> None:
         """Begin empty.
 
@@ -128,26 +127,25 @@ class MotionQueue:
             order: Which command counts.
             worker: Prepares motions, one after the other.
             clock: Steady time, the one of the cycle.
+            rest: Where the arm stands while others have its drives: from there a motion is tried
+                before the drives are taken from them. None where the arm follows.
         """
         self._core, self._orders, self._order = core, orders, order
-        self._worker, self._clock = worker, clock
+        self._worker, self._clock, self._rest = worker, clock, rest
         self._begun: list[MotionCommand] = []  # of the cycle
         self._lock = threading.Lock()  # of the two below; held for a few instructions only
         self._waiting: deque[MotionCommand] = deque()
         self._preparing: MotionCommand | None = None
 
-    def request(
-        self, request: MotionRequest, rest: RobotState | None, get_ready: Callable[[], None]
-    ) -> MotionCommand:
+    def request(self, request: MotionRequest, get_ready: Callable[[], None]) -> MotionCommand:
         """Have a motion prepared, and begun when it is found to be clear.
 
         Args:
             request: What is asked.
-            rest: Where the arm stands while others have its drives; None where it follows.
             get_ready: Gets the drives back.
         """
         with self._lock:
-            command = MotionCommand(request, self._order.number(), self._clock(), rest, get_ready)
+            command = MotionCommand(request, self._order.number(), self._clock(), get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS
             if not is_full:
                 self._waiting.append(command)
@@ -203,10 +201,11 @@ class MotionQueue:
             if self._preparing is not None or not self._waiting:
                 return
             command = self._preparing = self._waiting.popleft()
-        if command.rest is None:
+        rest = self._rest()
+        if rest is None:
             self._get_ready(command)
         else:
-            basis = CommandBasis(command.rest, self._core.scene)
+            basis = CommandBasis(rest, self._core.scene)
             self._submit(command, lambda: self._try_out(command, basis))
 
     def _submit(self, command: MotionCommand, step: Callable[[], None]) -> None:
@@ -218,7 +217,13 @@ class MotionQueue:
         self._get_ready(command)
 
     def _get_ready(self, command: MotionCommand) -> None:
-        if self._guarded(command, command.get_ready):
+        """Get the drives back for a motion, unless it is void already."""
+
+        def get_ready() -> None:
+            self._order.check(command.source, command.number)
+            command.get_ready()
+
+        if self._guarded(command, get_ready):
             self._order_basis(command)
 
     def _order_basis(self, command: MotionCommand) -> None:
