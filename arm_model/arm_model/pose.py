@@ -16,6 +16,9 @@ from .exceptions import CommandError
 UNIT_LENGTH_TOLERANCE = 1e-3
 """How far the length of a quaternion may be off."""
 
+ROUNDING_TOLERANCE = 1e-9
+"""How far numbers of equal poses may be apart, which come from different products."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
@@ -28,6 +31,13 @@ class Pose:
 
     rotation: Array
     position: Array
+
+    def is_close(self, other: Pose) -> bool:
+        """Whether another pose is the same but for rounding."""
+        return bool(
+            np.allclose(self.rotation, other.rotation, rtol=0.0, atol=ROUNDING_TOLERANCE)
+            and np.allclose(self.position, other.position, rtol=0.0, atol=ROUNDING_TOLERANCE)
+        )
 
 
 ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))

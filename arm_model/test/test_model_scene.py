@@ -395,3 +395,28 @@ def test_several_parts_are_replaced_in_one_step() -> None:
     single = MODEL.scene.with_object(TABLE).with_object(CUP)
     assert both.pairs == single.pairs
     assert both.with_contents(objects={}).pairs == MODEL.scene.pairs
+
+
+def test_scenes_are_the_same_by_what_is_in_them() -> None:
+    """Things that are made anew count as the same; a place, a shape or an allowance do not."""
+
+    def scene(x: float = 0.5, size: float = 0.1, held: float = 0.2) -> PlanningScene:
+        box = CollisionObject('box', Box(size, size, size), pose=Pose(np.eye(3), np.full(3, x)))
+        cup = CollisionObject('held', PlacedShape(Sphere(0.02), Pose(np.eye(3), np.full(3, held))))
+        return MODEL.scene.with_object(box).with_attached(AttachedBody(cup, 'link_4'))
+
+    left = two_arms('left')
+    assert scene().is_same(scene(x=0.5 + 1e-12))
+    for other in (
+        scene(x=0.5001),
+        scene(size=0.1001),
+        scene(held=0.2001),
+        scene().without('box'),
+        scene().without('held'),
+        scene().with_object(CUP),
+        scene().allowing('box', 'link_4'),
+        left.scene,
+    ):
+        assert not scene().is_same(other)
+        assert not other.is_same(scene())
+    assert not left.scene.is_same(left.with_others({'torso': 0.1}).scene)

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+import math
 from types import SimpleNamespace
 from typing import Any
 
 from geometry_msgs.msg import Point, Pose
 from model_robots import table, texts
 from moveit_msgs.msg import CollisionObject, PlanningScene, PlanningSceneWorld
+from servo_commands import SteppedWorker
 from servo_drives import Drives
 from shape_msgs.msg import SolidPrimitive
 
@@ -25,26 +28,150 @@ def message(name: str, frame: str = '') -> PlanningScene:
     return PlanningScene(world=PlanningSceneWorld(collision_objects=[box]))
 
 
-def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
-    """The last whole scene before the first feedback is enough."""
-    drives = Drives(model=RobotModel(*texts('panda'), table('panda')))
-    logged: list[str] = []
-    node: Any = SimpleNamespace(
-        get_logger=lambda: SimpleNamespace(error=logged.append),
-        create_subscription=lambda *_: None,
-        create_timer=lambda *_: None,
-    )
-    listener = SceneListener(node, [drives.gateway])
-    listener._take(message('early'))
-    listener._take(message('box'))
-    assert not drives.gateway.model.scene.objects
+class Listener:
+    """The listener without ROS, whose scenes are built when the test says so.
+
+    Attributes:
+        drives: The drives of each arm.
+        errors: What was logged as an error.
+        warnings: What was warned of.
+    """
+
+    def __init__(self, *drives: Drives) -> None:
+        self.drives = drives
+        self.errors: list[str] = []
+        self.warnings: list[str] = []
+        logger = SimpleNamespace(
+            error=lambda text, **_: self.errors.append(text), warning=self.warnings.append
+        )
+        node: Any = SimpleNamespace(
+            get_logger=lambda: logger,
+            create_subscription=lambda *_: None,
+            create_timer=lambda *_: None,
+        )
+        self._now = 0.0
+        self._worker = SteppedWorker()
+        gateways = [each.gateway for each in drives]
+        self._made = SceneListener(node, gateways, self._worker, lambda: self._now)
+
+    def take(self, message: PlanningScene) -> None:
+        """Let a message come; nothing is built yet."""
+        self._made._take(message)
+
+    def run(self, seconds: float = 0.1) -> None:
+        """Let time pass, and build what can be."""
+        self._now += seconds
+        self._made._retry()
+        while self._worker.run():
+            pass
+        for each in self.drives:
+            if each.attachments:
+                each.run()
+
+
+def arm() -> Drives:
+    """Return the drives of an arm with a scene of its own, of which nothing is known yet."""
+    return Drives(model=RobotModel(*texts('panda'), table('panda')))
+
+
+def started(drives: Drives) -> Drives:
+    """Let an arm follow."""
     drives.attach()
     drives.run(2)
-    listener._apply_waiting()
+    return drives
+
+
+def objects(drives: Drives) -> set[str]:
+    """Return the names of the objects that count for an arm."""
+    return set(drives.gateway.model.scene.objects)
+
+
+def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
+    """The last whole scene before the first feedback is enough."""
+    drives = arm()
+    listener = Listener(drives)
+    listener.take(message('early'))
+    listener.take(message('box'))
+    listener.run()
+    assert not objects(drives)
+    started(drives)
+    listener.run()
+    assert objects(drives) == {'box'}
+    listener.take(message('cup', 'nowhere'))
+    listener.run()
+    assert objects(drives) == {'box'}
+    assert "'cup': no frame 'nowhere'" in listener.errors[0]
+    assert 'the scene before counts' in listener.errors[0]
+
+
+def test_an_arm_that_nobody_knows_withholds_no_scene_from_others() -> None:
+    """It is named once, and gets the scene when it is known at last."""
+    known, unknown = started(arm()), arm()
+    listener = Listener(known, unknown)
+    listener.take(message('box'))
+    listener.run()
+    assert objects(known) == {'box'}
+    assert not listener.warnings
+    for _ in range(30):
+        listener.run()
+    assert len(listener.warnings) == 1
+    assert 'panda_arm: its position is not known' in listener.warnings[0]
+    started(unknown)
+    listener.run()
+    assert objects(unknown) == {'box'}
+
+
+def test_a_scene_is_not_lost_when_the_position_goes_unknown_before_it_is_built() -> None:
+    """It waits, and counts afterwards."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.take(message('box'))
+    axes = drives.axes
+    drives.axes = [replace(axis, position=math.nan, followable=False) for axis in axes]
     drives.run()
-    assert set(drives.gateway.model.scene.objects) == {'box'}
-    listener._take(message('cup', 'nowhere'))
+    assert drives.gateway.snapshot.reference is None
+    listener.run()
+    assert not objects(drives)
+    drives.axes = axes
     drives.run()
-    assert set(drives.gateway.model.scene.objects) == {'box'}
-    assert "'cup': no frame 'nowhere'" in logged[0]
-    assert 'the scene before counts' in logged[0]
+    listener.run()
+    assert objects(drives) == {'box'}
+
+
+def test_a_diff_on_the_latched_topic_is_refused_with_words() -> None:
+    """Whoever joins late would see the diff alone."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.take(message('box'))
+    diff = message('cup')
+    diff.is_diff = True
+    listener.take(diff)
+    listener.run()
+    assert objects(drives) == {'box'}
+    assert 'publish whole scenes' in listener.errors[0]
+
+
+def test_a_scene_equal_to_the_present_one_changes_nothing() -> None:
+    """What is under way is not checked again, what is prepared not prepared again."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.take(message('box', 'panda_link0'))
+    listener.run()
+    first = drives.gateway.model.scene
+    listener.take(message('box', 'panda_link0'))
+    listener.run()
+    assert drives.gateway.model.scene is first
+    listener.take(message('cup'))
+    listener.run()
+    assert objects(drives) == {'cup'}
+
+
+def test_nothing_is_built_in_the_thread_that_receives() -> None:
+    """Meshes take long; callbacks and the cycle go on meanwhile."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.take(message('cup', 'nowhere'))
+    drives.run(5)
+    assert not listener.errors
+    listener.run()
+    assert len(listener.errors) == 1

@@ -57,6 +57,17 @@ class CollisionObject:
         """
         return CollisionObject(self.name, *self.shapes, pose=pose)
 
+    def is_same(self, other: CollisionObject) -> bool:
+        """Whether another object has this name, and these shapes at the same places."""
+        return (
+            (self.name, len(self.shapes)) == (other.name, len(other.shapes))
+            and self.pose.is_close(other.pose)
+            and all(
+                mine.shape == its.shape and mine.pose.is_close(its.pose)
+                for mine, its in zip(self.shapes, other.shapes, strict=True)
+            )
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class AttachedBody:
@@ -71,3 +82,8 @@ class AttachedBody:
     object: CollisionObject
     link: str
     touch_links: frozenset[str] = frozenset()
+
+    def is_same(self, other: AttachedBody) -> bool:
+        """Whether another body is the same object on the same link, and may touch the same."""
+        mine, its = (self.link, self.touch_links), (other.link, other.touch_links)
+        return mine == its and self.object.is_same(other.object)

@@ -116,6 +116,22 @@ class PlanningScene:
         """Names of all links with shapes, objects and attached bodies."""
         return (*self.link_shapes, *self.objects, *self.attached_bodies)
 
+    def is_same(self, other: PlanningScene) -> bool:
+        """Whether another scene has the same things at the same places, and allows the same."""
+        return (
+            self.kinematics.joints == other.kinematics.joints
+            and self.kinematics.others == other.kinematics.others
+            and self.link_shapes == other.link_shapes
+            and self.allowed == other.allowed
+            and self.objects.keys() == other.objects.keys()
+            and self.attached_bodies.keys() == other.attached_bodies.keys()
+            and all(thing.is_same(other.objects[name]) for name, thing in self.objects.items())
+            and all(
+                body.is_same(other.attached_bodies[name])
+                for name, body in self.attached_bodies.items()
+            )
+        )
+
     def with_object(self, thing: CollisionObject) -> PlanningScene:
         """Return the scene with an object in the world, in the place of one with its name.
 

@@ -150,8 +150,8 @@ class CanopenMotion:
             ToolMotion(model, make_node(f'{model.group}_controller'), on_bus)
             for model in models.tools
         ]
-        SceneListener(manager, [arm.drives.gateway for arm in arms])
         self._groups: list[ArmMotion[BusDrives] | ToolMotion[BusDrives]] = [*arms, *tools]
+        SceneListener(manager, [group.drives.gateway for group in self._groups])
         broadcaster = make_node('joint_state_broadcaster')
         self._broadcaster = JointStateBroadcaster(
             broadcaster,

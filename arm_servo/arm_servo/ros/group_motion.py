@@ -127,7 +127,7 @@ def _settings(
 class ToolMotion(Generic[AnyDrives]):
     """An end effector: a gripper and a trajectory controller on one node.
 
-    Its links may touch: a gripper holds something.
+    Its links may touch, as a gripper holds something, unless ``check_self_collision`` is set.
 
     Attributes:
         drives: Its drives.
@@ -148,10 +148,10 @@ class ToolMotion(Generic[AnyDrives]):
             ParameterError: A parameter is misspelt, of another kind or out of its range.
             ModelError: The core cannot move it.
         """
-        trajectory = declare_trajectory(controller, model.joints)
+        trajectory = declare_trajectory(controller, model.joints, checks=False)
         gripper = declare_gripper(controller)
         settings = CoreSettings(
-            execution=trajectory.execution, clearance=None, check_self_collision=False
+            execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
         )
         self.nodes: Sequence[Node] = (controller,)
         self.drives = drives = make_drives(model, settings)

@@ -48,12 +48,15 @@ class TrajectoryParameters:
     check: bool
 
 
-def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameters:
+def declare_trajectory(
+    node: Node, joints: Sequence[str], *, checks: bool = True
+) -> TrajectoryParameters:
     """Declare the parameters of the trajectory controller.
 
     Args:
         node: The node.
-        joints: Names of the arm's joints.
+        joints: Names of the group's joints.
+        checks: Default of whether motions on whose way links meet are refused.
 
     Raises:
         ModelError: The parameter ``joints`` names others, or an interface is asked for that there
@@ -100,20 +103,21 @@ def declare_trajectory(node: Node, joints: Sequence[str]) -> TrajectoryParameter
         read.number(
             'speed_scaling.initial_scaling_factor', 1.0, (0.0, 1.0), 'speed at the start, 0 to 1'
         ),
-        declare_check(read),
+        declare_check(read, default=checks),
     )
 
 
-def declare_check(read: ParameterReader) -> bool:
+def declare_check(read: ParameterReader, *, default: bool = True) -> bool:
     """Declare whether motions on whose way links meet are refused.
 
     Args:
         read: Declares for the node.
+        default: Its default.
     """
     return read.flag(
         'check_self_collision',
         'refuse trajectories and displacements on whose way links of the arm collide',
-        default=True,
+        default=default,
     )
 
 
