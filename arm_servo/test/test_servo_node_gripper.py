@@ -50,6 +50,8 @@ class Gripper:
         self._made._parameters = GripperParameters(0.002, 0.001, 1.0, allow_stalling)
         self._made._joints = self.drives.gateway.model.joints
         self._made._goals = {}
+        self._made._newest = self._made._abandoned = None
+        self._made._has_warned = False
         self._made._prepare = self._made._check_active = lambda: None
         conclude: Any = SimpleNamespace(
             notify_execute=lambda handle, _: self._made._conclude(handle)
@@ -93,7 +95,7 @@ class Gripper:
 
     def run(self, duration: float, *, blocked: bool = False) -> None:
         """Let time pass in [s]."""
-        before = self.drives.axes
+        before = list(self.drives.axes)
         for _ in range(round(duration / PERIOD)):
             self.drives.run()
             if blocked:
@@ -145,6 +147,45 @@ def test_an_aborted_goal_moves_nothing_any_more(clock: Any) -> None:
     assert gripper.position == stopped < 0.5
 
 
+@pytest.mark.parametrize('end', ['canceled', 'aborted'])
+@pytest.mark.parametrize('goal', [0.05, 1.0])
+def test_the_drive_holds_where_it_is_once_a_goal_has_ended(
+    clock: Any, end: str, goal: float
+) -> None:
+    """It is blocked, and does not push on towards the place of the last set-point."""
+    gripper = Gripper(clock)
+    begin = gripper.position
+    handle = gripper.send('goal', goal)
+    gripper.run(0.8, blocked=True)
+    assert gripper.position > begin + 0.02
+    if end == 'canceled':
+        gripper.cancel(handle)
+    gripper.run(2.0, blocked=True)
+    assert gripper.ended == {'goal': end}
+    assert gripper.position == pytest.approx(begin, abs=1e-6)
+
+
+def test_the_drive_pushes_on_where_a_stall_is_a_success(clock: Any) -> None:
+    """Something is held by that."""
+    gripper = Gripper(clock, allow_stalling=True)
+    gripper.send('goal', 0.05)
+    gripper.run(3.0, blocked=True)
+    assert gripper.ended == {'goal': 'succeeded'}
+    assert gripper.position == pytest.approx(0.05, abs=1e-6)
+
+
+def test_a_goal_after_a_cancel_is_not_taken_back(clock: Any) -> None:
+    """It has taken over before the drive was to hold its place."""
+    gripper = Gripper(clock)
+    handle = gripper.send('old', 1.0)
+    gripper.run(0.8, blocked=True)
+    gripper.cancel(handle)
+    gripper.send('new', 0.2)
+    gripper.run(5.0)
+    assert gripper.ended == {'old': 'canceled', 'new': 'succeeded'}
+    assert gripper.position == pytest.approx(0.2, abs=1e-6)
+
+
 @pytest.mark.parametrize('allow_stalling', [False, True])
 def test_a_newer_goal_ends_the_one_before(clock: Any, allow_stalling: bool) -> None:
     """As aborted and at once, also where the gripper passes its place or stalls later."""
@@ -194,7 +235,9 @@ def test_an_effort_is_warned_of_once(clock: Any, effort: bool) -> None:
     gripper = Gripper(clock)
     gripper.send('goal', 0.03, effort=effort)
     gripper.run(2.0)
-    assert gripper.ended == {'goal': 'succeeded'}
+    gripper.send('next', 0.02, effort=effort)
+    gripper.run(2.0)
+    assert gripper.ended == {'goal': 'succeeded', 'next': 'succeeded'}
     assert ['0x6072' in text for text in gripper.warnings] == [True] * effort
 
 

@@ -22,6 +22,8 @@ from node_runner.action_goals import serve_goals
 from ...core.gateway import CommandGateway
 from ...core.motion_queue import MotionCommand
 from ...core.outcome import CONTINUED
+from ...core.requests import TargetRequest
+from ...core.set_point import Source
 from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
 from .parameters import GripperParameters
 
@@ -79,6 +81,9 @@ class GripperController:
         self._check_active, self._prepare = check_active, prepare
         self._joints = gateway.model.joints
         self._goals: dict[bytes, _Goal] = {}
+        self._newest: MotionCommand | None = None  # of those that have begun
+        self._abandoned: MotionCommand | None = None  # drives still have its set-points
+        self._has_warned = False
         interfaces: list[GripperInterface] = [ParallelGripper()]
         if len(self._joints) == 1:
             interfaces.append(SingleGripper())
@@ -100,7 +105,8 @@ class GripperController:
         try:
             request = interface.request(handle.request, self._joints)
             self._check_active()
-            if interface.asks_effort(handle.request):
+            if interface.asks_effort(handle.request) and not self._has_warned:
+                self._has_warned = True
                 self._node.get_logger().warning(NO_EFFORT_LIMIT)
             goal.command = self._gateway.request(request, self._prepare)
         except ArmError as error:
@@ -120,18 +126,61 @@ class GripperController:
         for goal in list(self._goals.values()):
             if goal.is_concluded:
                 continue
+            self._note_begin(goal.command)
             if measured is not None:
                 goal.state = self._look(goal, measured)
             goal.problem = goal.problem or self._problem(goal)
             state = goal.state
             if goal.problem or (state is not None and (state.reached or state.stalled)):
                 goal.is_concluded = True
-                if goal.command is not None and not self._parameters.allow_stalling:
+                if goal.command is not None and not self._succeeds(goal):
                     self._gateway.cancel(goal.command, 'stalled')  # nothing moves after the end
+                    self._abandoned = goal.command
                 server = self._servers[goal.interface.name]
                 server.notify_execute(goal.handle, None)  # leads to _conclude
             elif state is not None:
                 goal.handle.publish_feedback(goal.interface.feedback(state))
+        self._hold()
+
+    def _note_begin(self, command: MotionCommand | None) -> None:
+        if command is None or command.motion is None:
+            return
+        if self._newest is None or command.number > self._newest.number:
+            self._newest = command
+
+    def _succeeds(self, goal: _Goal) -> bool:
+        """Whether a goal that ends is reached, or ends with something held."""
+        state = goal.state
+        if goal.problem or state is None:
+            return False
+        return state.reached or (state.stalled and self._parameters.allow_stalling)
+
+    def _hold(self) -> None:
+        """Have the drives hold where they are, once a goal that was not reached has come to rest.
+
+        They may be blocked, and would push on towards the place of the last set-point.
+        """
+        snapshot, command = self._gateway.snapshot, self._abandoned
+        point, measured = snapshot.set_point, snapshot.measured
+        if command is None or not command.ended.done() or snapshot.paused:
+            return
+        if point is None or measured is None:  # nobody commands them any more
+            self._abandoned = None
+            return
+        if command is not self._newest or point.source is Source.TRAJECTORY:  # another does
+            self._abandoned = None
+            return
+        moves = (np.abs(measured.velocity) > self._parameters.stall_velocity).any()
+        if point.source is not Source.NONE or point.state.moving or moves:
+            return
+        self._abandoned = None
+        off = np.abs(point.state.position - measured.position)
+        if (off > self._parameters.goal_tolerance).any():
+            limits = self._gateway.model.limits
+            there = np.clip(measured.position, limits.lower, limits.upper)
+            self._gateway.request(
+                TargetRequest(dict(zip(self._joints, there.tolist(), strict=True)))
+            )
 
     def _look(self, goal: _Goal, measured: RobotState) -> GripperState:
         """Return where the gripper is, and whether it stalls or is there."""
@@ -187,7 +236,7 @@ class GripperController:
         state = goal.state or GripperState(self._joints, nothing)
         if goal.problem and handle.is_cancel_requested:
             handle.canceled()
-        elif state.reached or (state.stalled and self._parameters.allow_stalling):
+        elif self._succeeds(goal):
             handle.succeed()
         else:
             reason = goal.problem or 'stalled in front of the goal (allow_stalling is false)'
