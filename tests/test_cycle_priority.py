@@ -14,6 +14,14 @@ import pytest
 pytestmark = [pytest.mark.scenario, pytest.mark.slow]
 
 REFUSED = 'has no real-time priority'
+WITHOUT_RIGHTS = [
+    'prlimit',
+    '--rtprio=0',
+    '--',
+    'setpriv',
+    '--inh-caps=-all',
+    '--bounding-set=-all',
+]
 
 
 def descendants(pid: int) -> list[int]:
@@ -58,3 +66,14 @@ def test_cycles_have_real_time_priority(
             (pid,) = [pid for line, pid in found.items() if f'/{program} ' in line]
             refused = [line for line in bringup.lines if REFUSED in line and program in line]
             assert len(real_time_threads(pid)) == (0 if refused else 1), (program, found)
+
+
+def test_without_the_right_to_it_a_cycle_runs_all_the_same(isolation: Isolation) -> None:
+    """As for most users, whose memory is not locked either: a warning for each, with the remedy."""
+    command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--can', isolation.bus]
+    with RunningProcess([*WITHOUT_RIGHTS, *command], isolation.env) as bringup:
+        bringup.wait_for('all is ready', 60.0)
+        for program in ('slaves', 'master'):
+            lines = [line for line in bringup.lines if line.startswith(program)]
+            assert any(REFUSED in line and 'rtprio' in line for line in lines), bringup.output
+        assert bringup.stop(30.0) == 0, bringup.output

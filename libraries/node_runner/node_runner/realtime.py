@@ -4,11 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from rclpy.node import Node
 
-from realtime_loop import Outcome, PRIORITY_MAX, raise_priority, settle_memory
+from realtime_loop import PRIORITY_MAX, raise_priority, settle_memory
 
 from .parameter_reader import ParameterReader
 
@@ -25,15 +23,13 @@ def declare_thread_priority(read: ParameterReader, default: int) -> int:
 
 def raise_thread_priority(node: Node, priority: int, what: str) -> None:
     """Give the calling thread its priority; a refusal is a warning with the remedy."""
-    _log(node, raise_priority(priority, what), refused=node.get_logger().warning)
+    outcome = raise_priority(priority, what)
+    if outcome.granted:
+        node.get_logger().info(outcome.text)
+    elif outcome.text:
+        node.get_logger().warning(outcome.text)
 
 
 def settle_process_memory(node: Node) -> None:
     """Freeze the garbage collector and lock the memory, before the cycle starts."""
-    _log(node, settle_memory(), refused=node.get_logger().info)
-
-
-def _log(node: Node, outcome: Outcome, refused: Callable[[str], object]) -> None:
-    if outcome.text:
-        log = node.get_logger().info if outcome.granted else refused
-        log(outcome.text)
+    node.get_logger().info(settle_memory().text)
