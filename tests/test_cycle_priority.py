@@ -69,7 +69,7 @@ def test_cycles_have_real_time_priority(
 
 
 def test_without_the_right_to_it_a_cycle_runs_all_the_same(isolation: Isolation) -> None:
-    """As for most users, whose memory is not locked either: a warning for each, with the remedy."""
+    """As for most users, whose memory is not locked either; a warning each has the remedy."""
     command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--can', isolation.bus]
     with RunningProcess([*WITHOUT_RIGHTS, *command], isolation.env) as bringup:
         bringup.wait_for('all is ready', 60.0)

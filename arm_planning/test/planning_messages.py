@@ -115,8 +115,8 @@ def numbers_of(message: Any) -> list[float]:
     found: list[float] = []
     if isinstance(message, Quaternion):
         numbers = np.array([message.x, message.y, message.z, message.w])
-        largest = numbers[np.abs(numbers).argmax()]
-        return list(numbers * np.sign(largest))
+        clear = numbers[np.abs(numbers) > 0.123]  # rounding turns the sign of none of these
+        return list(numbers * np.sign(clear[0]))
     if hasattr(message, 'get_fields_and_field_types'):
         for field in message.get_fields_and_field_types():
             found += numbers_of(getattr(message, field))

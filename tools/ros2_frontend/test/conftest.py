@@ -28,9 +28,9 @@ def ros2(capsys: pytest.CaptureFixture[str]) -> Ros2:
     return runner(capsys)
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture(scope='module')
 def zoo_env() -> Iterator[Mapping[str, str]]:
-    """Give the environment of a domain in which the zoo lives."""
+    """Give the environment of a domain in which the zoo lives; no longer than it is looked at."""
     with reserve() as isolation:
         env = with_frontend(isolation.env)
         zoo_program = str(Path(__file__).with_name('frontend_zoo.py'))
