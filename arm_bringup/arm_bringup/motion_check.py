@@ -85,7 +85,7 @@ def check_motion(
         notes.update(dict.fromkeys(model.notes))
         models[group] = model
         if is_arm:
-            notes.update(dict.fromkeys(filter(None, [model.assumption])))
+            notes.update(dict.fromkeys(filter(None, [model.assumption(drives)])))
             findings += _start(robot, model)
     findings += [warning(*_note(robot, note)) for note in notes]
     return findings + list(_controllers(robot, models))

@@ -47,6 +47,9 @@ class RobotModel:
         end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.
         kinematics: The joints of the group, and those that follow them; for any thread.
+        allowed: What may touch by the SRDF, and what cannot help it.
+        moved_by_others: Pairs of links that other groups move against each other, by group;
+            :attr:`scene` does not check them.
         scene: What distances are measured in, at first the robot alone; for any thread.
         reach: Greatest distance of the tip from the first joint's axis frame in [m].
     """
@@ -72,8 +75,8 @@ class RobotModel:
             group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
             folder: Folder of the URDF, where names of mesh files are relative.
-            moved_by_others: Joints of other groups, by group, of which nothing is known here:
-                links that they move against each other are not checked.
+            moved_by_others: Joints of other groups that move by themselves, by group: links that
+                they move against each other are not checked, until a scene says where they are.
 
         Raises:
             ModelError: The three do not fit together; the message names what to mend.
@@ -104,14 +107,18 @@ class RobotModel:
         self.scene = with_default_collisions(
             PlanningScene(self.kinematics, shapes.by_link, allowed), tree, self.limits, notes
         )
-        if moved_by_others:
-            joints = {joint for group in moved_by_others.values() for joint in group}
-            unknown = _moved_by(self._tree, self.scene.link_shapes, joints)
-            self.scene = self.scene.with_allowed(self.scene.allowed.with_entries(unknown, True))
+        self.allowed = self.scene.allowed
+        self.moved_by_others: Mapping[str, frozenset[Pair]] = {
+            other: frozenset(_moved_by(self._tree, self.scene.link_shapes, joints))
+            for other, joints in (moved_by_others or {}).items()
+        }
+        if self.moved_by_others:
+            unknown = frozenset().union(*self.moved_by_others.values())
+            self.scene = self.scene.with_allowed(self.allowed.with_entries(unknown, True))
             notes += [
                 f'groups {" and ".join(sorted((self.group, other)))} are not checked for collision'
-                ' with each other; keep them apart'
-                for other in moved_by_others
+                ' with each other while both move; keep them apart'
+                for other in self.moved_by_others
             ]
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
@@ -137,17 +144,20 @@ class RobotModel:
         """Links of each pair of shapes that is checked for collision."""
         return self.scene.pairs
 
-    @property
-    def assumption(self) -> str:
-        """Where joints beside the group are taken to be between links that are checked, in words.
+    def assumption(self, known: Collection[str] = ()) -> str:
+        """Return where joints beside the group are taken to be between links that are checked.
 
-        Empty where no such joint is between them: distances are those of the robot as it stands.
+        Args:
+            known: Joints of which it is known where they stand.
+
+        Returns:
+            Words; none where there is no such joint: distances are those of the robot as it is.
         """
         checked = set(map(frozenset, self.pairs))
         moved: dict[str, list[str]] = {}  # what moves with each joint beside the group
         for joint in self._tree.movable():
             source = joint.name if joint.mimic is None else joint.mimic.source
-            if source not in self.joints:
+            if source not in self.joints and source not in known:
                 moved.setdefault(source, []).append(joint.name)
         assumed = [
             f'{name} at {self.kinematics.others[name]:g}'

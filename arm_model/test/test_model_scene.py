@@ -302,11 +302,13 @@ def test_joints_beside_the_group_that_count_where_they_are_not_are_named() -> No
     """Those between links that are checked, at 0 or at the limit next to it."""
     left = two_arms('left')
     assert any('right_2_link' in pair for pair in left.pairs)
-    assert 'torso at 0, right_1 at 0, right_2 at 0,' in left.assumption
-    assert two_arms('both').assumption == ''
+    assert 'torso at 0, right_1 at 0, right_2 at 0,' in left.assumption()
+    assert 'torso at 0, right_2 at 0,' in left.assumption({'right_1'})
+    assert left.assumption({'torso', 'right_1', 'right_2'}) == ''
+    assert two_arms('both').assumption() == ''
     urdf, srdf, limits = two_arms_texts()
     raised = RobotModel(urdf.replace('lower="-1.5"', 'lower="0.2"'), srdf, limits, 'left')
-    assert 'torso at 0.2,' in raised.assumption
+    assert 'torso at 0.2,' in raised.assumption()
 
 
 def test_arms_that_move_by_themselves_are_both_named() -> None:
@@ -316,7 +318,8 @@ def test_arms_that_move_by_themselves_are_both_named() -> None:
         others = {other: two_arms(other).joints}
         model = RobotModel(*two_arms_texts(), group, moved_by_others=others)
         assert not any(f'{other}_1_link' in pair for pair in model.pairs)
-        assert f'{other}_1' not in model.assumption
+        assert f'{other}_1' not in model.assumption()
+        assert all(f'{other}_' in ' '.join(pair) for pair in model.moved_by_others[other])
         found.append(model.notes[-1])
     assert found[0] == found[1]
     assert 'groups left and right are not checked' in found[0]

@@ -37,6 +37,7 @@ class Drives:
         name: str = 'panda',
         worker: Executor | None = None,
         model: RobotModel | None = None,
+        begin: Sequence[float] | None = None,
     ) -> None:
         """Let the drives be ready to follow; a test that changes the scene has its own model."""
         self.now = 100.0
@@ -46,7 +47,9 @@ class Drives:
         self.source = DriveSource(self.gateway)
         self.axes = [
             AxisFeedback(joint, True, DriveState.OPERATION_ENABLED, 8, at, 0.0, at, True)
-            for joint, at in zip(self.gateway.model.joints, ready(name).tolist(), strict=True)
+            for joint, at in zip(
+                self.gateway.model.joints, begin or ready(name).tolist(), strict=True
+            )
         ]
         self.path: list[Array] = []
         self.attachments: list[MotionSource] = []

@@ -6,18 +6,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from types import SimpleNamespace
-from typing import Any
 
 from geometry_msgs.msg import Point, Pose
 from model_robots import table, texts
 from moveit_msgs.msg import CollisionObject, PlanningScene, PlanningSceneWorld
-from servo_commands import SteppedWorker
 from servo_drives import Drives
+from servo_scenes import Listener
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import RobotModel
-from arm_servo.ros.scene_listener import SceneListener
 
 
 def message(name: str, frame: str = '') -> PlanningScene:
@@ -26,47 +23,6 @@ def message(name: str, frame: str = '') -> PlanningScene:
     box = CollisionObject(id=name, primitives=[shape], pose=Pose(position=Point(x=2.0)))
     box.header.frame_id = frame
     return PlanningScene(world=PlanningSceneWorld(collision_objects=[box]))
-
-
-class Listener:
-    """The listener without ROS, whose scenes are built when the test says so.
-
-    Attributes:
-        drives: The drives of each arm.
-        errors: What was logged as an error.
-        warnings: What was warned of.
-    """
-
-    def __init__(self, *drives: Drives) -> None:
-        self.drives = drives
-        self.errors: list[str] = []
-        self.warnings: list[str] = []
-        logger = SimpleNamespace(
-            error=lambda text, **_: self.errors.append(text), warning=self.warnings.append
-        )
-        node: Any = SimpleNamespace(
-            get_logger=lambda: logger,
-            create_subscription=lambda *_: None,
-            create_timer=lambda *_: None,
-        )
-        self._now = 0.0
-        self._worker = SteppedWorker()
-        gateways = [each.gateway for each in drives]
-        self._made = SceneListener(node, gateways, self._worker, lambda: self._now)
-
-    def take(self, message: PlanningScene) -> None:
-        """Let a message come; nothing is built yet."""
-        self._made._take(message)
-
-    def run(self, seconds: float = 0.1) -> None:
-        """Let time pass, and build what can be."""
-        self._now += seconds
-        self._made._retry()
-        while self._worker.run():
-            pass
-        for each in self.drives:
-            if each.attachments:
-                each.run()
 
 
 def arm() -> Drives:

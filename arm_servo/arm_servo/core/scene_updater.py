@@ -1,22 +1,34 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scene of one group: what a planner publishes, applied once it is known where the arm is."""
+"""The scene of one group: what a planner publishes, with the joints beside it where they are.
+
+A group that moves by itself (another arm) is checked against where it came to rest; while it
+moves, links that it moves are not checked. Other joints beside the group (a gripper, a neck, a
+lift) are checked where they are, or were half a second ago.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+
+from urdf_reader import Pair
 
 from arm_model import Array, PlanningScene
 
 from .gateway import CommandGateway
+from .joint_places import JointPlaces, PLACE_TOLERANCE
 
 SceneChange = Callable[[PlanningScene, Array], PlanningScene]
 """Makes a scene of the one before and the positions of the group's joints in [rad]."""
 
+MOVING_PERIOD = 0.5
+"""Time between two scenes for a joint beside the group that moves in [s]."""
+
 
 class SceneUpdater:
-    """Has the newest scene of a planner count for one group.
+    """Has the newest scene count for one group, as it is with the joints beside the group.
 
     :meth:`replace` is for any thread, :meth:`update` for one: it takes as long as it needs.
 
@@ -24,20 +36,33 @@ class SceneUpdater:
         gateway: Commands to the core of the group.
     """
 
-    def __init__(self, gateway: CommandGateway) -> None:
+    def __init__(self, gateway: CommandGateway, arms: Mapping[str, Sequence[str]]) -> None:
         """Begin with the scene of the model.
 
         Args:
             gateway: Commands to the core of the group.
+            arms: Joints of the arms that move by themselves, by group.
         """
         self.gateway = gateway
-        self._scene = gateway.model.scene
+        model = gateway.model
+        self._scene = self._planned = model.scene
+        self._moved_by_others = model.moved_by_others
+        self._arms = {group: arms[group] for group in self._moved_by_others}
+        self._unchecked = self._moved_by(self._arms)
+        if self._unchecked:
+            self._planned = model.scene.with_allowed(model.allowed)
+        self._moved = -math.inf
         self._newest: deque[SceneChange] = deque(maxlen=1)
 
     @property
     def waits(self) -> bool:
         """Whether a scene does not count yet."""
         return bool(self._newest)
+
+    @property
+    def others(self) -> Mapping[str, float]:
+        """Where the joints beside the group count in [rad], by joint."""
+        return self._planned.kinematics.others
 
     @property
     def is_placed(self) -> bool:
@@ -52,16 +77,53 @@ class SceneUpdater:
         """
         self._newest.append(change)
 
-    def update(self) -> None:
-        """Apply what waits, if it is known where the group is; one that is equal changes nothing.
+    def update(self, joints: JointPlaces, now: float) -> None:
+        """Apply what is new, if it is known where the group is; an equal scene changes nothing.
+
+        Args:
+            joints: Where the joints of the robot are.
+            now: Steady time in [s].
 
         Raises:
             ArmError: The scene is refused; the one before counts.
         """
         reference = self.gateway.snapshot.reference
-        if reference is None or not self._newest:
+        if reference is None:
             return
-        scene = self._newest.pop()(self._scene, reference.position)
+        moved = self._planned.kinematics.with_others(self._elsewhere(joints, now))
+        planned = self._planned.with_others(moved)
+        if self._newest:
+            planned = self._newest.pop()(planned, reference.position)
+        unchecked = self._moved_by(
+            group
+            for group, names in self._arms.items()
+            if any(name in joints.moving or name not in joints.places for name in names)
+        )
+        if planned is self._planned and unchecked == self._unchecked:
+            return
+        self._planned, self._unchecked = planned, unchecked
+        scene = planned
+        if unchecked:
+            scene = planned.with_allowed(planned.allowed.with_entries(unchecked, True))
         if not scene.is_same(self._scene):
             self.gateway.use_scene(scene)
             self._scene = scene
+
+    def _moved_by(self, groups: Iterable[str]) -> frozenset[Pair]:
+        """Return the pairs of links that groups move."""
+        return frozenset().union(*(self._moved_by_others[group] for group in groups))
+
+    def _elsewhere(self, joints: JointPlaces, now: float) -> Mapping[str, float]:
+        """Return the joints beside the group that count where they are not any more."""
+        of_arms = {name for names in self._arms.values() for name in names}
+        waits = now - self._moved < MOVING_PERIOD
+        found = {
+            joint: joints.places[joint]
+            for joint, place in self.others.items()
+            if joint in joints.places
+            and abs(joints.places[joint] - place) > PLACE_TOLERANCE
+            and not (joint in joints.moving and (waits or joint in of_arms))
+        }
+        if found:
+            self._moved = now
+        return found

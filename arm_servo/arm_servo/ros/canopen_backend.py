@@ -151,7 +151,14 @@ class CanopenMotion:
             for model in models.tools
         ]
         self._groups: list[ArmMotion[BusDrives] | ToolMotion[BusDrives]] = [*arms, *tools]
-        SceneListener(manager, [group.drives.gateway for group in self._groups])
+        SceneListener(
+            manager,
+            [
+                *(arm.drives.gateway for arm in arms),
+                *(tool.drives.gateway for tool in tools if tool.checks),
+            ],
+            [tool.drives.gateway for tool in tools if not tool.checks],
+        )
         broadcaster = make_node('joint_state_broadcaster')
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
@@ -171,8 +178,7 @@ class CanopenMotion:
         for node in self.nodes:
             check_names(node)
         notes = [note for model in (*models.arms, *models.tools) for note in model.notes]
-        notes += [model.assumption for model in models.arms]  # links of tools may touch
-        for note in filter(None, dict.fromkeys(notes)):
+        for note in dict.fromkeys(notes):
             manager.get_logger().warning(note)
 
     def _attach_first(self) -> None:

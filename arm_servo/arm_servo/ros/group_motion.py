@@ -132,6 +132,7 @@ class ToolMotion(Generic[AnyDrives]):
     Attributes:
         drives: Its drives.
         nodes: Its node.
+        checks: Whether its motions are checked for collision.
     """
 
     def __init__(
@@ -153,6 +154,7 @@ class ToolMotion(Generic[AnyDrives]):
         settings = CoreSettings(
             execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
         )
+        self.checks = trajectory.check
         self.nodes: Sequence[Node] = (controller,)
         self.drives = drives = make_drives(model, settings)
         self._controller = TrajectoryController(

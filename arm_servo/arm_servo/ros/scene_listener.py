@@ -1,16 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The scene of the planner, for the groups that are moved here."""
+"""The scene of the planner, and where joints are, for the groups that are moved here."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
+import math
 import time
 
 from moveit_msgs.msg import PlanningScene
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
 from arm_model import ArmError, Array
 from arm_model import PlanningScene as Scene
@@ -18,46 +20,67 @@ from arm_model.ros import apply_planning_scene
 from node_runner import LATCHED
 
 from ..core.gateway import CommandGateway
+from ..core.joint_places import JointPlaces
 from ..core.scene_updater import SceneUpdater
+from ..core.set_point import Source
 
 TOPIC = 'monitored_planning_scene'
 """Where move_group publishes its scene, latched."""
 
-RETRY_PERIOD = 0.1
-"""Time between two looks whether the groups' positions are known in [s]."""
+LOOK_PERIOD = 0.1
+"""Time between two looks where the joints are in [s]."""
 
 PLACE_TIMEOUT = 1.0
 """Time for which a scene waits for a group's position without a warning in [s]."""
 
+OTHERS_TIMEOUT = 5.0
+"""Time for which joints beside a group are awaited without a warning in [s]."""
+
 
 class SceneListener:
-    """Applies each scene of the topic to all groups; what is refused is logged.
+    """Applies each scene of the topic to all groups, with the joints beside them where they are.
 
     Scenes are built and measured in a thread of their own: neither the executor nor a cycle waits.
+    What is refused is logged.
     """
 
     def __init__(
         self,
         node: Node,
         gateways: Sequence[CommandGateway],
+        unchecked: Sequence[CommandGateway] = (),
+        *,
+        joint_topic: str = 'joint_states',
         worker: Executor | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Subscribe.
+        """Subscribe; to joint states only where there are joints besides those of the groups.
 
         Args:
             node: The node.
-            gateways: Commands to the core of each group.
+            gateways: Commands to the core of each group that is checked for collision.
+            unchecked: The same of the other groups, which the checked ones may meet.
+            joint_topic: Joint states of the robot.
             worker: Builds the scenes, one after the other; by default a thread.
             clock: Steady time in [s].
         """
         self._node, self._clock = node, clock
         self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='scenes')
-        self._updaters = [SceneUpdater(gateway) for gateway in gateways]
-        self._received = -1.0
+        arms = {gateway.model.group: gateway.model.joints for gateway in gateways}
+        self._updaters = [SceneUpdater(gateway, arms) for gateway in gateways]
+        self._gateways = [*gateways, *unchecked]
+        self._received = clock()
         self._unplaced = list(self._updaters)  # those of which no warning has said so
+        self._assuming = list(self._updaters)  # the same for joints beside them
+        self._placed: dict[SceneUpdater, float] = {}  # since when
+        self._joints = JointPlaces()
+        self._places: dict[str, float] = {}
+        commanded = {name for gateway in self._gateways for name in gateway.model.joints}
+        self._awaited = {name for each in self._updaters for name in each.others} - commanded
         node.create_subscription(PlanningScene, TOPIC, self._take, LATCHED)
-        node.create_timer(RETRY_PERIOD, self._retry)
+        if self._awaited:
+            node.create_subscription(JointState, joint_topic, self._take_joints, 10)
+        node.create_timer(LOOK_PERIOD, self._look)
 
     def _take(self, message: PlanningScene) -> None:
         if message.is_diff:
@@ -71,27 +94,40 @@ class SceneListener:
         self._received = self._clock()
         for updater in self._updaters:
             updater.replace(partial(_replaced, message))
-        self._retry()
+        self._submit()
 
-    def _retry(self) -> None:
-        """Have applied what can be, and warn of groups for which a scene waits in vain."""
+    def _take_joints(self, message: JointState) -> None:
+        self._places.update(
+            (name, place)
+            for name, place in zip(message.name, message.position, strict=False)
+            if name in self._awaited and math.isfinite(place)
+        )
+
+    def _look(self) -> None:
+        """See where the joints are, and have applied what is new."""
+        places, commanded = dict(self._places), set[str]()
+        for gateway in self._gateways:
+            snapshot, names = gateway.snapshot, gateway.model.joints
+            reference = snapshot.reference
+            if reference is not None:
+                places.update(zip(names, reference.position.tolist(), strict=True))
+                if snapshot.source is not Source.NONE or reference.moving:
+                    commanded.update(names)
+        self._joints = self._joints.next(places, commanded)
+        self._submit()
+        self._warn_of_groups()
+        self._warn_of_others()
+
+    def _submit(self) -> None:
+        joints, now = self._joints, self._clock()
         for updater in self._updaters:
-            if not updater.waits:
-                continue
-            if updater.is_placed:
-                self._worker.submit(self._update, updater)
-            elif updater in self._unplaced and self._clock() - self._received > PLACE_TIMEOUT:
-                self._unplaced.remove(updater)
-                self._node.get_logger().warning(
-                    f'{updater.gateway.model.group}: its position is not known, so the scene of'
-                    f' {TOPIC} does not count for it yet; is its bus up, are its joint states'
-                    ' published?'
-                )
+            if updater.is_placed and (updater.waits or updater.others):
+                self._worker.submit(self._update, updater, joints, now)
 
-    def _update(self, updater: SceneUpdater) -> None:
-        """Apply what waits for a group; in the thread of the scenes."""
+    def _update(self, updater: SceneUpdater, joints: JointPlaces, now: float) -> None:
+        """Apply what is new for a group; in the thread of the scenes."""
         try:
-            updater.update()
+            updater.update(joints, now)
         except Exception as error:  # noqa: BLE001  # a scene must not end the thread
             reason = (
                 str(error) if isinstance(error, ArmError) else f'{type(error).__name__}: {error}'
@@ -100,6 +136,27 @@ class SceneListener:
                 f'{TOPIC} refused for {updater.gateway.model.group}, the scene before counts:'
                 f' {reason}'
             )
+
+    def _warn_of_groups(self) -> None:
+        """Name once each group for which a scene waits, as it is not known where it is."""
+        for updater in self._unplaced.copy():
+            waited = self._clock() - self._received
+            if updater.waits and not updater.is_placed and waited > PLACE_TIMEOUT:
+                self._unplaced.remove(updater)
+                self._node.get_logger().warning(
+                    f'{updater.gateway.model.group}: its position is not known, so the scene of'
+                    f' {TOPIC} does not count for it yet; is its bus up, are its joint states'
+                    ' published?'
+                )
+
+    def _warn_of_others(self) -> None:
+        """Name once the joints beside each group of which it is not known where they are."""
+        now = self._clock()
+        for updater in self._assuming.copy():
+            if updater.is_placed and now - self._placed.setdefault(updater, now) > OTHERS_TIMEOUT:
+                self._assuming.remove(updater)
+                if assumption := updater.gateway.model.assumption(self._joints.places):
+                    self._node.get_logger().warning(assumption)
 
 
 def _replaced(message: PlanningScene, scene: Scene, positions: Array) -> Scene:

@@ -189,7 +189,7 @@ class TopicDrives:
             model: The arm.
             settings: How the core behaves.
         """
-        for note in filter(None, (*model.notes, model.assumption)):
+        for note in model.notes:
             node.get_logger().warning(note)
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
@@ -203,7 +203,7 @@ class TopicDrives:
             raise_thread_priority(node, loop.priority, 'the motion loop')
 
         node.create_subscription(JointState, loop.joint_topic, receive, 10)
-        SceneListener(node, [self.gateway])
+        SceneListener(node, [self.gateway], joint_topic=loop.joint_topic)
         publish = TopicOutput(node, wanted, list(model.joints), loop.period)
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)

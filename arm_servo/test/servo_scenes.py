@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The listener to scenes under test, without ROS and without a thread."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from moveit_msgs.msg import PlanningScene
+from servo_commands import SteppedWorker
+from servo_drives import Drives
+
+from arm_servo.ros.scene_listener import SceneListener
+
+
+class Listener:
+    """The listener without ROS, whose scenes are built when the test says so.
+
+    Attributes:
+        drives: The drives of each arm.
+        errors: What was logged as an error.
+        warnings: What was warned of.
+        made: The listener.
+    """
+
+    def __init__(self, *drives: Drives) -> None:
+        self.drives = drives
+        self.errors: list[str] = []
+        self.warnings: list[str] = []
+        logger = SimpleNamespace(
+            error=lambda text, **_: self.errors.append(text), warning=self.warnings.append
+        )
+        node: Any = SimpleNamespace(
+            get_logger=lambda: logger,
+            create_subscription=lambda *_: None,
+            create_timer=lambda *_: None,
+        )
+        self._now = 0.0
+        self._worker = SteppedWorker()
+        gateways = [each.gateway for each in drives]
+        self.made = SceneListener(node, gateways, worker=self._worker, clock=lambda: self._now)
+
+    def take(self, message: PlanningScene) -> None:
+        """Let a message come; nothing is built yet."""
+        self.made._take(message)
+
+    def run(self, seconds: float = 0.1) -> None:
+        """Let time pass, and build what can be."""
+        self._now += seconds
+        self.made._look()
+        while self._worker.run():
+            pass
+        for each in self.drives:
+            if each.attachments:
+                each.run()
