@@ -22,7 +22,7 @@ from .motion_check import check_motion
 from .robots import Robot
 from .semantic_check import check_semantic
 from .session import add_robot, locate, robots_epilog
-from .start_positions import check_given
+from .start_positions import given_positions
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -75,7 +75,7 @@ def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
     try:
         bus = read_bus(robot)
         in_namespace_of_bus(RosOptions(), bus)
-        check_given(robot, bus.joints)
+        given_positions(robot, bus.joints)
     except RobotError as problem:
         return [*findings, error('bus.yml', str(problem), 'see README of arm_bringup')], []
     return findings, list(bus.joints)

@@ -66,7 +66,8 @@ class Robot:
         packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
         groups: Groups of the SRDF that are moved; empty takes all arms of it.
         tip_link: Link that is moved; empty takes the end of the first group.
-        start_positions: Where simulated drives stand at power-on, by name, in [rad or m].
+        start_positions: Where simulated drives stand at power-on, by name, in [rad or m]; or the
+            name of a pose of the SRDF.
     """
 
     name: str
@@ -79,7 +80,7 @@ class Robot:
     packages: Mapping[str, Path] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
     tip_link: str = ''
-    start_positions: Mapping[str, float] = field(default_factory=dict)
+    start_positions: Mapping[str, float] | str = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -208,9 +209,14 @@ def _settings(path: Path) -> dict[str, Any]:
     return settings
 
 
-def _positions(path: Path, value: object) -> dict[str, float]:
+def _positions(path: Path, value: object) -> dict[str, float] | str:
+    if isinstance(value, str):
+        return value
     if not isinstance(value, dict):
-        raise RobotError(f'{path}: {START_POSITIONS}: a table of drives and numbers is needed')
+        raise RobotError(
+            f'{path}: {START_POSITIONS}: a table of drives and numbers is needed, or a pose of the'
+            ' SRDF'
+        )
     for name, number in value.items():
         if isinstance(number, bool) or not isinstance(number, int | float):
             raise RobotError(f'{path}: {START_POSITIONS}: {name}: {number!r} is no number')

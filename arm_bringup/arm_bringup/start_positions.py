@@ -12,8 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import urdf_reader
+from urdf_reader import parse_srdf
+
 from .description import joint_limits, read_semantic
-from .exceptions import BringupError, RobotError
+from .exceptions import BringupError, DescriptionError, RobotError
 from .groups import moved_groups
 from .robots import Robot, SETTINGS, START_POSITIONS
 
@@ -54,8 +57,7 @@ def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPosi
         RobotError: robot.yaml names something that is no drive, or no pose is found.
     """
     if robot.start_positions:
-        check_given(robot, drives)
-        return StartPositions(robot.start_positions, f'{SETTINGS} has {START_POSITIONS}')
+        return StartPositions(given_positions(robot, drives), f'{SETTINGS} has {START_POSITIONS}')
     ranges = {name: each for name, each in joint_limits(urdf).items() if name in drives}
     positions: dict[str, float] = {}
     reasons: list[str] = []
@@ -72,17 +74,36 @@ def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPosi
     return StartPositions(positions, f'at 0 {"; ".join(reasons)}' if reasons else '')
 
 
-def check_given(robot: Robot, drives: Sequence[str]) -> None:
-    """Make sure that robot.yaml gives positions of drives.
+def given_positions(robot: Robot, drives: Sequence[str]) -> Mapping[str, float]:
+    """Return the start positions that robot.yaml gives, by drive in [rad or m].
 
     Raises:
-        RobotError: It names something else.
+        RobotError: It names something that is no drive, or a pose that the SRDF does not have.
     """
-    if unknown := [name for name in robot.start_positions if name not in drives]:
+    given = robot.start_positions
+    if isinstance(given, str):
+        return {name: at for name, at in _pose(robot, given).items() if name in drives}
+    if unknown := [name for name in given if name not in drives]:
         raise RobotError(
             f'{robot.folder / SETTINGS}: {START_POSITIONS}: bus.yml has no drive '
             f'{", ".join(unknown)}; drives: {", ".join(drives)}'
         )
+    return given
+
+
+def _pose(robot: Robot, name: str) -> Mapping[str, float]:
+    """Return a pose of the SRDF, of all groups that have one of this name."""
+    key = f'{robot.folder / SETTINGS}: {START_POSITIONS}'
+    if not robot.semantic.is_file():
+        raise RobotError(f'{key}: {name!r} is a pose of the SRDF, and there is none')
+    try:
+        poses = parse_srdf(read_semantic(robot)).poses.values()
+    except (DescriptionError, urdf_reader.DescriptionError) as error:
+        raise RobotError(f'{robot.folder}: {error}') from error
+    if not any(name in each for each in poses):
+        known = ', '.join(dict.fromkeys(pose for each in poses for pose in each)) or 'none'
+        raise RobotError(f'{key}: the SRDF has no pose {name!r}; poses: {known}')
+    return {joint: at for each in poses for joint, at in each.get(name, {}).items()}
 
 
 def _models(robot: Robot, urdf: str) -> list[RobotModel]:

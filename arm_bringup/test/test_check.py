@@ -121,9 +121,9 @@ def test_the_remedy_is_for_the_file_that_is_the_matter(
 
 def test_without_the_files_of_motion(robot: Robot) -> None:
     """A robot that only its drives' services move is complete; that is warned of."""
-    robot.semantic.unlink()
-    robot.limits.unlink()
-    (finding,) = check_robot(robot)
+    for file in (robot.semantic, robot.limits, robot.folder / 'robot.yaml'):
+        file.unlink()
+    (finding,) = check_robot(find_robot('gp110', robot.folder.parent))
     assert finding.severity is WARNING
     assert 'gp110.srdf and limits.yaml' in finding.problem
 
