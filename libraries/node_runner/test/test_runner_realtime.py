@@ -33,7 +33,7 @@ def test_each_combination_is_logged(
     settle_process_memory(node)
     raise_thread_priority(node, 80, 'the cycle')
     settle_process_memory(node)
-    node.destroy_node()
+    node.destroy_node()  # type: ignore[no-untyped-call]
     context.shutdown()
     level = 'INFO' if priority else 'WARN'
     written = capfd.readouterr().err
