@@ -124,9 +124,9 @@ class Rig(ABC):
         self.client.spin_until(lambda: sent >= count, TIMEOUT, 'stream of commands')
         self.client.node.destroy_timer(timer)
 
-    def swing(self, duration: float) -> None:
-        """Publish commands of a trot, 50 times a second, that break off in the air [s]."""
-        count, sent = round(duration / 0.02), 0
+    def swing(self, steps: int) -> None:
+        """Publish commands of a trot, 50 times a second, that break off in a step."""
+        count, sent = 7 * steps + 4, 0  # between two steps all feet stand
 
         def send() -> None:
             nonlocal sent

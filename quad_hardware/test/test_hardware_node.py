@@ -159,7 +159,7 @@ def test_an_arm_that_is_not_there_disturbs_nothing(rig: NodeRig, garbage: float)
 
 def test_commands_that_break_off_in_motion_end_in_a_safe_posture(rig: NodeRig) -> None:
     """The legs fold softly and diagnostics is in error, until somebody commands again."""
-    rig.swing(1.0)
+    rig.swing(7)
     rig.wait_for_status('joint commands', DiagnosticStatus.ERROR, 'lies down')
     lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
     rig.client.spin_until(
@@ -203,14 +203,14 @@ def test_a_node_that_ends_in_motion_folds_the_legs_first(
 ) -> None:
     """As when the controller has died and the rest of the bring-up is stopped."""
     with NodeRig(isolation, tmp_path) as rig:
-        rig.swing(1.0)
+        rig.swing(7)
         assert rig.node.stop() == 0
         lying = [math.degrees(angle) for angle in pose_positions(Pose.LIE).values()]
         # on a busy machine the robot takes its last frames later than the node ends
         rig.client.spin_until(
             lambda: [rig.peer.angles[m] for m in LEGS_ORDER] == pytest.approx(lying, abs=0.1),
             TIMEOUT,
-            'folded legs',
+            f'folded legs after {rig.node.output}',
         )
 
 

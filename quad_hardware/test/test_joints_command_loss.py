@@ -22,6 +22,7 @@ from quad_description import (
     robot_urdf,
 )
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
+from quad_hardware.joints.command import MAX_PERIOD
 from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
@@ -228,6 +229,37 @@ def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
     assert line.commander.counters.loss
     assert line.commander.take(LYING, STAND, now + 1.0) is not None
     assert not line.commander.counters.loss
+
+
+@pytest.mark.parametrize('share', [0.1, 0.5, 0.9, 0.99])
+def test_a_pause_on_the_way_down_makes_it_later_and_not_quicker(share: float) -> None:
+    """A busy machine: all of the way is sent, and no step is larger for it."""
+    line = Line()
+    now = line.walk(2.0) + line.commander.timeout
+    line.commander.miss(STAND, 0.0, now)
+    place, end, pause = STAND, now + share, 0.45
+    while line.commander.goes_down:
+        now += PERIOD
+        if now > end:
+            now, pause = now + pause, 0.0
+        before = place
+        if command := line.commander.go_down(place, now):
+            place = dict(zip(NAMES, command.targets, strict=True))
+            assert not command.slowed
+        assert max(abs(place[n] - before[n]) for n in NAMES) <= SPEED * MAX_PERIOD * 1.01
+    assert line.sent[-1] == pytest.approx(JOINTS.angles(LYING))
+
+
+def test_a_pause_with_a_foot_in_the_air_does_not_begin_a_new_stream() -> None:
+    """A controller stutters, goes on for a moment and is gone: the robot comes down."""
+    for noticed in (False, True):
+        loss = command_loss()
+        now = stream(loss, 2.0, 0.3) + 0.5
+        if noticed:
+            assert loss.begin(STAND, 0.0, now) == ''
+            loss.step(now + PERIOD)
+        stream(loss, 0.2, 0.3, start=now + 2 * PERIOD)
+        assert loss.hazard
 
 
 @pytest.mark.parametrize('cut', ['before', 'on the way'])

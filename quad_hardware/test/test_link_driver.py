@@ -18,7 +18,7 @@ from quad_hardware.link import Driver, LinkOptions, LinkState, SerialPort
 from quad_hardware.link.dialect import Dialect
 from quad_hardware.link.v1_dialect import V1Dialect
 from quad_hardware.link.v2_dialect import V2Dialect
-from quad_hardware.protocol import Code, Frame, Kind, LEG_MOTORS, V1, V2
+from quad_hardware.protocol import Code, Frame, Kind, LEG_MOTORS, Protocol, V1, V2
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
@@ -122,6 +122,18 @@ def test_a_command_reaches_the_servos(rig: Rig) -> None:
     assert rig.peer.commands[0].keys() == set(LEG_MOTORS)
     rig.reports(2)
     assert rig.states[-1].positions[42] == pytest.approx(12.0, abs=0.4)
+
+
+@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
+def test_what_was_accepted_is_sent_before_the_end(protocol: Protocol, tmp_path: Path) -> None:
+    """The last command of a robot that is laid down is the one that matters."""
+    with PtyPeer(tmp_path / 'port', protocol) as peer:
+        rig = Rig(peer)
+        rig.driver.start()
+        rig.reports(1)
+        assert rig.driver.command(dict.fromkeys(LEG_MOTORS, 12.0))
+        rig.driver.stop()
+        wait_for(lambda: bool(peer.commands), 'command')
 
 
 def test_servos_let_go_and_hold_again(rig: Rig) -> None:

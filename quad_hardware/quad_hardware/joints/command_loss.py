@@ -16,6 +16,7 @@ import math
 
 from quad_description import Pose, pose_positions, STREAM_TIMEOUT
 
+from .command import MAX_PERIOD
 from .mapping import JointMap
 
 MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
@@ -31,17 +32,27 @@ class LossReaction(Enum):
     HOLD = 'hold'  # stays as it is
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Descent:
     start: Mapping[str, float]
     end: Mapping[str, float]
-    began_at: float  # [s]
+    stepped_at: float  # [s]
     duration: float  # [s]
+    elapsed: float = 0.0  # [s]
 
-    def positions(self, names: Sequence[str], now: float) -> list[float]:
-        """Return positions on a path with a soft start and end [rad]."""
-        share = min(max((now - self.began_at) / self.duration, 0.0), 1.0)
-        share = 0.5 * (1.0 - math.cos(math.pi * share))
+    @property
+    def is_over(self) -> bool:
+        """Whether the end was reached."""
+        return self.elapsed >= self.duration
+
+    def step(self, names: Sequence[str], now: float) -> list[float]:
+        """Return the next positions on a path with a soft start and end [rad].
+
+        It waits while nobody steps: what is sent keeps up with it, to its end.
+        """
+        self.elapsed += min(max(now - self.stepped_at, 0.0), MAX_PERIOD)
+        self.stepped_at = now
+        share = 0.5 * (1.0 - math.cos(math.pi * min(self.elapsed / self.duration, 1.0)))
         pairs = ((self.start[name], self.end[name]) for name in names)
         return [start + share * (end - start) for start, end in pairs]
 
@@ -86,9 +97,9 @@ class CommandLoss:
 
     def commanded(self, targets: Sequence[float], now: float) -> None:
         """Take note of targets that were sent [rad]; whoever commands ends the way down."""
+        if now - self._last_at > self.timeout and not (self.goes_down or self.hazard):
+            self._began_at = now  # a pause with a foot in the air is part of a stream
         self._descent = None
-        if now - self._last_at > self.timeout:
-            self._began_at = now
         self._last_at, self._last = now, targets[: len(self._legs)]
 
     def forget(self) -> None:
@@ -116,13 +127,14 @@ class CommandLoss:
         Returns:
             Why the robot holds; empty when it goes down.
         """
+        began_at = self._began_at
         self.forget()
         if reason := self._obstacle(place, tilt):
             return reason
         travel = max(abs(self._lying[name] - place[name]) for name in self._legs)
         # a cosine is pi / 2 times as fast in its middle as on average
         duration = max(MIN_DURATION, travel * math.pi / 2 / SPEED)
-        self._descent = _Descent(dict(place), self._lying, now, duration)
+        self._descent, self._began_at = _Descent(dict(place), self._lying, now, duration), began_at
         return ''
 
     def step(self, now: float) -> list[float] | None:
@@ -130,9 +142,10 @@ class CommandLoss:
         descent = self._descent
         if descent is None:
             return None
-        if now >= descent.began_at + descent.duration:
-            self._descent = None
-        return descent.positions(self._legs, now)
+        positions = descent.step(self._legs, now)
+        if descent.is_over:
+            self.forget()
+        return positions
 
     def _obstacle(self, place: Mapping[str, float], tilt: float | None) -> str:
         if self._reaction is LossReaction.HOLD:

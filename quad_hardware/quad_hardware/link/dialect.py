@@ -85,6 +85,11 @@ class Dialect(ABC, Generic[Received]):
         """Ids of the motors whose angles the robot reports."""
 
     @property
+    @abstractmethod
+    def pending(self) -> bool:
+        """Whether a command or a change of torque has not been given to the line yet."""
+
+    @property
     def torque_pending(self) -> bool:
         """Whether a change of torque has not been given to the line yet."""
         return False

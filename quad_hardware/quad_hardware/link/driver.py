@@ -80,7 +80,7 @@ class Driver:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread and close the port; servos hold their last target."""
+        """Send what was accepted, end the thread and close the port; servos hold their target."""
         self._stopping.set()
         self._wake()
         if self._thread.is_alive():
@@ -201,7 +201,7 @@ class Driver:
         )
         problem = latency_problem(session.port.path, self._latency)
         self._enter(LinkState.WAITING, '; '.join(filter(None, (found, problem))))
-        while not self._stopping.is_set():
+        while not self._stopping.is_set() or self._owes(dialect):
             now = time.monotonic()
             if now - self._received_at > RECONNECT_TIMEOUT:
                 raise LinkError(f'no report for {RECONNECT_TIMEOUT} s; connecting again')
@@ -217,6 +217,11 @@ class Driver:
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
             bytes_at = self._listen(session, max(timeout, 0.0), bytes_at)
+
+    def _owes(self, dialect: Dialect[Any]) -> bool:
+        """Return whether an order was accepted that is still to be sent."""
+        running = self._state is LinkState.RUNNING
+        return running and (dialect.pending or not self._mailbox.is_empty)
 
     def _deadline(self, now: float) -> float:
         """Return when silence has lasted long enough to do something about it [s]."""

@@ -64,6 +64,12 @@ class Mailbox:
                 self._orders = replace(self._orders, torque=on)
             return self._open
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is nothing to be taken."""
+        with self._lock:
+            return self._orders == _NONE
+
     def take(self) -> Orders:
         """Return what is to be sent now."""
         with self._lock:

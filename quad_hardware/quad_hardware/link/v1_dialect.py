@@ -102,6 +102,11 @@ class V1Dialect(Dialect[Frame]):
         return BULK_READ_ORDER
 
     @property
+    def pending(self) -> bool:
+        """Whether a command or a change of torque has not been given to the line yet."""
+        return bool(self._legs or self._arm or self._torque)
+
+    @property
     def torque_pending(self) -> bool:
         """Whether a change of torque has not been given to the line yet."""
         return bool(self._torque)
@@ -162,7 +167,7 @@ class V1Dialect(Dialect[Frame]):
         return None
 
     def _wake(self) -> float:
-        commands = self._free_at if self._legs or self._arm or self._torque else math.inf
+        commands = self._free_at if self.pending else math.inf
         if self._waiting is not None:
             return min(commands, self._deadline(self._waiting))
         return min(commands, self._free_at if self._queue else self._cycle_at)

@@ -53,6 +53,11 @@ class V2Dialect(Dialect[Frame]):
         return MOTOR_ORDER
 
     @property
+    def pending(self) -> bool:
+        """Whether a command or a change of torque has not been given to the line yet."""
+        return bool(self._pending or self._torque)
+
+    @property
     def torque_pending(self) -> bool:
         """Whether a change of torque has not been given to the line yet."""
         return bool(self._torque)

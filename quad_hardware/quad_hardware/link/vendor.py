@@ -171,6 +171,11 @@ class VendorDialect(Dialect[object]):
         """Ids of the motors whose angles the robot reports."""
         return MOTOR_ORDER
 
+    @property
+    def pending(self) -> bool:
+        """Whether angles have not been written yet."""
+        return bool(self._angles)
+
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are written at the next step."""
         self._angles = dict(angles)
