@@ -25,6 +25,8 @@ from arm_servo.core.gateway import CommandGateway
 from arm_servo.io.drive_source import DriveSource
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
+pytestmark = pytest.mark.slow
+
 LOST = 'panda_joint3'
 TPDOS, RPDOS = (0x180, 0x280), (0x200, 0x300, 0x400)
 TIME_OUT = 0.5  # [s] of silence of a drive, or of a position that stays behind

@@ -9,6 +9,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 FOREIGN = {'can', 'canopen', 'launch', 'lark', 'rich', 'rosidl_generator_py', 'scipy', 'xacro'}
 """Adapters of python-can, tools, terminals and descriptions; none is a master's business."""
 MODEL = {'pinocchio'}

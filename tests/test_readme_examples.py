@@ -12,6 +12,8 @@ from isolation import Isolation
 import pytest
 from readme_folder import CHECKOUT, READMES, run_examples
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize('package', READMES)
 def test_examples_run(package: str, tmp_path: Path, isolation: Isolation) -> None:

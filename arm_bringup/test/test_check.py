@@ -19,6 +19,8 @@ from arm_bringup.motion import controller_name
 from arm_bringup.robots import find_robot, Robot
 from process_supervisor import RosOptions
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parents[1] / 'robots'
 ERROR, WARNING = Severity.ERROR, Severity.WARNING
 

@@ -14,6 +14,8 @@ from urdf_kinematics import forward, numbers, transform
 from arm_bringup.description import expand_xacro, joint_limits
 from arm_bringup.exceptions import DescriptionError
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parents[1] / 'robots'
 HALF_PI = math.pi / 2
 

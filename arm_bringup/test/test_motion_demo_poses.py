@@ -19,6 +19,8 @@ from arm_bringup.demos.motion.poses import (
 from arm_bringup.description import expand_xacro
 from arm_model import load_limits, RobotModel, start_pose
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parents[1] / 'robots'
 
 

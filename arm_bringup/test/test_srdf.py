@@ -10,6 +10,8 @@ import pytest
 
 from arm_bringup.srdf import main
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parents[1] / 'robots'
 SAMPLES = ('--samples', '3000')
 

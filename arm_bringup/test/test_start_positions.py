@@ -18,6 +18,8 @@ from arm_bringup.stack import arm_processes, Stack
 from arm_bringup.start_positions import start_positions, StartPositions
 from arm_model import frozen, load_limits, RobotModel
 
+pytestmark = pytest.mark.slow
+
 ROBOTS = Path(__file__).parents[1] / 'robots'
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 RANGES = {'lift': (0.0, 0.5), 'turn': (0.3, 2.0), 'swing': (-3.0, 3.0), 'bend': (-3.0, 3.0)}

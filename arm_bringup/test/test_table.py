@@ -24,6 +24,8 @@ from arm_bringup.demos.table import (
 )
 from demo_runner import DemoStatus
 
+pytestmark = pytest.mark.slow
+
 JOINTS = [f'panda_joint{i}' for i in range(1, 8)]
 LIMITS = {name: JointRange(name, -2.0, 2.0, 1.0) for name in JOINTS}
 DRIVE = DriveFigures(

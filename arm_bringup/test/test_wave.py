@@ -27,6 +27,8 @@ from arm_bringup.demos.wave.source import WaveSource, WaveState
 from arm_bringup.exceptions import WaveError
 from arm_canopen import Refusal, RefusalCause
 
+pytestmark = pytest.mark.slow
+
 CYCLE = 0.01  # [s]
 STYLE = WaveStyle()
 HALTED = Refusal(RefusalCause.HALTED)

@@ -15,6 +15,8 @@ from arm_canopen.can.bus_thread import BusThread
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.exceptions import BusError
 
+pytestmark = pytest.mark.slow
+
 TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 CALLERS, CALLS = 3, 2000
 

@@ -22,6 +22,8 @@ from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.adapter import to_message
 from arm_canopen.can.plugin import ArmCanopenBus
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = Path(__file__).parents[1]
 
 

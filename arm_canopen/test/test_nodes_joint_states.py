@@ -25,6 +25,8 @@ from arm_canopen.exceptions import CanopenError
 from arm_canopen.nodes.joint_states import BusJointStates, DriveJointStates
 from arm_canopen.nodes.output_thread import OutputThread
 
+pytestmark = pytest.mark.slow
+
 DEADLINE = 10.0  # [s] for what takes milliseconds
 URDF = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
 <joint name="elbow" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>

@@ -10,6 +10,8 @@ from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN, rpdo_default, 
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
 
+pytestmark = pytest.mark.slow
+
 ENTRIES = st.lists(
     st.builds(
         ObjectEntry,

@@ -10,6 +10,8 @@ import pytest
 
 from arm_model import ModelError, pose_quality, RobotModel, start_pose
 
+pytestmark = pytest.mark.slow
+
 CHAIN = '<chain base_link="base" tip_link="tip"/>'
 
 

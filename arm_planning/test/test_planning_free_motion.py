@@ -22,6 +22,8 @@ from arm_planning import (
     PoseGoal,
 )
 
+pytestmark = pytest.mark.slow
+
 SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '6')))
 """Of the random scenes; more of them by the environment."""
 

@@ -30,6 +30,8 @@ from arm_planning.ik.link_kinematics import pose_error
 from arm_planning.ik.numeric import random_start
 from arm_planning.ik.solver import ik, IkSolver
 
+pytestmark = pytest.mark.slow
+
 SPHERICAL = ('prbt', 'gp110')
 
 seeds = st.integers(0, 10**6)

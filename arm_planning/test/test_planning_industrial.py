@@ -35,6 +35,8 @@ from arm_planning.industrial.planner import IndustrialPlanner
 from arm_planning.industrial.sequence import SequenceItem
 from arm_trajectory import Path
 
+pytestmark = pytest.mark.slow
+
 STRAIGHT = 1e-4
 """How far a link may be off its line or arc in [m]."""
 

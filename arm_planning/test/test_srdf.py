@@ -12,6 +12,8 @@ from urdf_reader import find_group, parse_srdf, read_urdf
 from arm_model import ModelError, pose_quality, RobotModel
 from arm_planning import make_srdf
 
+pytestmark = pytest.mark.slow
+
 SAMPLES = 1000
 LINK = '<link name="{0}"><collision><origin xyz="{1}"/><geometry>{2}</geometry></collision></link>'
 JOINT = (

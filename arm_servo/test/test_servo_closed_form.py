@@ -14,6 +14,8 @@ from servo_runs import run
 
 from arm_servo.jog.servo_source import PoseCommand
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize('name', OPW)
 @settings(max_examples=40, deadline=None)

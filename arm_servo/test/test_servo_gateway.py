@@ -38,6 +38,8 @@ from arm_servo.core.snapshot import MAX_CYCLE_AGE
 from arm_servo.jog.servo_source import JointCommand
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'panda_joint1'
 
 

@@ -22,6 +22,8 @@ from arm_servo.ros.gripper.parameters import GripperParameters
 from arm_servo.ros.group_motion import ToolMotion
 from arm_servo.ros.trajectory.controller import TrajectoryController
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'panda_joint1'
 
 

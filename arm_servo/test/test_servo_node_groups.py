@@ -18,6 +18,8 @@ from arm_servo.core.motion_queue import MotionCommand
 from arm_servo.core.requests import TargetRequest
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
+pytestmark = pytest.mark.slow
+
 ARMS = ('left', 'right')
 LINKS = ('base', 'left_link', 'right_link', 'gate_link')
 QUARTER = math.pi / 2

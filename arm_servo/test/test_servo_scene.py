@@ -26,6 +26,8 @@ from arm_servo import Source
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MotionCommand
 from arm_trajectory import GoalCode, GoalPoint, StateMovedError, TrajectoryGoal
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'panda_joint1'
 
 

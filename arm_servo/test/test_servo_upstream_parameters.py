@@ -24,6 +24,8 @@ from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
 from arm_servo.ros.topics_backend import build_motion
 from arm_servo.ros.upstream_parameters import check_names
 
+pytestmark = pytest.mark.slow
+
 JOINTS = list(robot('panda').joints)
 GROUP = 'panda_arm'
 CONTROLLER = f'{GROUP}_controller'

@@ -47,6 +47,8 @@ from arm_canopen.master import other_master
 from arm_canopen.standard.dictionary import ObjectDictionary
 from canopen_sim.runner import DeviceRunner
 
+pytestmark = pytest.mark.slow
+
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 TIMEOUT = 30.0  # [s]
 BUS_YML = f"""

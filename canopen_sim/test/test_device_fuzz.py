@@ -12,6 +12,8 @@ import pytest
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.nmt import NmtState
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 20_000
 OWN_IDS = [
     0x000,

@@ -7,8 +7,11 @@ from __future__ import annotations
 from device_rig import ENABLE, FAULT_RESET, Rig, SHUTDOWN, SWITCH_ON
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import pytest
 
 from canopen_sim.fault import Fault
+
+pytestmark = pytest.mark.slow
 
 SPEED = 3000.0  # [inc/s] 0x607F, the highest of all
 STEP = 0.005  # [s]

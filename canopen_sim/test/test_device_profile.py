@@ -21,6 +21,8 @@ from canopen_sim.drive.profile import (
     Point,
 )
 
+pytestmark = pytest.mark.slow
+
 START = 1000.0  # [s]
 
 

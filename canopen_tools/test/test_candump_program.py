@@ -23,6 +23,8 @@ from arm_canopen.exceptions import BusError
 from canopen_tools import candump
 from canopen_tools.candump_log import LogWriter, read_log
 
+pytestmark = pytest.mark.slow
+
 Start: TypeAlias = Callable[..., 'subprocess.Popen[str]']
 
 FRAMES = [

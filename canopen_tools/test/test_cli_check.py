@@ -18,6 +18,8 @@ from tool_environment import ENVIRONMENT, REPOSITORY
 
 from canopen_tools.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 DEADLINE = 60.0  # [s]
 PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 

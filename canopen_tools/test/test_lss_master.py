@@ -22,6 +22,8 @@ from arm_canopen.standard.lss import (
 )
 from canopen_tools.lss_master import LssMaster
 
+pytestmark = pytest.mark.slow
+
 FIRST = LssAddress(0x555, 0x1234, 0x10002, 0xCAFE)
 SECOND = FIRST._replace(serial=0xCAFF)
 NUMBER = st.integers(0, 0xFFFF_FFFF)

@@ -25,6 +25,8 @@ from quad_hardware.protocol import Code, Frame, Kind, Register, ROBOT_KINDS, Str
 from quad_sim import ServoModel
 from quad_sim.options import build, parse_arguments, parse_servo, Simulation
 
+pytestmark = pytest.mark.slow
+
 OURS = ('quad_hardware', 'quad_sim', 'quad_controller', 'robot_viewer')
 
 

@@ -41,6 +41,8 @@ from quad_hardware.protocol import LEG_MOTORS, V1
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
+pytestmark = pytest.mark.slow
+
 SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)]
 MOUNTINGS = st.builds(
     ImuMounting,

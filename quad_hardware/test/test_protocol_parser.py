@@ -23,6 +23,8 @@ from quad_hardware.protocol import (
 )
 from quad_protocol_strategies import cut, frames, PROTOCOLS
 
+pytestmark = pytest.mark.slow
+
 KINDS = HOST_KINDS | ROBOT_KINDS
 STATE_WIRE = Feedback(sequence=7).frame().encode(V2)
 

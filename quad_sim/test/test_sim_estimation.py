@@ -18,6 +18,8 @@ from quad_sim import Terrain
 from quad_sim.physics import Robot
 from quad_sim.plant.terrain import FLAT
 
+pytestmark = pytest.mark.slow
+
 Array = NDArray[np.float64]
 
 URDF = robot_urdf('lite')

@@ -29,6 +29,8 @@ from quad_msgs.srv import InjectFault, Push
 from quad_sim.fake_xgo import run, split_ros_arguments
 from quad_sim.options import parse_arguments
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = Path(__file__).parents[1]
 VERSION = Frame(Kind.READ, Code.VERSION)
 

@@ -13,6 +13,8 @@ from sim_virtual import VirtualRobot
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.protocol import Frame, Kind, Register, V1
 
+pytestmark = pytest.mark.slow
+
 NEUTRAL = 128
 MAX_TILT = math.radians(8.0)  # [rad]
 DONE = Frame(Kind.READ, 0x3F, b'\x01')

@@ -16,6 +16,8 @@ from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
 from quad_teleop.requests import ClearFault, ModeRequest, PoseRequest
 from quad_teleop.velocity import rest_of, ZERO
 
+pytestmark = pytest.mark.slow
+
 DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
 
 

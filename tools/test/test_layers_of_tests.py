@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 tomllib = pytest.importorskip('tomllib')
 
 ROOT = Path(__file__).parents[2]

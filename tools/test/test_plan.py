@@ -18,6 +18,8 @@ from workspace.plan import carry_out, plan, Target
 from workspace.state import EnvironmentState, read_state
 from workspace.underlay import Underlay, UnderlayKind
 
+pytestmark = pytest.mark.slow
+
 Add = Callable[..., Path]
 Fake = Callable[..., FakeRunner]
 ALL = Target(dev=True)

@@ -11,6 +11,8 @@ from workspace.layout import this_checkout
 from workspace.shell import SHELLS, write_front_end, write_setup_scripts
 from workspace.underlay import Underlay, UnderlayKind
 
+pytestmark = pytest.mark.slow
+
 PRINTED = ('PATH', 'AMENT_PREFIX_PATH', 'LD_LIBRARY_PATH', 'ROS_DISTRO', 'VIRTUAL_ENV')
 
 

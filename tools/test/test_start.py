@@ -14,6 +14,8 @@ from workspace import cli
 from workspace.layout import this_checkout
 from workspace.system import PYTHON_NEWEST, PYTHON_OLDEST
 
+pytestmark = pytest.mark.slow
+
 TOOLS = this_checkout().root / 'tools'
 
 

@@ -17,6 +17,8 @@ from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import OperationMode
 from canopen_sim.drive.servo import ServoModel
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 LAG = 0.05  # [s] of a motor that comes after its set-points
 MODES = pytest.mark.parametrize(

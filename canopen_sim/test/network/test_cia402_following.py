@@ -20,6 +20,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import DriveState, OperationMode, Statusword
 
+pytestmark = pytest.mark.slow
+
 JOINT, NODE_ID = 'joint1', 2
 STATE_PDO, POSITION_PDO = 0x180 + NODE_ID, 0x280 + NODE_ID
 MODES = pytest.mark.parametrize(

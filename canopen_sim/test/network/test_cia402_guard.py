@@ -20,6 +20,8 @@ from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 GOOD, ODD = 'joint1', 'joint2'
 NODE_IDS = {GOOD: 2, ODD: 3}
 LEAST = -(2**31)  # smallest INTEGER32; many encoders say so while they have no reference

@@ -12,6 +12,8 @@ from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint'
 METHOD = 0x6098
 

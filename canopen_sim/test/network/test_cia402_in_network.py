@@ -19,6 +19,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 MODES = [
     OperationMode.PROFILE_POSITION,

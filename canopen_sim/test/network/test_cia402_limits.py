@@ -13,6 +13,8 @@ from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 NODE_ID = 2
 

@@ -19,6 +19,8 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState, OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 NODE_ID = 2
 STATE_PDO, POSITION_PDO = 0x180 + NODE_ID, 0x280 + NODE_ID

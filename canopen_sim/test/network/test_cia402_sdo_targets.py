@@ -22,6 +22,8 @@ from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.fault import Fault, FaultInjection
 
+pytestmark = pytest.mark.slow
+
 JOINT, NODE_ID = 'joint1', 2
 REQUEST, ANSWER = 0x600 + NODE_ID, 0x580 + NODE_ID
 DOWNLOADS = frozenset({0x22, 0x23, 0x27, 0x2B, 0x2F})
@@ -541,7 +543,6 @@ class Client:
         self.net.wire.loses = lambda sender, frame: False
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('seed', range(8))
 def test_nothing_moves_that_was_not_commanded(seed: int) -> None:
     """Stopped, switched or enabled, the axis rests until a target came after that."""

@@ -17,6 +17,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 
 

@@ -18,6 +18,8 @@ from arm_canopen.standard.drive import OperationMode
 from canopen_sim.host import DeviceHost
 from canopen_sim.simulation import add_devices
 
+pytestmark = pytest.mark.slow
+
 JOINT, PLACE = 'joint1', -1.25
 TWO_AXES = DRIVE_EDS.with_name('cia402_two_axes.eds')
 SCALES = {

@@ -22,6 +22,8 @@ from arm_canopen.nodes.diagnostics import drive_diagnostic
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.drive.drive import Drive as SimulatedDrive
 
+pytestmark = pytest.mark.slow
+
 JOINT, NODE_ID = 'joint1', 2
 RAMP = 1.0  # [s] from full speed to rest
 STANDING = 0.03  # [rad/s]

@@ -15,6 +15,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.drive import OperationMode
 
+pytestmark = pytest.mark.slow
+
 JOINT = 'joint1'
 STEP = 0.005  # [rad] of the stream in each cycle: 0.5 rad/s
 

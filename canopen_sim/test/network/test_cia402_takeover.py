@@ -15,6 +15,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 
+pytestmark = pytest.mark.slow
+
 LOAD = 0.2  # share of the rated torque
 
 CYCLIC = [OperationMode.CYCLIC_POSITION, OperationMode.INTERPOLATED_POSITION]

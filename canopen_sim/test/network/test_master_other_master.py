@@ -22,6 +22,8 @@ from arm_canopen.master.other_master import (
     refuse_other_master,
 )
 
+pytestmark = pytest.mark.slow
+
 BUS = bus_config(drive_config('a', 2), drive_config('b', 3))
 
 

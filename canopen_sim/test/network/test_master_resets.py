@@ -13,6 +13,8 @@ from arm_canopen.master.events import Severity
 from arm_canopen.master.remote_node import RESET_TIME
 from arm_canopen.standard.nmt import nmt_frame, NmtCommand, RESETS
 
+pytestmark = pytest.mark.slow
+
 NODE = 'a'
 NODE_ID = 2
 

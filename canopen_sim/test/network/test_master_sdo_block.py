@@ -22,6 +22,8 @@ from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from canopen_sim.objects.object_store import ObjectStore
 from canopen_sim.services.sdo_server import SdoServer
 
+pytestmark = pytest.mark.slow
+
 NODE, BLOB = 5, 0x2002
 REQUEST, RESPONSE = 0x600 + NODE, 0x580 + NODE
 TIMEOUT = 0.1  # [s]

@@ -17,6 +17,8 @@ from std_msgs.msg import Header
 
 from message_templates import FastReader, serialized, SerializedTemplate
 
+pytestmark = pytest.mark.slow
+
 NUMBERS = st.lists(st.floats(allow_nan=False), min_size=3, max_size=3)
 STAMPS = st.builds(Time, sec=st.integers(0, 2**31 - 1), nanosec=st.integers(0, 10**9 - 1))
 TEXTS = st.text('abc/_é', max_size=9)

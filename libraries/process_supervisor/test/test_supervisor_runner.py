@@ -21,6 +21,8 @@ from small_processes import program, TIMEOUT, wait_for_end
 from process_supervisor import Notice, Outcome, ProcessSpec, Runner
 from process_supervisor.runner import LEAVE_SIGNALS
 
+pytestmark = pytest.mark.slow
+
 
 class Watch:
     """Runs a bring-up and keeps what it wrote; does something when all is ready."""

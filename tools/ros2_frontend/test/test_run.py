@@ -15,6 +15,8 @@ from frontend_cli import PROGRAM, Ros2, with_frontend
 from processes import RunningProcess
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PRINT_ARGUMENTS = '#!/bin/sh\nfor word in "$@"; do echo "[$word]"; done\nexit 7\n'
 EVERYTHING = 'broken, count_signals, print_arguments, print_ignored, twice, twice'
 COUNT_SIGNALS = """\

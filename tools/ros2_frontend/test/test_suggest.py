@@ -10,6 +10,8 @@ import pytest
 
 from ros2_frontend.cli.suggest import hint, likeness, nearest
 
+pytestmark = pytest.mark.slow
+
 NAMES = st.lists(st.from_regex(r'/[a-z_]{1,8}(/[a-z_]{1,8})?', fullmatch=True), max_size=6)
 
 

@@ -14,6 +14,8 @@ import yaml
 from ros2_frontend.aliases import Document
 from ros2_frontend.messages.yaml_text import to_yaml
 
+pytestmark = pytest.mark.slow
+
 FIELDS = st.from_regex(r'[a-z][a-z0-9_]{0,5}', fullmatch=True) | st.sampled_from(
     ['y', 'n', 'on', 'off', 'yes', 'no', 'null', 'true']
 )
