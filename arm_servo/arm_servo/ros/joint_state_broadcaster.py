@@ -177,7 +177,7 @@ class JointStateBroadcaster:
         message.header.stamp = (self._node.get_clock().now() - age).to_msg()
         message.header.frame_id = self._frame
         self._states.publish(message)
-        if self._is_dynamic:
+        if self._is_dynamic and self._dynamic.get_subscription_count():
             values = [
                 InterfaceValue(
                     interface_names=['position', 'velocity'], values=[row.position, row.velocity]
