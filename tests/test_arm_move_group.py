@@ -28,13 +28,18 @@ from moveit_msgs.srv import (
     QueryPlannerInterfaces,
 )
 from moving_arm import goal_to, MovingArm, READY, robot_parameters
+from planning_messages import panda
 from processes import executable
 import pytest
+from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from simulated_arm import JOINTS
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from arm_model import Clearances
+from arm_planning.ros.scene_changes import apply_object
+from arm_planning.ros.scene_snapshot import SceneSnapshot
 from node_runner import LATCHED
 
 if TYPE_CHECKING:
@@ -73,7 +78,12 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         _plans_and_executes_for_pymoveit2(arm)
         _solves_and_follows_lines(arm)
         _cancels_a_move(arm)
+        _back_to_ready(arm)
+        _stops_in_front_of_what_appears(arm)
+        _back_to_ready(arm)
         _says_why_no_plan(arm)
+        _plans_anew_around_what_appears(arm)
+        _cancels_before_it_is_planned_anew(arm)
 
 
 def goal_constraints(positions: Sequence[float]) -> Constraints:
@@ -360,6 +370,126 @@ def _cancels_a_move(arm: MovingArm) -> None:
         MoveItErrorCodes.PREEMPTED,
     ), result.error_code
     assert result.planned_trajectory.joint_trajectory.points
+
+
+def _visitor(arm: MovingArm, turn: float, size: float) -> CollisionObject:
+    """Return a box where the hand is when joint 1 has turned from READY."""
+    state = GetPositionFK.Request(fk_link_names=['panda_hand'])
+    state.robot_state.joint_state.name = list(JOINTS)
+    state.robot_state.joint_state.position = [turn, *READY[1:]]
+    at = arm.client.call(GetPositionFK, '/compute_fk', state).pose_stamped[0].pose.position
+    box = _box('visitor', at.x, at.y, at.z)
+    box.primitives[0].dimensions = [size] * 3
+    return box
+
+
+def _goes(arm: MovingArm, name: str) -> None:
+    """Take an object away."""
+    _change(arm, CollisionObject(id=name, operation=CollisionObject.REMOVE))
+
+
+def _change(arm: MovingArm, thing: CollisionObject) -> None:
+    """Change one object of the scene."""
+    change = PlanningScene(is_diff=True)
+    change.robot_state.is_diff = True
+    change.world.collision_objects = [thing]
+    apply = ApplyPlanningScene.Request(scene=change)
+    assert arm.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+
+
+class Observer:
+    """Looks on from beside move_group: where the joints were, and whether they touched a box."""
+
+    def __init__(self, arm: MovingArm) -> None:
+        """Listen from now on."""
+        self._client = arm.client
+        self._states = arm.client.listen(JointState, '/joint_states')
+
+    def wait_for_turn(self) -> None:
+        """Wait until joint 1 has turned a little."""
+        self._client.spin_until(
+            lambda: bool(self._states) and self._states[-1].position[0] < -0.05, 10.0, 'motion'
+        )
+
+    def saw_no_contact(self, visitor: CollisionObject) -> None:
+        """Check all states that have come."""
+        robot = panda()
+        home = robot.positions({})
+        scene = apply_object(SceneSnapshot.of(robot.scene), visitor, home).scene
+        clearances = Clearances(scene)
+        for state in self._states:
+            places = dict(zip(state.name, state.position, strict=True))
+            contacts = clearances.contacts(robot.positions(places))
+            assert not contacts, f'{contacts} at {places}'
+
+
+def _stops_in_front_of_what_appears(arm: MovingArm) -> None:
+    """A trajectory on its way ends on its path, with the name of the box."""
+    visitor, observer = _visitor(arm, -0.9, size=0.1), Observer(arm)
+    run = execute(arm, _trajectory([-0.9, *READY[1:]], 12))
+    observer.wait_for_turn()
+    _change(arm, visitor)
+    status, result = run.wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    invalidated = MoveItErrorCodes.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+    assert result.error_code.val == invalidated, result.error_code
+    assert 'visitor' in result.error_code.message
+    observer.saw_no_contact(visitor)
+    _goes(arm, 'visitor')
+
+
+def _plans_anew_around_what_appears(arm: MovingArm) -> None:
+    """With replan, a move that is blocked on its way goes around."""
+    _goes(arm, 'crate')
+    visitor, observer = _visitor(arm, -0.65, size=0.06), Observer(arm)
+    goal = move_goal([-1.2, *READY[1:]])
+    goal.request.max_velocity_scaling_factor = 0.1
+    goal.planning_options.replan = True
+    goal.planning_options.replan_delay = 0.1
+    run = move(arm, goal)
+    observer.wait_for_turn()
+    _change(arm, visitor)
+    status, result = run.wait()
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
+    assert run.states.count('PLANNING') > 1
+    observer.saw_no_contact(visitor)
+
+
+def _cancels_before_it_is_planned_anew(arm: MovingArm) -> None:
+    """The answer does not wait for the delay; nothing stands for a plan that was given up."""
+    visitor, goal = _visitor(arm, -0.1, size=0.06), move_goal(READY)
+    goal.request.max_velocity_scaling_factor = 0.1
+    goal.planning_options.replan = True
+    goal.planning_options.replan_delay = 1000.0
+    run = move(arm, goal)
+    run.wait_for_motion()
+    states = arm.client.listen(JointState, '/joint_states')
+    _change(arm, visitor)
+    arm.client.spin_until(lambda: _stands(states), 20.0, 'the stop')
+    run.cancel()
+    status, result = run.wait()
+    assert (status, result.error_code.val) == (
+        GoalStatus.STATUS_CANCELED,
+        MoveItErrorCodes.PREEMPTED,
+    ), result.error_code
+    assert not result.planned_trajectory.joint_trajectory.points
+
+
+def _stands(states: Sequence[JointState]) -> bool:
+    """Return whether no joint has moved for half a second."""
+    if not states:
+        return False
+    last = states[-1]
+    since = [s for s in states if 0.5 < _seconds(last) - _seconds(s) < 1.0]
+    return bool(since) and all(
+        abs(now - before) < 1e-3
+        for state in since
+        for now, before in zip(last.position, state.position, strict=True)
+    )
+
+
+def _seconds(state: JointState) -> float:
+    return state.header.stamp.sec + state.header.stamp.nanosec * 1e-9
 
 
 def _says_why_no_plan(arm: MovingArm) -> None:

@@ -197,6 +197,38 @@ def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: st
     bench.start()
 
 
+@pytest.mark.parametrize('change', ['', 'the scene has changed: a and b would touch'])
+def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) -> None:
+    """It looks at the scene too, and may be quicker: that is another code than a defect."""
+    asked: list[execution.Execution] = []
+    bench.execution.on_failure(asked.append)
+    running = bench.start()
+    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    assert (asked, bench.ends) == ([running], [])
+    bench.execution.explain(running, change)
+    ((code, reason),) = bench.ends
+    assert code is (execution.INVALIDATED if change else PlanningCode.CONTROL_FAILED)
+    assert change in reason
+    bench.start()
+
+
+@pytest.mark.parametrize(
+    ('status', 'outcome'),
+    [
+        (GoalStatus.STATUS_SUCCEEDED, PlanningCode.SUCCESS),
+        (GoalStatus.STATUS_CANCELED, execution.INVALIDATED),
+    ],
+)
+def test_a_scene_that_changes_at_the_end_is_too_late(
+    bench: Bench, status: int, outcome: PlanningCode
+) -> None:
+    """What counts is whether the arm has arrived."""
+    bench.execution.on_failure(lambda _: pytest.fail('it was stopped'))
+    bench.execution.stop(bench.start(), execution.INVALIDATED, 'the scene has changed')
+    bench.controller.end(status)
+    assert [code for code, _ in bench.ends] == [outcome]
+
+
 class QuietNode:
     """A node without a graph."""
 

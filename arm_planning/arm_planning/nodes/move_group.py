@@ -28,6 +28,7 @@ from ..ros.execute_action import ExecuteAction
 from ..ros.execution import ExecutionLimits, TrajectoryExecution
 from ..ros.kinematic_services import KinematicServices
 from ..ros.move_action import MoveAction
+from ..ros.path_watch import PathWatch
 from ..ros.planning import PlanningThread
 from ..ros.robot_groups import RobotGroups
 from ..ros.scene_monitor import SceneMonitor
@@ -74,6 +75,8 @@ class MoveGroup(Node):
         StateServices(self, monitor, self._queries, queried)
         KinematicServices(self, monitor, self._queries, queried)
         execution = TrajectoryExecution(self, controllers, monitor.received, limits)
+        self._watch = Background(self, 'watch')
+        PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
         planning = PlanningThread(self, monitor, self._planning, _robot(description))
@@ -85,6 +88,7 @@ class MoveGroup(Node):
         """End the threads."""
         self._queries.close()
         self._planning.close()
+        self._watch.close()
 
 
 def _robot(description: Description) -> RobotGroups:

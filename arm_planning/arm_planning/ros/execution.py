@@ -33,6 +33,8 @@ STOP_TIMEOUT = 5.0
 FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
 """Answers to a cancel of controllers that do not follow the goal any more."""
 
+INVALIDATED = PlanningCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+
 Done = Callable[[PlanningCode, str], None]
 
 
@@ -60,6 +62,8 @@ class Execution:
         done: Called once, with how it ended.
         begin: Steady time of its start in [s].
         is_over: Whether ``done`` was called; a controller may still be on its way then.
+        is_complete: Whether all controllers that have ended reached the end of the trajectory.
+        in_doubt: Whether it is still to be found out why a controller gave up.
     """
 
     trajectory: Any
@@ -70,6 +74,8 @@ class Execution:
     waits_for: set[str] = field(default_factory=set)
     ending: tuple[PlanningCode, str] | None = None
     is_over: bool = False
+    is_complete: bool = True
+    in_doubt: bool = False
 
     @property
     def joints(self) -> set[str]:
@@ -103,7 +109,33 @@ class TrajectoryExecution:
             for name in controllers
         }
         self._running: list[Execution] = []
+        self._find_out: Callable[[Execution], None] | None = None
         node.create_timer(WATCH_PERIOD, self._watch)
+
+    @property
+    def running(self) -> Sequence[Execution]:
+        """What is on its way and not about to stop."""
+        return [each for each in self._running if each.ending is None]
+
+    def on_failure(self, find_out: Callable[[Execution], None]) -> None:
+        """Have somebody find out why a controller gave up, who answers with :meth:`explain`.
+
+        Args:
+            find_out: Called in the executor.
+        """
+        self._find_out = find_out
+
+    def explain(self, execution: Execution, change: str) -> None:
+        """Take why a controller gave up.
+
+        Args:
+            execution: What it followed.
+            change: How the scene has changed that it had to; empty where its own words count.
+        """
+        execution.in_doubt = False
+        if change:
+            execution.ending = INVALIDATED, change
+        self._conclude(execution)
 
     def start(
         self,
@@ -243,13 +275,20 @@ class TrajectoryExecution:
         self._fail(execution, f'{name}: {words}')
 
     def _fail(self, execution: Execution, reason: str) -> None:
-        self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
+        execution.is_complete = False
+        if execution.ending is None:
+            self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
+            if self._find_out is not None:
+                execution.in_doubt = True
+                self._find_out(execution)
         self._conclude(execution)
 
     def _conclude(self, execution: Execution) -> None:
         """End it when all of its controllers have ended."""
-        if execution.waits_for or execution not in self._running:
+        if execution.waits_for or execution.in_doubt or execution not in self._running:
             return
+        if execution.is_complete and execution.ending and execution.ending[0] is INVALIDATED:
+            execution.ending = None  # the end of the trajectory came before the stop
         self._running.remove(execution)
         self._report(execution)
 

@@ -9,16 +9,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from moveit_msgs.action import MoveGroup
+from moveit_msgs.msg import RobotState
 from rclpy.action.server import CancelResponse
 from rclpy.node import Node
+from rclpy.timer import Timer
 
 from node_runner.action_goals import serve_goals
 
 from ..exceptions import PlanningCode, PlanningError
 from .background import as_refusal, Background, error_code
 from .execute_action import conclude
-from .execution import Execution, TrajectoryExecution
+from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .planning import PlannedMotion, PlanningThread
+
+REPLAN_ATTEMPTS = 5
+"""How often a goal that does not say so is planned anew at most, as in MoveIt."""
 
 
 @dataclass(slots=True, eq=False)
@@ -31,6 +36,8 @@ class _Goal:
     execution: Execution | None = None
     outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
     is_canceled: bool = False
+    replans: int = 0
+    delay: Timer | None = None
 
 
 class MoveAction:
@@ -65,8 +72,14 @@ class MoveAction:
 
     def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
         goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
-        request, options = handle.request.request, handle.request.planning_options
-        handle.publish_feedback(MoveGroup.Feedback(state='PLANNING'))
+        self._plan(goal)
+
+    def _plan(self, goal: _Goal) -> None:
+        request = goal.handle.request.request
+        options = goal.handle.request.planning_options
+        goal.handle.publish_feedback(MoveGroup.Feedback(state='PLANNING'))
+        if goal.replans:  # from where it has stopped
+            request.start_state = RobotState(is_diff=True)
         try:
             work = self._planning.prepare(request, options.planning_scene_diff)
         except PlanningError as error:
@@ -92,10 +105,34 @@ class MoveAction:
         try:
             goal.execution = self._execution.start(
                 planned.trajectory.joint_trajectory,
-                lambda code, reason: self._end(goal, code, reason),
+                lambda code, reason: self._executed(goal, code, reason),
             )
         except PlanningError as refused:
             self._end(goal, refused.code, str(refused))
+
+    def _executed(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
+        """End it, or plan anew where the scene has changed and the goal's options say so."""
+        options = goal.handle.request.planning_options
+        most = options.replan_attempts if options.replan_attempts > 0 else REPLAN_ATTEMPTS
+        if code is not INVALIDATED or not options.replan or goal.is_canceled:
+            self._end(goal, code, reason)
+            return
+        if goal.replans >= most:
+            self._end(goal, code, f'{reason}; planned anew {most} times')
+            return
+        self._node.get_logger().info(f'move_action: {reason}; plans anew')
+        goal.replans, goal.execution, goal.work, goal.planned = goal.replans + 1, None, None, None
+
+        def plan() -> None:
+            self._end_delay(goal)
+            self._plan(goal)
+
+        goal.delay = self._node.create_timer(max(options.replan_delay, 0.0), plan)
+
+    def _end_delay(self, goal: _Goal) -> None:
+        if goal.delay is not None:
+            self._node.destroy_timer(goal.delay)
+            goal.delay = None
 
     def _cancel(self, handle: Any) -> CancelResponse:  # noqa: ANN401
         goal = self._goals.get(bytes(handle.goal_id.uuid))
@@ -105,6 +142,9 @@ class MoveAction:
                 self._execution.stop(goal.execution, reason='canceled')
             elif goal.work is not None:
                 goal.work.cancel()
+            elif goal.delay is not None:
+                self._end_delay(goal)
+                self._end(goal, PlanningCode.PREEMPTED, 'canceled before it was planned anew')
         return CancelResponse.ACCEPT
 
     def _end(self, goal: _Goal, code: PlanningCode, reason: str) -> None:

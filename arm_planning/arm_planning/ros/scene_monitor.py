@@ -57,6 +57,7 @@ class SceneMonitor:
         self._node = node
         self._places: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
+        self._listeners: list[Callable[[], None]] = []
         self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
         for kind, topic, apply in (
@@ -71,6 +72,14 @@ class SceneMonitor:
         node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         self._publish()
+
+    def on_change(self, listener: Callable[[], None]) -> None:
+        """Have something called after each change of the scene.
+
+        Args:
+            listener: What is called, in the executor.
+        """
+        self._listeners.append(listener)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are in [rad], by joint.
@@ -166,6 +175,8 @@ class SceneMonitor:
             self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
             return False
         self._publish()
+        for listener in self._listeners:
+            listener()
         return True
 
     def _publish(self) -> None:

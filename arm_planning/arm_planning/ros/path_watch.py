@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories on their way when the scene changes: what is left of them must be clear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from typing import Any
+
+import numpy as np
+
+from arm_model import Array, PlanningScene
+from arm_model.ros import seconds
+from arm_trajectory import Path, PathCheck, quintics, Segment
+
+from .background import Background
+from .execution import Execution, INVALIDATED, TrajectoryExecution
+from .scene_monitor import SceneMonitor
+from .scene_snapshot import SceneSnapshot
+
+LOOKS = 400
+"""Places on a trajectory at which the arm is looked for."""
+
+AMBIGUOUS = 0.02
+"""Places that are this much farther away than the nearest may be where the arm is, in [rad]."""
+
+LATENCY = 0.1
+"""How far before that place the trajectory is looked at, in [s]: joint states come late."""
+
+
+class PathWatch:
+    """Stops executions whose way is not clear any more; belongs to the node's executor."""
+
+    def __init__(
+        self, monitor: SceneMonitor, execution: TrajectoryExecution, background: Background
+    ) -> None:
+        """Look at what is on its way after each change of the scene.
+
+        Args:
+            monitor: The scene and where the joints are.
+            execution: What is on its way.
+            background: A thread that has nothing else to do.
+        """
+        self._monitor, self._execution, self._background = monitor, execution, background
+        self._looks_at: SceneSnapshot | None = None
+        monitor.on_change(self._look)
+        execution.on_failure(self._find_out)
+
+    def _find_out(self, failed: Execution) -> None:
+        """Find out whether a controller gave up because of the scene."""
+        scene, here = self._monitor.snapshot.scene, self._monitor.positions()
+
+        def found(done: Future[str]) -> None:
+            contact = '' if done.cancelled() or done.exception() else done.result()
+            self._execution.explain(failed, contact and _words(contact))
+
+        self._background.submit(lambda: contact_ahead(failed.trajectory, here, scene), found)
+
+    def _look(self) -> None:
+        """Look at all executions in the present scene; one scene at a time."""
+        if self._looks_at is not None or not (running := self._execution.running):
+            return
+        snapshot = self._looks_at = self._monitor.snapshot
+        here = self._monitor.positions()
+
+        def contacts() -> list[str]:
+            return [contact_ahead(each.trajectory, here, snapshot.scene) for each in running]
+
+        self._background.submit(contacts, lambda done: self._looked(running, done))
+
+    def _looked(self, running: Sequence[Execution], done: Future[list[str]]) -> None:
+        before, self._looks_at = self._looks_at, None
+        if done.cancelled():
+            return
+        error = done.exception()
+        # what cannot be looked at is not known to be clear
+        found = [str(error)] * len(running) if error else done.result()
+        for execution, contact in zip(running, found, strict=True):
+            if contact:
+                self._execution.stop(execution, INVALIDATED, _words(contact))
+        if self._monitor.snapshot is not before:
+            self._look()
+
+
+def _words(contact: str) -> str:
+    return f'the scene has changed: {contact}'
+
+
+def contact_ahead(
+    trajectory: Any,  # noqa: ANN401  # messages have no type
+    here: Array,
+    scene: PlanningScene,
+) -> str:
+    """Return what the rest of a trajectory would touch, in words; empty for nothing.
+
+    Args:
+        trajectory: A trajectory_msgs/JointTrajectory that was checked.
+        here: Where all joints of the robot are in [rad].
+        scene: What may collide; all joints of the robot move in it.
+    """
+    if len(trajectory.points) < 2:
+        return ''  # a single point is the end of a motion that the controller makes up
+    path = path_of(trajectory)
+    joints = list(scene.kinematics.joints)
+    columns = [joints.index(name) for name in trajectory.joint_names]
+    passed = passed_time(path, here[columns])
+
+    def rows(times: Array) -> Array:
+        found = np.tile(here, (len(times), 1))
+        found[:, columns] = path.positions(times + passed)
+        return found
+
+    contact = PathCheck(scene).contact(rows, path.duration - passed)
+    if contact is None:
+        return ''
+    first, second = contact.links
+    return f'{first} and {second} would touch in {contact.time:.1f} s'
+
+
+def passed_time(path: Path, positions: Array) -> float:
+    """Return a time of a path that is not behind the arm in [s].
+
+    Args:
+        path: The path.
+        positions: Where its joints are in [rad].
+    """
+    times = np.linspace(0.0, path.duration, LOOKS)
+    apart = np.abs(path.positions(times) - positions).max(axis=1)
+    first = int((apart <= apart.min() + AMBIGUOUS).argmax())
+    return max(float(times[first]) - LATENCY, 0.0)
+
+
+def path_of(trajectory: Any) -> Path:  # noqa: ANN401
+    """Return a trajectory as joint_trajectory_controller interpolates it.
+
+    Args:
+        trajectory: A trajectory_msgs/JointTrajectory of two points or more.
+    """
+    times = np.array([seconds(each.time_from_start) for each in trajectory.points])
+    lasts = np.diff(times)
+    q, v, a = (
+        np.array([getattr(each, kind) for each in trajectory.points])
+        for kind in ('positions', 'velocities', 'accelerations')
+    )
+    between = _quintics if a.shape == q.shape == v.shape else _lower(v.shape == q.shape)
+    pieces = between(lasts, q, v, a)
+    starts = (times[:-1] - times[0]).tolist()
+    return Path([Segment(*each) for each in zip(starts, lasts.tolist(), pieces, strict=True)])
+
+
+def _quintics(lasts: Array, q: Array, v: Array, a: Array) -> Array:
+    return quintics(lasts, q, v, a)
+
+
+def _lower(with_velocities: bool) -> Callable[[Array, Array, Array, Array], Array]:
+    """Return what makes cubics, or straight segments."""
+
+    def between(lasts: Array, q: Array, v: Array, _: Array) -> Array:
+        t, way = lasts[:, None], np.diff(q, axis=0)
+        pieces = np.zeros((len(lasts), 6, q.shape[1]))
+        pieces[:, 0] = q[:-1]
+        if not with_velocities:
+            pieces[:, 1] = way / t
+            return pieces
+        pieces[:, 1] = v[:-1]
+        pieces[:, 2] = (3.0 * way - (2.0 * v[:-1] + v[1:]) * t) / t**2
+        pieces[:, 3] = (-2.0 * way + (v[:-1] + v[1:]) * t) / t**3
+        return pieces
+
+    return between

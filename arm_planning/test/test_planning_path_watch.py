@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is left of a trajectory when an object enters the scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from planning_messages import box, panda
+import pytest
+from trajectory_msgs.msg import JointTrajectory
+
+from arm_model import Array, frozen, RobotState
+from arm_planning.ros.path_watch import contact_ahead, passed_time, path_of
+from arm_planning.ros.robot_state import trajectory_message
+from arm_planning.ros.scene_changes import apply_object
+from arm_planning.ros.scene_snapshot import SceneSnapshot
+from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
+
+MODEL = panda().model('panda_arm')
+READY = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+TURN = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+GOAL = TrajectoryGoal(MODEL.joints, [GoalPoint(4.0, READY + TURN)])
+PATH = build_path(GOAL, MODEL.limits, RobotState.at_rest(READY), GoalRules()).path
+EMPTY = SceneSnapshot.of(panda().scene)
+
+
+def places(arm: Array) -> Array:
+    """Return where all joints are."""
+    return panda().positions(dict(zip(MODEL.joints, arm.tolist(), strict=True)))
+
+
+def motion(kinds: str = 'va') -> JointTrajectory:
+    """Return a turn about the first joint by 2 rad, with velocities and accelerations."""
+    trajectory = trajectory_message(MODEL.joints, PATH, 'panda_link0').joint_trajectory
+    for point in trajectory.points:
+        point.velocities = point.velocities if 'v' in kinds else []
+        point.accelerations = point.accelerations if 'a' in kinds else []
+    return trajectory
+
+
+def crate_at(share: float) -> Any:
+    """Return the scene with a crate where the tip is at a share of the turn."""
+    x, y, z = MODEL.kinematics.link_pose('panda_link8', frozen(READY + share * TURN)).position
+    return apply_object(EMPTY, box('crate', x, y, z, edge=0.1), places(READY)).scene
+
+
+@pytest.mark.parametrize('kinds', ['va', 'v', ''])
+def test_a_trajectory_is_read_as_controllers_follow_it(kinds: str) -> None:
+    """With accelerations exactly; positions alone are met at the points."""
+    path = path_of(motion(kinds))
+    times = np.linspace(0.0, PATH.duration, 50)
+    if kinds == 'va':
+        assert path.positions(times) == pytest.approx(PATH.positions(times), abs=1e-6)
+    assert path.positions(PATH.starts) == pytest.approx(PATH.positions(PATH.starts), abs=1e-6)
+    if kinds:
+        assert path.at(PATH.starts[0]).velocity == pytest.approx(np.zeros(7), abs=1e-6)
+
+
+def test_an_object_ahead_is_seen_and_one_behind_is_not() -> None:
+    """The pair is named, and when it would touch."""
+    halfway = places(PATH.at(0.5 * PATH.duration).position)
+    ahead, behind = crate_at(0.9), crate_at(0.02)
+    assert 'crate' in contact_ahead(motion(), halfway, ahead)
+    assert 'crate' in contact_ahead(motion(), places(READY), ahead)
+    assert contact_ahead(motion(), halfway, behind) == ''
+    assert contact_ahead(motion(), halfway, EMPTY.scene) == ''
+    assert contact_ahead(JointTrajectory(), halfway, ahead) == ''
+
+
+@pytest.mark.parametrize('share', [0.0, 0.3, 1.0])
+def test_the_arm_is_found_on_its_path(share: float) -> None:
+    """Never before where it is: something in between would not be seen."""
+    time = share * PATH.duration
+    found = passed_time(PATH, PATH.at(time).position)
+    assert time - 0.6 <= found <= time
