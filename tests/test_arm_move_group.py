@@ -38,6 +38,7 @@ from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import Clearances
+from arm_model.ros import seconds
 from arm_planning.ros.scene_changes import apply_object
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 from node_runner import LATCHED
@@ -480,16 +481,13 @@ def _stands(states: Sequence[JointState]) -> bool:
     if not states:
         return False
     last = states[-1]
-    since = [s for s in states if 0.5 < _seconds(last) - _seconds(s) < 1.0]
+    now = seconds(last.header.stamp)
+    since = [state for state in states if 0.5 < now - seconds(state.header.stamp) < 1.0]
     return bool(since) and all(
-        abs(now - before) < 1e-3
+        abs(place - before) < 1e-3
         for state in since
-        for now, before in zip(last.position, state.position, strict=True)
+        for place, before in zip(last.position, state.position, strict=True)
     )
-
-
-def _seconds(state: JointState) -> float:
-    return state.header.stamp.sec + state.header.stamp.nanosec * 1e-9
 
 
 def _says_why_no_plan(arm: MovingArm) -> None:
