@@ -69,6 +69,24 @@ def test_an_object_ahead_is_seen_and_one_behind_is_not() -> None:
     assert contact_ahead(JointTrajectory(), halfway, ahead) == ''
 
 
+def test_points_may_lack_what_others_have() -> None:
+    """A trajectory whose last point has no velocities is followed, and looked at, too."""
+    trajectory = motion()
+    trajectory.points[-1].velocities = []
+    assert 'crate' in contact_ahead(trajectory, places(READY), crate_at(0.9))
+
+
+def test_joints_that_the_robot_does_not_have_do_not_count() -> None:
+    """A controller may move what no description has, beside the arm."""
+    trajectory = motion()
+    trajectory.joint_names.append('tool_changer')
+    for point in trajectory.points:
+        for row in (point.positions, point.velocities, point.accelerations):
+            row.append(0.0)
+    assert contact_ahead(trajectory, places(READY), EMPTY.scene) == ''
+    assert 'crate' in contact_ahead(trajectory, places(READY), crate_at(0.9))
+
+
 @pytest.mark.parametrize('share', [0.0, 0.3, 1.0])
 def test_the_arm_is_found_on_its_path(share: float) -> None:
     """Never before where it is: something in between would not be seen."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from typing import Any
 
@@ -14,8 +14,9 @@ from arm_model import Array, PlanningScene
 from arm_model.ros import seconds
 from arm_trajectory import Path, PathCheck, quintics, Segment
 
-from .background import Background
+from .background import as_refusal, Background
 from .execution import Execution, INVALIDATED, TrajectoryExecution
+from .joint_trajectory import part_of, ROWS
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
 
@@ -65,7 +66,7 @@ class PathWatch:
         here = self._monitor.positions()
 
         def contacts() -> list[str]:
-            return [contact_ahead(each.trajectory, here, snapshot.scene) for each in running]
+            return [_contact(each.trajectory, here, snapshot.scene) for each in running]
 
         self._background.submit(contacts, lambda done: self._looked(running, done))
 
@@ -73,10 +74,7 @@ class PathWatch:
         before, self._looks_at = self._looks_at, None
         if done.cancelled():
             return
-        error = done.exception()
-        # what cannot be looked at is not known to be clear
-        found = [str(error)] * len(running) if error else done.result()
-        for execution, contact in zip(running, found, strict=True):
+        for execution, contact in zip(running, done.result(), strict=True):
             if contact:
                 self._execution.stop(execution, INVALIDATED, _words(contact))
         if self._monitor.snapshot is not before:
@@ -85,6 +83,14 @@ class PathWatch:
 
 def _words(contact: str) -> str:
     return f'the scene has changed: {contact}'
+
+
+def _contact(trajectory: Any, here: Array, scene: PlanningScene) -> str:  # noqa: ANN401
+    """Return the contact ahead; what cannot be looked at is not known to be clear."""
+    try:
+        return contact_ahead(trajectory, here, scene)
+    except Exception as error:  # noqa: BLE001  # one trajectory must not stop the others
+        return f'what is left of the trajectory cannot be looked at: {as_refusal(error)}'
 
 
 def contact_ahead(
@@ -99,11 +105,12 @@ def contact_ahead(
         here: Where all joints of the robot are in [rad].
         scene: What may collide; all joints of the robot move in it.
     """
-    if len(trajectory.points) < 2:
-        return ''  # a single point is the end of a motion that the controller makes up
-    path = path_of(trajectory)
     joints = list(scene.kinematics.joints)
-    columns = [joints.index(name) for name in trajectory.joint_names]
+    moved = [name for name in trajectory.joint_names if name in joints]
+    if len(trajectory.points) < 2 or not moved:
+        return ''  # a single point is the end of a motion that the controller makes up
+    path = path_of(part_of(trajectory, moved))
+    columns = [joints.index(name) for name in moved]
     passed = passed_time(path, here[columns])
 
     def rows(times: Array) -> Array:
@@ -139,33 +146,32 @@ def path_of(trajectory: Any) -> Path:  # noqa: ANN401
     """
     times = np.array([seconds(each.time_from_start) for each in trajectory.points])
     lasts = np.diff(times)
-    q, v, a = (
-        np.array([getattr(each, kind) for each in trajectory.points])
-        for kind in ('positions', 'velocities', 'accelerations')
-    )
-    between = _quintics if a.shape == q.shape == v.shape else _lower(v.shape == q.shape)
-    pieces = between(lasts, q, v, a)
+    rows = [[getattr(each, kind) for each in trajectory.points] for kind in ROWS]
+    # velocities or accelerations that some points lack do not count
+    q, v, a = (np.array(each if all(map(len, each)) else []) for each in rows)
+    if a.shape == q.shape == v.shape:
+        pieces = quintics(lasts, q, v, a)
+    elif v.shape == q.shape:
+        pieces = _cubics(lasts, q, v)
+    else:
+        pieces = _lines(lasts, q)
     starts = (times[:-1] - times[0]).tolist()
     return Path([Segment(*each) for each in zip(starts, lasts.tolist(), pieces, strict=True)])
 
 
-def _quintics(lasts: Array, q: Array, v: Array, a: Array) -> Array:
-    return quintics(lasts, q, v, a)
+def _cubics(lasts: Array, q: Array, v: Array) -> Array:
+    """Return coefficients as quintics() does, of points without accelerations."""
+    pieces = _lines(lasts, q)
+    t, way = lasts[:, None], np.diff(q, axis=0)
+    pieces[:, 1] = v[:-1]
+    pieces[:, 2] = (3.0 * way - (2.0 * v[:-1] + v[1:]) * t) / t**2
+    pieces[:, 3] = (-2.0 * way + (v[:-1] + v[1:]) * t) / t**3
+    return pieces
 
 
-def _lower(with_velocities: bool) -> Callable[[Array, Array, Array, Array], Array]:
-    """Return what makes cubics, or straight segments."""
-
-    def between(lasts: Array, q: Array, v: Array, _: Array) -> Array:
-        t, way = lasts[:, None], np.diff(q, axis=0)
-        pieces = np.zeros((len(lasts), 6, q.shape[1]))
-        pieces[:, 0] = q[:-1]
-        if not with_velocities:
-            pieces[:, 1] = way / t
-            return pieces
-        pieces[:, 1] = v[:-1]
-        pieces[:, 2] = (3.0 * way - (2.0 * v[:-1] + v[1:]) * t) / t**2
-        pieces[:, 3] = (-2.0 * way + (v[:-1] + v[1:]) * t) / t**3
-        return pieces
-
-    return between
+def _lines(lasts: Array, q: Array) -> Array:
+    """Return coefficients as quintics() does, of points that are positions alone."""
+    pieces = np.zeros((len(lasts), 6, q.shape[1]))
+    pieces[:, 0] = q[:-1]
+    pieces[:, 1] = np.diff(q, axis=0) / lasts[:, None]
+    return pieces
