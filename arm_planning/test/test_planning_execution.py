@@ -197,6 +197,20 @@ def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: st
     bench.start()
 
 
+def test_a_start_is_told_with_the_way_to_its_first_point(bench: Bench) -> None:
+    """What is refused is not told."""
+    begun: list[Any] = []
+    bench.execution.on_start(lambda: begun.append(bench.execution.running[-1].way))
+    trajectory = motion()
+    del trajectory.points[0]
+    trajectory.points[0].positions = [0.005, 0.0]
+    bench.start(trajectory)
+    (way,) = begun
+    assert [list(point.positions) for point in way.points] == [[0, 0], [0.005, 0], [1, 1]]
+    bench.refusal()
+    assert len(begun) == 1
+
+
 @pytest.mark.parametrize('change', ['', 'the scene has changed: a and b would touch'])
 def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) -> None:
     """It looks at the scene too, and may be quicker: that is another code than a defect."""

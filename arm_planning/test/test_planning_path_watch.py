@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Future
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +15,10 @@ import pytest
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model import Array, frozen, RobotState
-from arm_planning.ros.path_watch import contact_ahead, passed_time, path_of
+from arm_planning import PlanningCode
+from arm_planning.ros.execution import Execution, INVALIDATED
+from arm_planning.ros.joint_trajectory import from_start
+from arm_planning.ros.path_watch import contact_ahead, passed_time, path_of, PathWatch
 from arm_planning.ros.robot_state import trajectory_message
 from arm_planning.ros.scene_changes import apply_object
 from arm_planning.ros.scene_snapshot import SceneSnapshot
@@ -85,6 +91,87 @@ def test_joints_that_the_robot_does_not_have_do_not_count() -> None:
             row.append(0.0)
     assert contact_ahead(trajectory, places(READY), EMPTY.scene) == ''
     assert 'crate' in contact_ahead(trajectory, places(READY), crate_at(0.9))
+
+
+class Executions:
+    """Executions that the test begins, and what was stopped of them."""
+
+    def __init__(self) -> None:
+        """Nothing is on its way."""
+        self.running: list[Execution] = []
+        self.stopped: list[tuple[Execution, PlanningCode, str]] = []
+        self.begun: Callable[[], None] = lambda: None
+
+    def on_start(self, begun: Callable[[], None]) -> None:
+        """Take who wants to know of a start."""
+        self.begun = begun
+
+    def on_failure(self, _find_out: Any) -> None:
+        """No controller fails."""
+
+    def start(self, trajectory: JointTrajectory) -> Execution:
+        """Have a trajectory on its way."""
+        execution = Execution(trajectory, lambda *_: None, way=trajectory)
+        self.running = [*self.running, execution]
+        self.begun()
+        return execution
+
+    def stop(self, execution: Execution, code: PlanningCode, reason: str) -> None:
+        """Stop one."""
+        self.running = [each for each in self.running if each is not execution]
+        self.stopped.append((execution, code, reason))
+
+
+class Later:
+    """A thread that does its work when the test wants."""
+
+    def __init__(self) -> None:
+        """Nothing is to be done."""
+        self.work: list[tuple[Callable[[], Any], Callable[[Future[Any]], None]]] = []
+
+    def submit(self, work: Callable[[], Any], then: Callable[[Future[Any]], None]) -> None:
+        """Take work."""
+        self.work.append((work, then))
+
+    def run(self) -> None:
+        """Do what is to be done, and what follows from that."""
+        while self.work:
+            work, then = self.work.pop(0)
+            done: Future[Any] = Future()
+            done.set_result(work())
+            then(done)
+
+
+def test_what_begins_in_a_scene_that_has_changed_meanwhile_is_stopped() -> None:
+    """Also where a look at what had begun before is not done yet."""
+    monitor = SimpleNamespace(
+        snapshot=SimpleNamespace(scene=crate_at(0.9)),
+        positions=lambda: places(READY),
+        on_change=lambda _look: None,
+    )
+    executions, later = Executions(), Later()
+    PathWatch(monitor, executions, later)  # type: ignore[arg-type]
+    started = [executions.start(motion()), executions.start(motion())]
+    later.run()
+    assert [each for each, _, _ in executions.stopped] == started
+    for _, code, reason in executions.stopped:
+        assert code is INVALIDATED
+        assert 'crate' in reason
+    monitor.snapshot.scene = EMPTY.scene
+    executions.start(motion())
+    later.run()
+    assert len(executions.stopped) == len(started)
+
+
+@pytest.mark.parametrize('kinds', ['va', 'v', ''])
+def test_the_way_to_the_first_point_counts(kinds: str) -> None:
+    """A trajectory of one point is what the controller makes up from where the arm is."""
+    trajectory = motion(kinds)
+    del trajectory.points[:-1]
+    ahead, behind = crate_at(0.9), crate_at(-0.2)
+    way = from_start(trajectory, READY.tolist())
+    assert 'crate' in contact_ahead(way, places(READY), ahead)
+    assert contact_ahead(way, places(READY), behind) == ''
 
 
 @pytest.mark.parametrize('share', [0.0, 0.3, 1.0])

@@ -22,7 +22,7 @@ from trajectory_msgs.msg import JointTrajectory
 from arm_model.ros import seconds
 
 from ..exceptions import PlanningCode, PlanningError
-from .joint_trajectory import check_trajectory, part_of
+from .joint_trajectory import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05
 """How often executions are looked at in [s]."""
@@ -64,6 +64,7 @@ class Execution:
         is_over: Whether ``done`` was called; a controller may still be on its way then.
         is_complete: Whether all controllers that have ended reached the end of the trajectory.
         in_doubt: Whether it is still to be found out why a controller gave up.
+        way: The trajectory with the way to its first point.
     """
 
     trajectory: Any
@@ -76,6 +77,7 @@ class Execution:
     is_over: bool = False
     is_complete: bool = True
     in_doubt: bool = False
+    way: Any = None
 
     @property
     def joints(self) -> set[str]:
@@ -110,12 +112,21 @@ class TrajectoryExecution:
         }
         self._running: list[Execution] = []
         self._find_out: Callable[[Execution], None] | None = None
+        self._begun: Callable[[], None] | None = None
         node.create_timer(WATCH_PERIOD, self._watch)
 
     @property
     def running(self) -> Sequence[Execution]:
         """What is on its way and not about to stop."""
         return [each for each in self._running if each.ending is None]
+
+    def on_start(self, begun: Callable[[], None]) -> None:
+        """Have something called when one more trajectory is on its way.
+
+        Args:
+            begun: Called in the executor.
+        """
+        self._begun = begun
 
     def on_failure(self, find_out: Callable[[Execution], None]) -> None:
         """Have somebody find out why a controller gave up, who answers with :meth:`explain`.
@@ -164,7 +175,8 @@ class TrajectoryExecution:
                     if other.is_over
                     else f'{min(shared)} is moved by another execution; stop it first, or wait',
                 )
-        self._check_start(trajectory)
+        places = self._check_start(trajectory)
+        execution.way = from_start(trajectory, [places[each] for each in trajectory.joint_names])
         parts = self._parts(trajectory, names)
         lasts = seconds(trajectory.points[-1].time_from_start)
         limits = self._limits
@@ -179,6 +191,8 @@ class TrajectoryExecution:
             sent.add_done_callback(
                 lambda answer, name=name: self._accepted(execution, name, answer)
             )
+        if self._begun is not None:
+            self._begun()
         return execution
 
     def stop(
@@ -210,7 +224,8 @@ class TrajectoryExecution:
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
 
-    def _check_start(self, trajectory: Any) -> None:  # noqa: ANN401
+    def _check_start(self, trajectory: Any) -> Mapping[str, float]:  # noqa: ANN401
+        """Return where its joints are in [rad]; refuse to begin far from there."""
         tolerance = self._limits.start_tolerance
         places = self._received(trajectory.joint_names)
         start = trajectory.points[0].positions
@@ -222,6 +237,7 @@ class TrajectoryExecution:
                     f' {tolerance:g} at joint {name!r}: it is at {places[name]:.4f}, the'
                     f' trajectory begins at {wanted:.4f}; plan anew',
                 )
+        return places
 
     def _parts(self, trajectory: Any, names: Sequence[str]) -> dict[str, JointTrajectory]:  # noqa: ANN401
         """Return what each controller is to follow."""

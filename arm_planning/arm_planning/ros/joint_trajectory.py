@@ -66,6 +66,28 @@ def part_of(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa:
     return part
 
 
+def from_start(trajectory: Any, start: Sequence[float]) -> JointTrajectory:  # noqa: ANN401
+    """Return a trajectory with the way to its first point, where that is later than its begin.
+
+    Args:
+        trajectory: A trajectory_msgs/JointTrajectory that was checked.
+        start: Where its joints stand at its begin in [rad] (n).
+    """
+    first = trajectory.points[0]
+    if seconds(first.time_from_start) <= 0.0:
+        return trajectory
+    at_rest = JointTrajectoryPoint(
+        positions=list(start),
+        velocities=[0.0] * len(first.velocities),
+        accelerations=[0.0] * len(first.accelerations),
+    )
+    return JointTrajectory(
+        header=trajectory.header,
+        joint_names=trajectory.joint_names,
+        points=[at_rest, *trajectory.points],
+    )
+
+
 def _check_row(number: int, kind: str, values: Sequence[float], names: Sequence[str]) -> None:
     if len(values) != len(names) and (len(values) or kind == ROWS[0]):
         raise _invalid(f'point {number} has {len(values)} {kind} of {len(names)} joints')

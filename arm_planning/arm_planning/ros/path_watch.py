@@ -18,7 +18,6 @@ from .background import as_refusal, Background
 from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .joint_trajectory import part_of, ROWS
 from .scene_monitor import SceneMonitor
-from .scene_snapshot import SceneSnapshot
 
 LOOKS = 400
 """Places on a trajectory at which the arm is looked for."""
@@ -36,7 +35,9 @@ class PathWatch:
     def __init__(
         self, monitor: SceneMonitor, execution: TrajectoryExecution, background: Background
     ) -> None:
-        """Look at what is on its way after each change of the scene.
+        """Look at what is on its way after each change of the scene, and as it begins.
+
+        The scene may have changed since a trajectory was planned.
 
         Args:
             monitor: The scene and where the joints are.
@@ -44,8 +45,9 @@ class PathWatch:
             background: A thread that has nothing else to do.
         """
         self._monitor, self._execution, self._background = monitor, execution, background
-        self._looks_at: SceneSnapshot | None = None
+        self._is_looking, self._looks_again = False, False
         monitor.on_change(self._look)
+        execution.on_start(self._look)
         execution.on_failure(self._find_out)
 
     def _find_out(self, failed: Execution) -> None:
@@ -56,33 +58,34 @@ class PathWatch:
             contact = '' if done.cancelled() or done.exception() else done.result()
             self._execution.explain(failed, contact and _words(contact))
 
-        self._background.submit(lambda: contact_ahead(failed.trajectory, here, scene), found)
+        self._background.submit(lambda: contact_ahead(failed.way, here, scene), found)
 
     def _look(self) -> None:
-        """Look at all executions in the present scene; one scene at a time."""
-        if self._looks_at is not None or not (running := self._execution.running):
+        """Look at all executions in the present scene, once more where one look is not done."""
+        self._looks_again = self._is_looking
+        if self._is_looking or not (running := self._execution.running):
             return
-        snapshot = self._looks_at = self._monitor.snapshot
-        here = self._monitor.positions()
+        self._is_looking = True
+        scene, here = self._monitor.snapshot.scene, self._monitor.positions()
 
         def contacts() -> list[str]:
-            return [_contact(each.trajectory, here, snapshot.scene) for each in running]
+            return [_contact(each.way, here, scene) for each in running]
 
         self._background.submit(contacts, lambda done: self._looked(running, done))
 
     def _looked(self, running: Sequence[Execution], done: Future[list[str]]) -> None:
-        before, self._looks_at = self._looks_at, None
+        self._is_looking = False
         if done.cancelled():
             return
         for execution, contact in zip(running, done.result(), strict=True):
             if contact:
                 self._execution.stop(execution, INVALIDATED, _words(contact))
-        if self._monitor.snapshot is not before:
+        if self._looks_again:
             self._look()
 
 
 def _words(contact: str) -> str:
-    return f'the scene has changed: {contact}'
+    return f'the way is not clear in the present scene: {contact}'
 
 
 def _contact(trajectory: Any, here: Array, scene: PlanningScene) -> str:  # noqa: ANN401
@@ -101,14 +104,15 @@ def contact_ahead(
     """Return what the rest of a trajectory would touch, in words; empty for nothing.
 
     Args:
-        trajectory: A trajectory_msgs/JointTrajectory that was checked.
+        trajectory: A trajectory_msgs/JointTrajectory that was checked, with the way to its
+            first point.
         here: Where all joints of the robot are in [rad].
         scene: What may collide; all joints of the robot move in it.
     """
     joints = list(scene.kinematics.joints)
     moved = [name for name in trajectory.joint_names if name in joints]
     if len(trajectory.points) < 2 or not moved:
-        return ''  # a single point is the end of a motion that the controller makes up
+        return ''  # nothing that the robot has moves
     path = path_of(part_of(trajectory, moved))
     columns = [joints.index(name) for name in moved]
     passed = passed_time(path, here[columns])
