@@ -39,6 +39,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_model import Clearances
 from arm_model.ros import seconds
+from arm_msgs.srv import InjectFault
 from arm_planning.ros.scene_changes import apply_object
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 from node_runner import LATCHED
@@ -85,6 +86,7 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         _says_why_no_plan(arm)
         _plans_anew_around_what_appears(arm)
         _cancels_before_it_is_planned_anew(arm)
+        _names_the_drive_that_fails(arm)
 
 
 def goal_constraints(positions: Sequence[float]) -> Constraints:
@@ -474,6 +476,31 @@ def _cancels_before_it_is_planned_anew(arm: MovingArm) -> None:
         MoveItErrorCodes.PREEMPTED,
     ), result.error_code
     assert not result.planned_trajectory.joint_trajectory.points
+
+
+def _names_the_drive_that_fails(arm: MovingArm) -> None:
+    """The client reads which one it is; nothing is planned anew."""
+    _goes(arm, 'visitor')
+    goal, states = move_goal(TURNED), arm.client.listen(JointState, '/joint_states')
+    goal.request.max_velocity_scaling_factor = 0.1
+    goal.planning_options.replan = True
+    run = move(arm, goal)
+    run.wait_for_motion()
+    begin = len(states)
+
+    def turned() -> bool:
+        return len(states) > begin and states[-1].position[0] > states[begin].position[0] + 0.05
+
+    arm.client.spin_until(turned, 10.0, 'motion')
+    fault = InjectFault.Request(fault='over_current')
+    answer = arm.client.call(InjectFault, '/fake_slaves/panda_joint4/fault', fault)
+    assert answer.success, answer.message
+    status, result = run.wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED, result.error_code
+    assert 'panda_joint4 ' in result.error_code.message
+    assert 'panda_joint3' not in result.error_code.message
+    assert run.states.count('PLANNING') == 1
 
 
 def _stands(states: Sequence[JointState]) -> bool:

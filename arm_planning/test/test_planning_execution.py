@@ -56,9 +56,9 @@ class Controller:
         code = CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID if self.forgets else 0
         return answered(CancelGoal.Response(return_code=code))
 
-    def end(self, status: int = GoalStatus.STATUS_CANCELED) -> None:
+    def end(self, status: int = GoalStatus.STATUS_CANCELED, words: str = '') -> None:
         """Confirm the end."""
-        result = FollowJointTrajectory.Result()
+        result = FollowJointTrajectory.Result(error_string=words)
         self.result.set_result(SimpleNamespace(status=status, result=result))
 
 
@@ -217,12 +217,13 @@ def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) 
     asked: list[execution.Execution] = []
     bench.execution.on_failure(asked.append)
     running = bench.start()
-    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    bench.controller.end(GoalStatus.STATUS_ABORTED, 'left is in fault')
     assert (asked, bench.ends) == ([running], [])
     bench.execution.explain(running, change)
     ((code, reason),) = bench.ends
     assert code is (execution.INVALIDATED if change else PlanningCode.CONTROL_FAILED)
     assert change in reason
+    assert 'arm: left is in fault' in reason  # a drive may fail in front of an object, too
     bench.start()
 
 

@@ -141,11 +141,13 @@ class TrajectoryExecution:
 
         Args:
             execution: What it followed.
-            change: How the scene has changed that it had to; empty where its own words count.
+            change: How the scene has changed that it had to; empty where its own words alone
+                count.
         """
         execution.in_doubt = False
-        if change:
-            execution.ending = INVALIDATED, change
+        if change and execution.ending is not None:
+            _, words = execution.ending
+            execution.ending = INVALIDATED, f'{change}; {words}'
         self._conclude(execution)
 
     def start(
