@@ -56,9 +56,11 @@ class Controller:
         code = CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID if self.forgets else 0
         return answered(CancelGoal.Response(return_code=code))
 
-    def end(self, status: int = GoalStatus.STATUS_CANCELED, words: str = '') -> None:
+    def end(
+        self, status: int = GoalStatus.STATUS_CANCELED, words: str = '', code: int = 0
+    ) -> None:
         """Confirm the end."""
-        result = FollowJointTrajectory.Result(error_string=words)
+        result = FollowJointTrajectory.Result(error_string=words, error_code=code)
         self.result.set_result(SimpleNamespace(status=status, result=result))
 
 
@@ -225,6 +227,25 @@ def test_why_a_controller_gave_up_is_found_out_first(bench: Bench, change: str) 
     assert change in reason
     assert 'arm: left is in fault' in reason  # a drive may fail in front of an object, too
     bench.start()
+
+
+@pytest.mark.parametrize(
+    ('status', 'words', 'code', 'reason'),
+    [
+        (GoalStatus.STATUS_ABORTED, 'left is in fault', -1, 'arm: left is in fault'),
+        (GoalStatus.STATUS_ABORTED, '', -4, 'arm: PATH_TOLERANCE_VIOLATED'),
+        (GoalStatus.STATUS_ABORTED, '', -99, 'arm: error code -99'),
+        (GoalStatus.STATUS_ABORTED, '', 0, 'arm: did not reach the end, and gave no reason'),
+        (GoalStatus.STATUS_CANCELED, '', 0, 'arm: canceled by another client'),
+    ],
+)
+def test_a_controller_that_says_little_is_put_into_words(
+    bench: Bench, status: int, words: str, code: int, reason: str
+) -> None:
+    """Some give a code alone, or neither code nor words."""
+    bench.start()
+    bench.controller.end(status, words, code)
+    assert bench.ends == [(PlanningCode.CONTROL_FAILED, reason)]
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model.ros import seconds
+from arm_trajectory import GoalCode
 
 from ..exceptions import PlanningCode, PlanningError
 from .joint_trajectory import check_trajectory, from_start, part_of
@@ -289,8 +290,7 @@ class TrajectoryExecution:
         if wrapped.status == GoalStatus.STATUS_SUCCEEDED and not wrapped.result.error_code:
             self._conclude(execution)
             return
-        words = wrapped.result.error_string or f'error code {wrapped.result.error_code}'
-        self._fail(execution, f'{name}: {words}')
+        self._fail(execution, f'{name}: {_words(wrapped)}')
 
     def _fail(self, execution: Execution, reason: str) -> None:
         execution.is_complete = False
@@ -355,6 +355,18 @@ class TrajectoryExecution:
         if answer.result().return_code in FORGOTTEN:
             execution.waits_for.discard(name)
             self._conclude(execution)
+
+
+def _words(ended: Any) -> str:  # noqa: ANN401
+    """Return why a controller did not reach the end; some say little."""
+    code = ended.result.error_code
+    if ended.result.error_string:
+        return str(ended.result.error_string)
+    if code:
+        return GoalCode(code).name if code in set(GoalCode) else f'error code {code}'
+    if ended.status == GoalStatus.STATUS_CANCELED:
+        return 'canceled by another client'
+    return 'did not reach the end, and gave no reason'
 
 
 def _unconfirmed(execution: Execution) -> str:
