@@ -199,8 +199,8 @@ def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: st
     bench.start()
 
 
-def test_a_start_is_told_with_the_way_to_its_first_point(bench: Bench) -> None:
-    """What is refused is not told."""
+def test_a_start_is_reported_with_the_way_to_its_first_point(bench: Bench) -> None:
+    """What is refused is not reported."""
     begun: list[Any] = []
     bench.execution.on_start(lambda: begun.append(bench.execution.running[-1].way))
     trajectory = motion()
