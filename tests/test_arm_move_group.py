@@ -4,28 +4,36 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import Pose
-from moveit_msgs.action import ExecuteTrajectory, MoveGroup
+from geometry_msgs.msg import Pose, PoseStamped
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import (
     CollisionObject,
     Constraints,
     JointConstraint,
+    MotionSequenceItem,
+    MotionSequenceRequest,
     MoveItErrorCodes,
+    OrientationConstraint,
     PlanningScene,
+    PositionConstraint,
     RobotTrajectory,
 )
 from moveit_msgs.srv import (
     ApplyPlanningScene,
     GetCartesianPath,
     GetMotionPlan,
+    GetMotionSequence,
+    GetPlannerParams,
     GetPlanningScene,
     GetPositionFK,
     GetPositionIK,
     GetStateValidity,
     QueryPlannerInterfaces,
+    SetPlannerParams,
 )
 from moving_arm import goal_to, MovingArm, READY, robot_parameters
 from planning_messages import panda
@@ -37,7 +45,7 @@ from simulated_arm import JOINTS
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_model import Clearances
+from arm_model import Clearances, frozen
 from arm_model.ros import seconds
 from arm_msgs.srv import InjectFault
 from arm_planning.ros.scene_changes import apply_object
@@ -45,10 +53,11 @@ from arm_planning.ros.scene_snapshot import SceneSnapshot
 from node_runner import LATCHED
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from isolation import Isolation
+    from processes import RunningProcess
 
 pytestmark = pytest.mark.scenario
 
@@ -76,9 +85,11 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         _says_why_not(arm)
         _cancels_and_stops(arm)
         _back_to_ready(arm)
-        _plans_for_move_group_interface(arm)
+        _plans_for_move_group_interface(arm, group)
         _plans_and_executes_for_pymoveit2(arm)
         _solves_and_follows_lines(arm)
+        _back_to_ready(arm)
+        _follows_sequences(arm)
         _cancels_a_move(arm)
         _back_to_ready(arm)
         _stops_in_front_of_what_appears(arm)
@@ -301,12 +312,19 @@ def _back_to_ready(arm: MovingArm) -> None:
     assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
 
 
-def _plans_for_move_group_interface(arm: MovingArm) -> None:
+def _plans_for_move_group_interface(arm: MovingArm, group: RunningProcess) -> None:
     """MoveGroupInterface::plan, then ::execute with what it got."""
     planners = arm.client.call(
         QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
     )
-    assert planners.planner_interfaces[0].pipeline_id == 'ompl'
+    planner = planners.planner_interfaces[0]
+    assert planner.pipeline_id == 'ompl'
+    about = GetPlannerParams.Request(planner_config=planner.planner_ids[0], group='panda_arm')
+    params = arm.client.call(GetPlannerParams, '/get_planner_params', about).params
+    assert dict(zip(params.keys, params.values, strict=True)) == {'type': 'geometric::RRTConnect'}
+    change = SetPlannerParams.Request(planner_config=planner.planner_ids[0], params=params)
+    arm.client.call(SetPlannerParams, '/set_planner_params', change)
+    group.wait_for('set_planner_params: RRTConnectkConfigDefault .* type was refused', 10.0)
     status, result = move(arm, move_goal([-0.4, *READY[1:]], plan_only=True)).wait()
     assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
     points = result.planned_trajectory.joint_trajectory.points
@@ -358,6 +376,80 @@ def _solves_and_follows_lines(arm: MovingArm) -> None:
     refused = arm.client.call(GetPositionIK, '/compute_ik', ik).error_code
     assert refused.val == MoveItErrorCodes.NO_IK_SOLUTION
     assert 'out of reach' in refused.message
+
+
+def _sequence(arm: MovingArm, *radii: float) -> MotionSequenceRequest:
+    """Return LIN around a corner, and PTP back to READY."""
+    fk = GetPositionFK.Request(fk_link_names=['panda_link8'])
+    here = arm.client.call(GetPositionFK, '/compute_fk', fk).pose_stamped[0]
+    sequence = MotionSequenceRequest()
+    for (x, z), radius in zip(((0.05, 0.0), (0.05, -0.08)), radii, strict=True):
+        corner = deepcopy(here)
+        corner.pose.position.x += x
+        corner.pose.position.z += z
+        request = move_goal(READY).request
+        request.planner_id, request.max_velocity_scaling_factor = 'LIN', 0.5
+        request.goal_constraints = [_pose_constraints(corner)]
+        sequence.items.append(MotionSequenceItem(req=request, blend_radius=radius))
+    back = move_goal(READY).request
+    back.planner_id = 'PTP'
+    sequence.items.append(MotionSequenceItem(req=back))
+    return sequence
+
+
+def _pose_constraints(at: PoseStamped) -> Constraints:
+    """Return a pose of the tip as MoveGroupInterface::setPoseTarget makes it."""
+    sphere = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1e-3])
+    place = PositionConstraint(header=at.header, link_name='panda_link8', weight=1.0)
+    place.constraint_region.primitives = [sphere]
+    place.constraint_region.primitive_poses = [at.pose]
+    turn = OrientationConstraint(header=at.header, link_name='panda_link8', weight=1.0)
+    turn.orientation = at.pose.orientation
+    turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = 1e-2
+    turn.absolute_z_axis_tolerance = 1e-2
+    return Constraints(position_constraints=[place], orientation_constraints=[turn])
+
+
+def _follows_sequences(arm: MovingArm) -> None:
+    """Pilz' plan_sequence_path and sequence_move_group, with a blend; and what is refused."""
+    asked = GetMotionSequence.Request(request=_sequence(arm, 0.02, 0.0))
+    planned = arm.client.call(GetMotionSequence, '/plan_sequence_path', asked).response
+    assert planned.error_code.val == MoveItErrorCodes.SUCCESS, planned.error_code.message
+    (trajectory,) = planned.planned_trajectories
+    ends = trajectory.joint_trajectory.points[0], trajectory.joint_trajectory.points[-1]
+    assert all(list(end.positions) == pytest.approx(READY, abs=0.01) for end in ends)
+    wrong = GetMotionSequence.Request(request=_sequence(arm, 0.2, 0.0))
+    refused = arm.client.call(GetMotionSequence, '/plan_sequence_path', wrong).response.error_code
+    assert (refused.val, refused.source) == (MoveItErrorCodes.INVALID_MOTION_PLAN, 'move_group')
+    assert 'item 0' in refused.message
+
+    depth = _depth(arm)
+    goal = MoveGroupSequence.Goal(request=asked.request)
+    run = ActionRun(arm, MoveGroupSequence, '/sequence_move_group', goal)
+    status, result = run.wait()
+    code = result.response.error_code
+    assert (status, code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), code
+    assert len(result.response.planned_trajectories) == 1
+    assert run.states == ['PLANNING', 'MONITOR', 'IDLE']
+    assert depth() == pytest.approx(0.08, abs=0.01)
+    goal.planning_options.replan = True
+    status, result = ActionRun(arm, MoveGroupSequence, '/sequence_move_group', goal).wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert 'replan' in result.response.error_code.message
+
+
+def _depth(arm: MovingArm) -> Callable[[], float]:
+    """Return what shows how far the tip has been below where it is now [m]."""
+    states = arm.client.listen(JointState, '/joint_states')
+    arm.client.spin_until(lambda: bool(states), 10.0, 'joint states')
+    model = panda().model('panda_arm')
+
+    def height(state: JointState) -> float:
+        places = dict(zip(state.name, state.position, strict=True))
+        positions = frozen([places[name] for name in model.joints])
+        return float(model.kinematics.link_pose('panda_link8', positions).position[2])
+
+    return lambda: height(states[0]) - min(map(height, states))
 
 
 def _cancels_a_move(arm: MovingArm) -> None:

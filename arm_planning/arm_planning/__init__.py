@@ -9,6 +9,7 @@ A :class:`Planner` plans: a :class:`MotionRequest` goes in, a :class:`MotionPlan
 from __future__ import annotations
 
 from .exceptions import PlanningCode, PlanningError
+from .industrial.sequence import SequenceItem
 from .planner import Planner
 from .requests import (
     CircPoint,
@@ -41,6 +42,7 @@ __all__ = [
     'PlanningError',
     'PoseGoal',
     'PositionConstraint',
+    'SequenceItem',
     'SrdfDraft',
     'ValidityCheck',
     'Violation',

@@ -19,6 +19,7 @@ from .free.timing import scaled_limits
 from .ik.solver import DEFAULT_TIMEOUT, IkSolver
 from .industrial.limits import CartesianLimits
 from .industrial.planner import IndustrialPlanner, PLANNER_IDS
+from .industrial.sequence import SequenceItem
 from .link_speed import speed_limited
 from .requests import Goal, JointGoal, MotionPlan, MotionRequest
 from .validity import ValidityCheck, Violation
@@ -74,6 +75,24 @@ class Planner:
             plan = self._industrial.plan(request, scene)
         else:
             plan = self._free_motion(request, scene, began + request.timeout)
+        return replace(plan, planning_time=self._clock() - began)
+
+    def plan_sequence(
+        self, items: Sequence[SequenceItem], scene: PlanningScene | None = None, first: int = 0
+    ) -> MotionPlan:
+        """Return one motion through several of PTP, LIN and CIRC, blended where they say so.
+
+        Args:
+            items: The motions; each begins where the one before ends.
+            scene: What may collide; by default that of the model.
+            first: Number of the first item, for messages.
+
+        Raises:
+            PlanningError: A motion is refused, or a blend; the message names the item.
+        """
+        began = self._clock()
+        scene = self._model.scene if scene is None else scene
+        plan = self._industrial.plan_sequence(items, scene, first)
         return replace(plan, planning_time=self._clock() - began)
 
     def ik(

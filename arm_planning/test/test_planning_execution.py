@@ -13,7 +13,7 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from control_msgs.action import FollowJointTrajectory
-from planning_messages import panda
+from planning_messages import panda, QuietNode
 import pytest
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -263,16 +263,6 @@ def test_a_scene_that_changes_at_the_end_is_too_late(
     bench.execution.stop(bench.start(), execution.INVALIDATED, 'the scene has changed')
     bench.controller.end(status)
     assert [code for code, _ in bench.ends] == [outcome]
-
-
-class QuietNode:
-    """A node without a graph."""
-
-    def __getattr__(self, name: str) -> Any:
-        """Return what does nothing."""
-        if name == 'resolve_topic_name':
-            return lambda topic: f'/{topic}'
-        return lambda *_: SimpleNamespace(publish=lambda _message: None)
 
 
 def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ from ..requests import (
 from .following import curve_path
 from .limits import CartesianLimits, check_scaling, scaled
 from .ptp import ptp_path
-from .sequence import check_items, check_overlap, joined, SequenceItem
+from .sequence import check_overlap, check_radii, joined, SequenceItem
 from .timing import FullSpeedPath, timed
 
 PTP, LIN, CIRC = 'PTP', 'LIN', 'CIRC'
@@ -104,7 +104,7 @@ class IndustrialPlanner:
             return error
 
     def plan_sequence(
-        self, items: Sequence[SequenceItem], scene: PlanningScene | None = None
+        self, items: Sequence[SequenceItem], scene: PlanningScene | None = None, first: int = 0
     ) -> MotionPlan:
         """Return one motion through a sequence, with stops where a blend radius is 0.
 
@@ -113,15 +113,16 @@ class IndustrialPlanner:
         Args:
             items: The motions; each has one goal, and begins where the one before ends.
             scene: Where it must be free of contact; None does not check.
+            first: Number of the first item, for messages.
 
         Raises:
             PlanningError: A motion is refused, or a blend; the message names the item.
         """
-        check_items(items)
+        check_radii([item.blend_radius for item in items])
         start, path = self._start(items[0].request), None
         notes: list[str] = []
         group: list[tuple[MotionRequest, FullSpeedPath, LinkKinematics, float]] = []
-        for number, item in enumerate(items):
+        for number, item in enumerate(items, first):
             full, link = self._item(number, item.request, start, scene)
             group.append((item.request, full, link, item.blend_radius))
             start = full.path.end.position

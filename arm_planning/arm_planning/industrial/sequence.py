@@ -53,21 +53,23 @@ class SequenceItem:
     blend_radius: float = 0.0
 
 
-def check_items(items: Sequence[SequenceItem]) -> None:
-    """Refuse what is no sequence, by the rules of Pilz' planner.
+def check_radii(radii: Sequence[float]) -> None:
+    """Refuse what are no blend radii of a sequence, by the rules of Pilz' planner.
+
+    Args:
+        radii: That of each item in [m].
 
     Raises:
-        PlanningError: It is empty, a radius is negative, or the last one is not 0.
+        PlanningError: There is none, one is negative or not finite, or the last is not 0.
     """
-    if not items:
+    if not radii:
         raise _refused('no items')
-    for number, item in enumerate(items):
-        if not item.blend_radius >= 0.0 or not np.isfinite(item.blend_radius):
-            raise _refused(f'item {number}: blend radius {item.blend_radius}; give 0 m or more')
-    if items[-1].blend_radius > 0.0:
+    for number, radius in enumerate(radii):
+        if not radius >= 0.0 or not np.isfinite(radius):
+            raise _refused(f'item {number}: blend radius {radius}; give 0 m or more')
+    if radii[-1] > 0.0:
         raise _refused(
-            f'the last item has a blend radius of {items[-1].blend_radius:g} m, and nothing'
-            ' follows it; give 0'
+            f'the last item has a blend radius of {radii[-1]:g} m, and nothing follows it; give 0'
         )
 
 

@@ -27,8 +27,9 @@ from ..ros.background import Background
 from ..ros.execute_action import ExecuteAction
 from ..ros.execution import ExecutionLimits, TrajectoryExecution
 from ..ros.kinematic_services import KinematicServices
-from ..ros.move_action import MoveAction
+from ..ros.motion_action import MotionAction, sequence, single_motion
 from ..ros.path_watch import PathWatch
+from ..ros.planner_queries import PlannerQueries
 from ..ros.planning import PlanningThread
 from ..ros.robot_groups import RobotGroups
 from ..ros.scene_monitor import SceneMonitor
@@ -80,7 +81,9 @@ class MoveGroup(Node):
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
         planning = PlanningThread(self, monitor, self._planning, _robot(description))
-        MoveAction(self, planning, self._planning, execution)
+        PlannerQueries(self)
+        for kind in (single_motion(planning), sequence(planning)):
+            MotionAction(self, kind, planning, self._planning, execution)
         # there is no octomap that would have to be cleared
         self.create_service(Empty, 'clear_octomap', lambda _request, response: response)
 

@@ -4,30 +4,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 import time
 from typing import Any
 
-from moveit_msgs.msg import DisplayTrajectory, PlannerInterfaceDescription, RobotTrajectory
+from moveit_msgs.msg import (
+    DisplayTrajectory,
+    MotionSequenceResponse,
+    MoveItErrorCodes,
+    RobotTrajectory,
+)
 from moveit_msgs.msg import RobotState as StateMessage
-from moveit_msgs.srv import GetMotionPlan, QueryPlannerInterfaces
+from moveit_msgs.srv import GetMotionPlan, GetMotionSequence
 from rclpy.node import Node
 
-from arm_model import Array, RobotModel
+from arm_model import Array, frozen, RobotModel
 from node_runner import LATCHED
 
 from ..exceptions import PlanningCode, PlanningError
-from ..industrial.planner import PLANNER_IDS
-from ..planner import FREE_MOTION, Planner
+from ..industrial.sequence import SequenceItem
+from ..planner import Planner
+from ..requests import MotionRequest
 from .background import Background, error_code
-from .motion_request import OMPL, PILZ, RequestReader
+from .motion_request import RequestReader
 from .robot_groups import RobotGroups
 from .robot_state import state_message, trajectory_message
 from .scene_changes import apply_scene, scene_for
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
+from .sequence_request import group_runs, GroupRun
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +43,12 @@ class PlannedMotion:
 
     Attributes:
         start: Where it begins.
-        trajectory: The motion.
+        trajectories: The motion; a sequence has one for each change of the group.
         planning_time: How long planning took in [s].
     """
 
     start: StateMessage
-    trajectory: RobotTrajectory
+    trajectories: Sequence[RobotTrajectory]
     planning_time: float
 
 
@@ -82,7 +89,7 @@ class PlanningThread:
     def __init__(
         self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
     ) -> None:
-        """Offer plan_kinematic_path, query_planner_interface and display_planned_path.
+        """Offer plan_kinematic_path, plan_sequence_path and what belongs to them.
 
         Args:
             node: The node.
@@ -94,7 +101,9 @@ class PlanningThread:
         self._planners = GroupPlanners(robot)
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
         background.serve(GetMotionPlan, 'plan_kinematic_path', self._serve, _refuse)
-        node.create_service(QueryPlannerInterfaces, 'query_planner_interface', _interfaces)
+        background.serve(
+            GetMotionSequence, 'plan_sequence_path', self._serve_sequence, _refuse_sequence
+        )
 
     def prepare(self, message: Any, scene_diff: Any = None) -> Callable[[], PlannedMotion]:  # noqa: ANN401
         """Return what plans a motion; called in the executor, what it returns in the thread.
@@ -112,9 +121,51 @@ class PlanningThread:
                 PlanningCode.INVALID_GROUP_NAME, f'group_name is empty; groups: {known}'
             )
         snapshot, positions = self._monitor.start(message.start_state, message.group_name)
-        if scene_diff is not None and scene_diff.is_diff:
-            snapshot = apply_scene(snapshot, scene_diff, positions)
+        snapshot = _changed(snapshot, scene_diff, positions)
         return lambda: self._plan(message, snapshot, positions)
+
+    def prepare_sequence(
+        self,
+        items: Sequence[Any],
+        scene_diff: Any = None,  # noqa: ANN401
+    ) -> Callable[[], PlannedMotion]:
+        """Return what plans a sequence, as :meth:`prepare`; without items it is one of no motion.
+
+        Args:
+            items: The moveit_msgs/MotionSequenceItem.
+            scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
+
+        Raises:
+            PlanningError: The sequence is refused.
+        """
+        if not items:
+            return lambda: PlannedMotion(StateMessage(), [], 0.0)
+        runs = group_runs(items)
+        snapshot, positions = self._monitor.start(items[0].req.start_state, runs[0].group)
+        for number, run in enumerate(runs):
+            if run.group not in [each.group for each in runs[:number]]:
+                positions = self._begin(run, positions)
+        snapshot = _changed(snapshot, scene_diff, positions)
+        return lambda: self._plan_sequence(runs, snapshot, positions)
+
+    def _begin(self, run: GroupRun, positions: Array) -> Array:
+        """Return all positions with those at which the first item of a group begins."""
+        state = run.items[0].req.start_state
+        if run.first and state.attached_collision_objects:
+            raise PlanningError(
+                PlanningCode.INVALID_ROBOT_STATE,
+                f'sequence: item {run.first} attaches bodies; the first item of all may',
+            )
+        _, given = self._monitor.start(state, run.group)
+        joints = self._monitor.robot.group_joints()[run.group]
+        places = dict(zip(self._monitor.robot.joints, given.tolist(), strict=True))
+        return self._moved(positions, {name: places[name] for name in joints if name in places})
+
+    def _moved(self, positions: Array, places: Mapping[str, float]) -> Array:
+        joints = self._monitor.robot.joints
+        return frozen(
+            [places.get(name, at) for name, at in zip(joints, positions.tolist(), strict=True)]
+        )
 
     def display(self, planned: PlannedMotion) -> None:
         """Show a motion to listeners.
@@ -125,7 +176,7 @@ class PlanningThread:
         self._displayed.publish(
             DisplayTrajectory(
                 model_id=self._robot.name,
-                trajectory=[planned.trajectory],
+                trajectory=list(planned.trajectories),
                 trajectory_start=planned.start,
             )
         )
@@ -137,7 +188,39 @@ class PlanningThread:
         plan = planner.plan(request, scene_for(snapshot, model.scene))
         start = state_message(self._robot.joints, positions, snapshot.root)
         trajectory = trajectory_message(model.joints, plan.path, snapshot.root)
-        return PlannedMotion(start, trajectory, time.monotonic() - begin)
+        return PlannedMotion(start, [trajectory], time.monotonic() - begin)
+
+    def _plan_sequence(
+        self, runs: Sequence[GroupRun], snapshot: SceneSnapshot, start: Array
+    ) -> PlannedMotion:
+        begin, positions = time.monotonic(), start
+        trajectories = []
+        for run in runs:
+            model, planner = self._planners.at(run.group, positions)
+            read = RequestReader(model, snapshot, positions)
+            items = [
+                SequenceItem(_read_item(read, number, item.req), item.blend_radius)
+                for number, item in enumerate(run.items, run.first)
+            ]
+            plan = planner.plan_sequence(items, scene_for(snapshot, model.scene), run.first)
+            trajectories.append(trajectory_message(model.joints, plan.path, snapshot.root))
+            end = dict(zip(model.joints, plan.path.end.position.tolist(), strict=True))
+            positions = self._moved(positions, end)
+        return PlannedMotion(
+            state_message(self._robot.joints, start, snapshot.root),
+            trajectories,
+            time.monotonic() - begin,
+        )
+
+    def _serve_sequence(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
+        work = self.prepare_sequence(request.request.items)
+
+        def answer() -> Any:  # noqa: ANN401
+            planned = work()
+            self.display(planned)
+            return GetMotionSequence.Response(response=sequence_response(error_code(), planned))
+
+        return answer
 
     def _serve(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         work = self.prepare(request.motion_plan_request)
@@ -150,24 +233,49 @@ class PlanningThread:
             filled.error_code = error_code()
             filled.group_name = request.motion_plan_request.group_name
             filled.trajectory_start = planned.start
-            filled.trajectory = planned.trajectory
+            (filled.trajectory,) = planned.trajectories
             filled.planning_time = planned.planning_time
             return response
 
         return answer
 
 
+def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> Any:  # noqa: ANN401
+    """Return a moveit_msgs/MotionSequenceResponse.
+
+    Args:
+        code: How it ended.
+        planned: What was planned; None for nothing.
+    """
+    response = MotionSequenceResponse(error_code=code)
+    if planned is not None:
+        response.sequence_start = planned.start
+        response.planned_trajectories = list(planned.trajectories)
+        response.planning_time = planned.planning_time
+    return response
+
+
+def _changed(
+    snapshot: SceneSnapshot,
+    diff: Any,  # noqa: ANN401
+    positions: Array,
+) -> SceneSnapshot:
+    """Return a scene with a change, where there is one."""
+    if diff is None or not diff.is_diff:
+        return snapshot
+    return apply_scene(snapshot, diff, positions)
+
+
+def _read_item(read: RequestReader, number: int, message: Any) -> MotionRequest:  # noqa: ANN401
+    try:
+        return read.request(message)
+    except PlanningError as error:
+        raise PlanningError(error.code, f'sequence: item {number}: {error}') from error
+
+
+def _refuse_sequence(response: Any, error: PlanningError) -> None:  # noqa: ANN401
+    response.response.error_code = error_code(error.code, str(error))
+
+
 def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401
     response.motion_plan_response.error_code = error_code(error.code, str(error))
-
-
-def _interfaces(_request: Any, response: Any) -> Any:  # noqa: ANN401
-    response.planner_interfaces = [
-        PlannerInterfaceDescription(
-            name='RRT-Connect', pipeline_id=OMPL, planner_ids=list(FREE_MOTION)
-        ),
-        PlannerInterfaceDescription(
-            name='PTP, LIN, CIRC', pipeline_id=PILZ, planner_ids=list(PLANNER_IDS)
-        ),
-    ]
-    return response

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The action move_action: plan, and execute unless only a plan is asked for."""
+"""The actions move_action and sequence_move_group: plan, and execute unless a plan is enough."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from moveit_msgs.action import MoveGroup
-from moveit_msgs.msg import RobotState
+from moveit_msgs.action import MoveGroup, MoveGroupSequence
+from moveit_msgs.msg import MoveItErrorCodes, RobotState
 from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 from rclpy.timer import Timer
@@ -20,10 +21,71 @@ from ..exceptions import PlanningCode, PlanningError
 from .background import as_refusal, Background, error_code
 from .execute_action import conclude
 from .execution import Execution, INVALIDATED, TrajectoryExecution
-from .planning import PlannedMotion, PlanningThread
+from .planning import PlannedMotion, PlanningThread, sequence_response
 
 REPLAN_ATTEMPTS = 5
 """How often a goal that does not say so is planned anew at most, as in MoveIt."""
+
+
+Prepare = Callable[[Any, bool], Callable[[], PlannedMotion]]
+Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class MotionKind:
+    """What an action asks for, and how it is answered.
+
+    Attributes:
+        action: Its class.
+        name: Its name.
+        prepare: Takes what a goal asks for and whether it is planned anew, and returns what plans
+            it in the thread of planning; raises PlanningError.
+        answer: Makes the result of how it ended, the plan, and whether that was begun.
+    """
+
+    action: Any
+    name: str
+    prepare: Prepare
+    answer: Answer
+
+
+def single_motion(planning: PlanningThread) -> MotionKind:
+    """Return move_action: a motion of MoveGroupInterface::plan and ::move."""
+
+    def prepare(asked: Any, again: bool) -> Callable[[], PlannedMotion]:  # noqa: ANN401
+        if again:  # from where it has stopped
+            asked.request.start_state = RobotState(is_diff=True)
+        return planning.prepare(asked.request, asked.planning_options.planning_scene_diff)
+
+    def answer(code: MoveItErrorCodes, planned: PlannedMotion | None, begun: bool) -> Any:  # noqa: ANN401
+        result = MoveGroup.Result(error_code=code)
+        if planned is not None:
+            result.trajectory_start = planned.start
+            (result.planned_trajectory,) = planned.trajectories
+            result.planning_time = planned.planning_time
+            if begun:
+                result.executed_trajectory = result.planned_trajectory
+        return result
+
+    return MotionKind(MoveGroup, 'move_action', prepare, answer)
+
+
+def sequence(planning: PlanningThread) -> MotionKind:
+    """Return sequence_move_group, of Pilz' planner."""
+
+    def prepare(asked: Any, _: bool) -> Callable[[], PlannedMotion]:  # noqa: ANN401
+        if asked.planning_options.replan:
+            raise PlanningError(
+                PlanningCode.PLANNING_FAILED,
+                'planning_options.replan: a sequence is not planned anew; leave it out',
+            )
+        diff = asked.planning_options.planning_scene_diff
+        return planning.prepare_sequence(asked.request.items, diff)
+
+    def answer(code: MoveItErrorCodes, planned: PlannedMotion | None, _: bool) -> Any:  # noqa: ANN401
+        return MoveGroupSequence.Result(response=sequence_response(code, planned))
+
+    return MotionKind(MoveGroupSequence, 'sequence_move_group', prepare, answer)
 
 
 @dataclass(slots=True, eq=False)
@@ -34,18 +96,20 @@ class _Goal:
     work: Future[Any] | None = None
     planned: PlannedMotion | None = None
     execution: Execution | None = None
+    begun: int = 0
     outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
     is_canceled: bool = False
     replans: int = 0
     delay: Timer | None = None
 
 
-class MoveAction:
+class MotionAction:
     """Plans in the thread of planning; executes beside other goals whose joints are others."""
 
     def __init__(
         self,
         node: Node,
+        kind: MotionKind,
         planning: PlanningThread,
         background: Background,
         execution: TrajectoryExecution,
@@ -54,17 +118,18 @@ class MoveAction:
 
         Args:
             node: The node.
-            planning: What plans.
+            kind: The action.
+            planning: What shows plans.
             background: The thread of planning.
             execution: What executes.
         """
-        self._node, self._planning = node, planning
+        self._node, self._kind, self._planning = node, kind, planning
         self._background, self._execution = background, execution
         self._goals: dict[bytes, _Goal] = {}
         self._server = serve_goals(
             node,
-            MoveGroup,
-            'move_action',
+            kind.action,
+            kind.name,
             start=self._start,
             conclude=self._conclude,
             cancel=self._cancel,
@@ -75,13 +140,9 @@ class MoveAction:
         self._plan(goal)
 
     def _plan(self, goal: _Goal) -> None:
-        request = goal.handle.request.request
-        options = goal.handle.request.planning_options
-        goal.handle.publish_feedback(MoveGroup.Feedback(state='PLANNING'))
-        if goal.replans:  # from where it has stopped
-            request.start_state = RobotState(is_diff=True)
+        self._publish(goal, 'PLANNING')
         try:
-            work = self._planning.prepare(request, options.planning_scene_diff)
+            work = self._kind.prepare(goal.handle.request, goal.replans > 0)
         except PlanningError as error:
             self._end(goal, error.code, str(error))
             return
@@ -101,17 +162,32 @@ class MoveAction:
         if goal.handle.request.planning_options.plan_only:
             self._end(goal, PlanningCode.SUCCESS, '')
             return
-        goal.handle.publish_feedback(MoveGroup.Feedback(state='MONITOR'))
+        self._publish(goal, 'MONITOR')
+        self._follow(goal, planned)
+
+    def _follow(self, goal: _Goal, planned: PlannedMotion) -> None:
+        """Have the next trajectory of a plan followed, or end the goal after the last."""
+        if goal.begun == len(planned.trajectories):
+            self._end(goal, PlanningCode.SUCCESS, '')
+            return
         try:
             goal.execution = self._execution.start(
-                planned.trajectory.joint_trajectory,
+                planned.trajectories[goal.begun].joint_trajectory,
                 lambda code, reason: self._executed(goal, code, reason),
             )
         except PlanningError as refused:
             self._end(goal, refused.code, str(refused))
+        else:
+            goal.begun += 1
 
     def _executed(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
-        """End it, or plan anew where the scene has changed and the goal's options say so."""
+        """Go on, end it, or plan anew where the scene has changed and the options say so."""
+        if code is PlanningCode.SUCCESS and goal.planned is not None:
+            if goal.is_canceled and goal.begun < len(goal.planned.trajectories):
+                self._end(goal, PlanningCode.PREEMPTED, 'canceled')
+            else:
+                self._follow(goal, goal.planned)
+            return
         options = goal.handle.request.planning_options
         most = options.replan_attempts if options.replan_attempts > 0 else REPLAN_ATTEMPTS
         if code is not INVALIDATED or not options.replan or goal.is_canceled:
@@ -120,8 +196,9 @@ class MoveAction:
         if goal.replans >= most:
             self._end(goal, code, f'{reason}; planned anew {most} times')
             return
-        self._node.get_logger().info(f'move_action: {reason}; plans anew')
-        goal.replans, goal.execution, goal.work, goal.planned = goal.replans + 1, None, None, None
+        self._node.get_logger().info(f'{self._kind.name}: {reason}; plans anew')
+        goal.replans, goal.begun = goal.replans + 1, 0
+        goal.execution = goal.work = goal.planned = None
 
         def plan() -> None:
             self._end_delay(goal)
@@ -151,18 +228,14 @@ class MoveAction:
         goal.outcome = code, reason
         self._server.notify_execute(goal.handle, None)  # leads to _conclude
 
-    def _conclude(self, handle: Any) -> MoveGroup.Result:  # noqa: ANN401
+    def _conclude(self, handle: Any) -> Any:  # noqa: ANN401
         goal = self._goals.pop(bytes(handle.goal_id.uuid))
         code, reason = goal.outcome
-        handle.publish_feedback(MoveGroup.Feedback(state='IDLE'))
+        self._publish(goal, 'IDLE')
         if code is not PlanningCode.SUCCESS:
-            self._node.get_logger().warning(f'move_action: {code.name}: {reason}')
+            self._node.get_logger().warning(f'{self._kind.name}: {code.name}: {reason}')
         conclude(handle, code)
-        result = MoveGroup.Result(error_code=error_code(code, reason))
-        if goal.planned is not None:
-            result.trajectory_start = goal.planned.start
-            result.planned_trajectory = goal.planned.trajectory
-            result.planning_time = goal.planned.planning_time
-            if goal.execution is not None:
-                result.executed_trajectory = goal.planned.trajectory
-        return result
+        return self._kind.answer(error_code(code, reason), goal.planned, goal.begun > 0)
+
+    def _publish(self, goal: _Goal, state: str) -> None:
+        goal.handle.publish_feedback(self._kind.action.Feedback(state=state))

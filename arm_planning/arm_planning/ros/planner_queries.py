@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which planners there are and what can be set of them, as RViz' panel asks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from moveit_msgs.msg import PlannerInterfaceDescription, PlannerParams
+from moveit_msgs.srv import GetPlannerParams, QueryPlannerInterfaces, SetPlannerParams
+from rclpy.node import Node
+
+from ..industrial.planner import PLANNER_IDS
+from ..planner import FREE_MOTION
+from .motion_request import OMPL, PILZ
+
+SEARCH = 'geometric::RRTConnect'
+
+
+class PlannerQueries:
+    """Answers about planners; none has anything to set."""
+
+    def __init__(self, node: Node) -> None:
+        """Offer query_planner_interface, get_planner_params and set_planner_params.
+
+        Args:
+            node: The node.
+        """
+        self._log = node.get_logger()
+        node.create_service(QueryPlannerInterfaces, 'query_planner_interface', _interfaces)
+        node.create_service(GetPlannerParams, 'get_planner_params', _get)
+        node.create_service(SetPlannerParams, 'set_planner_params', self._set)
+
+    def _set(self, request: Any, response: Any) -> Any:  # noqa: ANN401  # rclpy has no types here
+        """Say that it counts nothing: the response has no place for it."""
+        self._log.warning(
+            f'set_planner_params: {request.planner_config or "the planners"} of group'
+            f' {request.group!r} cannot be set; {", ".join(request.params.keys) or "nothing"}'
+            ' was refused'
+        )
+        return response
+
+
+def _interfaces(_request: Any, response: Any) -> Any:  # noqa: ANN401
+    response.planner_interfaces = [
+        PlannerInterfaceDescription(
+            name='RRT-Connect', pipeline_id=OMPL, planner_ids=list(FREE_MOTION)
+        ),
+        PlannerInterfaceDescription(
+            name='PTP, LIN, CIRC', pipeline_id=PILZ, planner_ids=list(PLANNER_IDS)
+        ),
+    ]
+    return response
+
+
+def _get(request: Any, response: Any) -> Any:  # noqa: ANN401
+    if request.planner_config in FREE_MOTION:
+        words = 'how it searches; nothing of it can be set'
+        response.params = PlannerParams(keys=['type'], values=[SEARCH], descriptions=[words])
+    return response

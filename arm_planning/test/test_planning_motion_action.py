@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The motion actions over DDS, with plans and executions that the test makes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from types import SimpleNamespace
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from isolation import Isolation
+from moveit_msgs.action import MoveGroup, MoveGroupSequence
+from moveit_msgs.msg import RobotState, RobotTrajectory
+import pytest
+from ros_client import RosClient
+
+from arm_planning import PlanningCode
+from arm_planning.ros.background import Background
+from arm_planning.ros.execution import Done, INVALIDATED
+from arm_planning.ros.motion_action import MotionAction, sequence, single_motion
+from arm_planning.ros.planning import PlannedMotion
+
+TIMEOUT = 20.0  # [s]
+
+
+class Bench:
+    """Both actions and their clients in one node."""
+
+    def __init__(self, client: RosClient) -> None:
+        """Offer them."""
+        self.client = client
+        self.plans = 0
+        self.stops = True
+        self.executions: list[Done] = []
+        self.background = Background(client.node, 'planning')
+        planning: Any = SimpleNamespace(
+            prepare=partial(self._prepare, 1),
+            prepare_sequence=partial(self._prepare, 2),
+            display=lambda _: None,
+        )
+        execution: Any = SimpleNamespace(start=self._start, stop=self._stop)
+        self.actions = [
+            MotionAction(client.node, kind, planning, self.background, execution)
+            for kind in (single_motion(planning), sequence(planning))
+        ]
+
+    def _prepare(self, count: int, *_: Any) -> Callable[[], PlannedMotion]:
+        self.plans += 1
+        return lambda: PlannedMotion(RobotState(), [RobotTrajectory()] * count, 0.0)
+
+    def _start(self, _trajectory: Any, done: Done) -> Done:
+        self.executions.append(done)
+        return done
+
+    def _stop(self, done: Done, *, reason: str) -> None:
+        if self.stops:
+            done(PlanningCode.PREEMPTED, reason)
+
+    def move(self, *, delay: float) -> Any:
+        """Send a goal that is planned anew after a delay in [s]; return its handle."""
+        goal = MoveGroup.Goal()
+        goal.planning_options.replan = True
+        goal.planning_options.replan_delay = delay
+        return self.begin(MoveGroup, 'move_action', goal)
+
+    def begin(self, kind: Any, name: str, goal: Any) -> Any:
+        """Send a goal; return its handle when its execution has begun."""
+        caller = self.client.action(kind, name)
+        assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
+        sent = caller.send_goal_async(goal)  # type: ignore[no-untyped-call]
+        self.client.spin_until(sent.done, TIMEOUT, 'acceptance')
+        self.wait_for_execution(1)
+        return sent.result()
+
+    def wait_for_execution(self, number: int) -> None:
+        """Wait until a plan is executed."""
+        self.client.spin_until(
+            lambda: len(self.executions) >= number, TIMEOUT, f'execution {number}'
+        )
+
+    def result(self, handle: Any) -> tuple[int, Any]:
+        """Return status and result of a goal."""
+        result = handle.get_result_async()
+        self.client.spin_until(result.done, TIMEOUT, 'result')
+        return result.result().status, result.result().result
+
+
+@pytest.fixture(name='bench')
+def make_bench(isolation: Isolation) -> Iterator[Bench]:
+    """Give a bench."""
+    with RosClient(isolation.domain_id) as client:
+        bench = Bench(client)
+        yield bench
+        bench.background.close()
+
+
+def test_a_motion_that_is_not_clear_any_more_is_planned_anew_once(bench: Bench) -> None:
+    """Not again and again with each period of the delay."""
+    handle = bench.move(delay=0.02)
+    bench.executions[0](INVALIDATED, 'the scene has changed')
+    bench.wait_for_execution(2)
+    bench.client.spin_for(0.2)  # ten delays
+    assert bench.plans == 2
+    bench.executions[1](PlanningCode.SUCCESS, '')
+    status, result = bench.result(handle)
+    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1)
+
+
+def test_a_sequence_is_followed_part_by_part(bench: Bench) -> None:
+    """The next one begins with the end of the one before."""
+    handle = bench.begin(MoveGroupSequence, 'sequence_move_group', MoveGroupSequence.Goal())
+    assert len(bench.executions) == 1
+    bench.executions[0](PlanningCode.SUCCESS, '')
+    bench.wait_for_execution(2)
+    bench.executions[1](PlanningCode.SUCCESS, '')
+    status, result = bench.result(handle)
+    assert (status, result.response.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1)
+    assert len(result.response.planned_trajectories) == 2
+
+
+@pytest.mark.parametrize('stops', [True, False], ids=['stopped', 'arrived'])
+def test_no_part_begins_after_a_cancel(bench: Bench, stops: bool) -> None:
+    """Not even where the part before had arrived just then."""
+    bench.stops = stops
+    handle = bench.begin(MoveGroupSequence, 'sequence_move_group', MoveGroupSequence.Goal())
+    answer = handle.cancel_goal_async()
+    bench.client.spin_until(answer.done, TIMEOUT, 'answer to the cancel')
+    if not stops:
+        bench.executions[0](PlanningCode.SUCCESS, '')
+    status, result = bench.result(handle)
+    assert (status, result.response.error_code.val) == (
+        GoalStatus.STATUS_CANCELED,
+        PlanningCode.PREEMPTED,
+    )
+    assert len(bench.executions) == 1
+
+
+def test_a_sequence_is_not_planned_anew(bench: Bench) -> None:
+    """From its middle it is another one."""
+    goal = MoveGroupSequence.Goal()
+    goal.planning_options.replan = True
+    caller = bench.client.action(MoveGroupSequence, 'sequence_move_group')
+    sent = caller.send_goal_async(goal)  # type: ignore[no-untyped-call]
+    bench.client.spin_until(sent.done, TIMEOUT, 'acceptance')
+    status, result = bench.result(sent.result())
+    assert status == GoalStatus.STATUS_ABORTED
+    assert 'replan' in result.response.error_code.message
+    assert not bench.plans
