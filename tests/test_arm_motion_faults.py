@@ -79,7 +79,7 @@ def _stops_on_the_path_when_one_drive_fails(arm: MovingArm) -> None:
     status, result = run.wait()
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code == Result.INVALID_GOAL
-    assert 'panda_joint4 ' in result.error_string
+    assert 'panda_joint4 is faulted: 0x2310' in result.error_string
     assert 'recover' in result.error_string
     assert 'panda_joint3' not in result.error_string
     # the result may be here before the last states are

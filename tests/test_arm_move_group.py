@@ -590,7 +590,7 @@ def _names_the_drive_that_fails(arm: MovingArm) -> None:
     status, result = run.wait()
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED, result.error_code
-    assert 'panda_joint4 ' in result.error_code.message
+    assert 'panda_joint4 is faulted: 0x2310' in result.error_code.message
     assert 'panda_joint3' not in result.error_code.message
     assert run.states.count('PLANNING') == 1
 

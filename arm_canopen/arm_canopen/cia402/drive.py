@@ -13,6 +13,7 @@ from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword, statusword_text
+from ..standard.emcy import error_code_text
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_control import DriveControl
 from .drive_view import DriveView, FAULTY
@@ -28,6 +29,7 @@ from .target_limits import check_setpoint
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
 POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
+EMCY_AGE_MAX = 0.2  # [s] of an EMCY that came with a fault
 UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 
 
@@ -329,6 +331,7 @@ class Drive:
             control.halt.release()
         if view.state in FAULTY and before not in FAULTY:
             control.goal = DriveState.SWITCH_ON_DISABLED
+            view.error = self._error_of_emcy()
             self.released(Refusal(RefusalCause.FAULT, view.error))
             self._scheduler.background(self._report_fault())
         elif left and control.goal is DriveState.OPERATION_ENABLED:
@@ -342,6 +345,11 @@ class Drive:
             )
         elif left:
             self.released(Refusal(RefusalCause.NOT_ENABLED, view.state.title))
+
+    def _error_of_emcy(self) -> str:
+        """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
+        emergency = self.node.emergencies.since(self._scheduler.now - EMCY_AGE_MAX)
+        return '' if emergency is None else error_code_text(emergency.code)
 
     async def _report_fault(self) -> None:
         await self.view.read_error_code()

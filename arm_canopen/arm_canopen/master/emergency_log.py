@@ -33,6 +33,12 @@ class EmergencyLog:
         self.last: Emergency | None = None
         self._report = report
 
+    def since(self, begin: float) -> Emergency | None:
+        """Return the last EMCY, when it came after a steady time in [s] and was no reset."""
+        if self.last is None or not self.history or self.history[-1][0] < begin:
+            return None
+        return self.last
+
     def restarted(self) -> None:
         """The device restarted: whatever it was, it ended with that."""
         self.last = None

@@ -26,7 +26,7 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import RefusalCause
+from arm_canopen import Refusal, RefusalCause
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.identity import Identity
 from arm_canopen.exceptions import DriveError, SdoError
@@ -319,6 +319,21 @@ FAULTS = (
         Way.ENABLE,
     ),
 )
+
+
+@pytest.mark.parametrize(
+    ('happen', 'error'), [(over_current, '0x2310'), (open_safety_circuit, '0x3220')]
+)
+def test_what_stops_a_motion_names_the_error(happen: Callable[[Arm], None], error: str) -> None:
+    """The EMCY that came with it; 0x603F is read when the motion has ended already."""
+    arm = Arm()
+    arm.move(MODES[0])
+    drive, refusals = arm.net.drives[FAULTY], list[Refusal]()
+    drive.released = refusals.append
+    happen(arm)
+    arm.net.run(SETTLING)
+    assert refusals[0].cause is RefusalCause.FAULT
+    assert refusals[0].detail[:6] == error
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)

@@ -14,9 +14,11 @@ from virtual_network import VirtualNetwork
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import CodecError
+from arm_canopen.master.emergency_log import EmergencyLog
 from arm_canopen.master.events import Severity
 from arm_canopen.master.guarding import Guarding
 from arm_canopen.master.network import Network
+from arm_canopen.standard.emcy import Emergency
 from arm_canopen.standard.time_of_day import decode_time_of_day, encode_time_of_day
 
 GUARD_TIME = 0.05  # [s]
@@ -119,6 +121,17 @@ def test_an_emergency_is_received_where_the_device_sends_it() -> None:
         name: node.emergencies.last is not None for name, node in net.network.nodes.items()
     }
     assert received == {'a': True, 'b': True, 'c': False}
+
+
+def test_an_error_that_is_over_or_old_is_not_of_now() -> None:
+    """Of a fault, the EMCY that came with it counts."""
+    log = EmergencyLog(lambda *_: None)
+    assert log.since(0.0) is None
+    log.receive(Frame(0x81, Emergency(0x2310, 1).encode(), timestamp=5.0))
+    assert log.since(4.9) == Emergency(0x2310, 1)
+    assert log.since(5.1) is None
+    log.receive(Frame(0x81, Emergency(0, 0).encode(), timestamp=6.0))
+    assert log.since(4.9) is None
 
 
 def test_the_last_emergencies_are_remembered() -> None:
