@@ -113,6 +113,7 @@ def test_the_same_cycle_twice_is_no_jerk() -> None:
     assert peak_jerk([same, same], PERIOD, np.array([1.0])) == 0.0
 
 
+@pytest.mark.slow
 @given(
     direction=st.tuples(*[st.floats(0.1, 2.0)] * 3).map(np.array),
     offset=st.floats(0.0, 1.0),

@@ -502,6 +502,7 @@ def test_setting_of_a_period(period: float, setting: tuple[int, int] | None) -> 
     assert period_setting(period) == setting
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('seed', range(4))
 def test_damaged_files_can_be_checked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int

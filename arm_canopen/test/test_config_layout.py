@@ -180,6 +180,7 @@ def merged(below: object, above: object) -> object:
     }
 
 
+@pytest.mark.slow
 @given(
     below=st.dictionaries(KEYS, TREES, max_size=4), above=st.dictionaries(KEYS, TREES, max_size=4)
 )

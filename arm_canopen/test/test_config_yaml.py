@@ -90,6 +90,7 @@ def test_a_mistake_in_a_template_is_reported_once(tmp_path: Path) -> None:
     assert problem.key == '.pdos.2.transmission'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('text', 'line', 'message'),
     [

@@ -367,6 +367,7 @@ def test_a_mimic_joint_follows() -> None:
         assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
 
 
+@pytest.mark.slow
 @given(shape=SHAPES, padding=st.floats(0.0, 0.1), scale=st.floats(1.0, 2.0))
 def test_a_padded_shape_holds_the_scaled_one(shape: Shape, padding: float, scale: float) -> None:
     """From each of its sides it comes nearer, by the padding at most."""

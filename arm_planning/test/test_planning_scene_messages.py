@@ -83,6 +83,7 @@ def test_an_object_comes_back_as_it_was(message: ObjectMessage) -> None:
     assert texts_of(back) == texts_of(message)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=20)
 @given(first=objects('table'), second=objects('cup'), held=objects('tool'), data=st.data())
 def test_a_whole_scene_comes_back_as_it_was(

@@ -128,6 +128,7 @@ def test_joint_that_is_not_there() -> None:
     assert teleop.wanted(0.0) == JointJog(5, 0.5)
 
 
+@pytest.mark.slow
 @given(
     key=st.sampled_from([*TOOL, *JOINTS]),
     speed=st.floats(0.05, 1.0),

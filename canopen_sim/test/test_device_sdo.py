@@ -301,6 +301,7 @@ def test_too_much_text_is_refused(rig: Rig) -> None:
     assert answer == bytes.fromhex('80 00 20 00 05 00 04 05')
 
 
+@pytest.mark.slow
 @given(text=st.text(st.characters(max_codepoint=0xFF), max_size=200))
 def test_strings_come_back(text: str) -> None:
     """Whatever text is written is read again, however many segments it takes."""

@@ -152,6 +152,7 @@ pictures = st.builds(
 )
 
 
+@pytest.mark.slow
 @given(
     pictures,
     st.integers(NARROWEST, 180),

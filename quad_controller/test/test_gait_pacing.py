@@ -42,6 +42,7 @@ def test_without_feedback_steps_are_on_schedule() -> None:
     assert times == pytest.approx([index * PERIOD for index in range(len(times))])
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(
     offset=st.floats(0.0, 0.019),

@@ -20,6 +20,7 @@ HOME = [0.0] * 12
 POSITIONS = st.lists(st.floats(-1e3, 1e3), min_size=12, max_size=12)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(-3.4, 3.4), min_size=12, max_size=12),
     st.lists(st.tuples(POSITIONS, st.floats(0.0, 2.0)), min_size=1, max_size=20),

@@ -171,6 +171,7 @@ def writes_to(rig: OldRig, *registers: int) -> list[tuple[int, int]]:
     return [(f.address, f.payload[0]) for _, f in rig.sent if f.address in registers]
 
 
+@pytest.mark.slow
 def test_a_servo_that_is_not_reported_goes_slowly_until_it_must_be_there() -> None:
     """The lowest speed comes first, and for it alone; unplugged, it may be anywhere again."""
     rig = OldRig()

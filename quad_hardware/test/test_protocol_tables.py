@@ -62,6 +62,7 @@ def test_payloads_survive(data: st.DataObject, row: Function) -> None:
     assert row.unpack(row.pack(**values)) == values
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.integers(0, 255), st.floats(-327, 327)), min_size=1, max_size=16))
 def test_groups_in_one_go_are_groups_one_by_one(groups: list[tuple[int, float]]) -> None:
     """The same bytes; and what does not fit is refused by the name of the row."""
@@ -108,6 +109,7 @@ def test_nan_has_no_byte() -> None:
         Span(-1, 1).encode(math.nan)
 
 
+@pytest.mark.slow
 @given(
     st.builds(
         Feedback,

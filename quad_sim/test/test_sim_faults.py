@@ -88,6 +88,7 @@ def test_damage_on_the_line_costs_frames_and_repeats_itself() -> None:
     assert 2 <= first[1] < 60
 
 
+@pytest.mark.slow
 def test_silence_begins_and_ends() -> None:
     """The robot receives and moves, and sends nothing, from one time to another."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'silence,at=1,for=0.5')

@@ -284,6 +284,7 @@ def test_measurements_are_noisy_and_in_steps_of_the_encoder() -> None:
     assert np.std(rolls) == pytest.approx(BOARD.attitude, rel=0.2)
 
 
+@pytest.mark.slow
 def test_physics_that_blows_up_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A servo that is no servo ends in an error with the remedy, and leaves no file behind."""
     monkeypatch.chdir(tmp_path)

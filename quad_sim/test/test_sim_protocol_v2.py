@@ -224,6 +224,7 @@ def test_a_push_shows_in_the_states() -> None:
     assert max(abs(state.attitude[0]) for state in felt) > 0.5
 
 
+@pytest.mark.slow
 def test_heavy_load_drains_the_battery_and_warms_the_servos() -> None:
     """A minute of standing costs charge and warms the servos that carry the robot."""
     robot = VirtualRobot('--start', 'stand', '--noise', 'none')

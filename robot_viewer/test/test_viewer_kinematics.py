@@ -66,6 +66,7 @@ def pinocchio_positions(
     return q
 
 
+@pytest.mark.slow
 @given(random_urdfs(), st.lists(angle, min_size=7, max_size=7))
 @settings(max_examples=60)
 def test_every_link_is_where_pinocchio_has_it(urdf: str, values: list[float]) -> None:

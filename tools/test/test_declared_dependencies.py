@@ -86,6 +86,7 @@ def imported(folder: Path) -> Iterator[str]:
             todo += ast.iter_child_nodes(node)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('name', PACKAGES)
 def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is missing after `pip install`, and nothing is installed for no use."""

@@ -388,6 +388,7 @@ def test_a_device_that_falls_silent_while_it_is_configured() -> None:
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
+@pytest.mark.slow
 def test_a_device_without_heartbeat_is_reported_and_not_started_again() -> None:
     """Its loss would go unnoticed; the reasons are reported once each, and nothing after that."""
     scene = Scene()

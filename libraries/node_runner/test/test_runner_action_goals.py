@@ -16,6 +16,7 @@ from node_runner import action_goals
 TIMEOUT = 20.0  # [s]
 
 
+@pytest.mark.slow
 def test_a_goal_goes_on_after_its_callback_and_is_forgotten_after_its_end(
     isolation: Isolation, monkeypatch: pytest.MonkeyPatch
 ) -> None:

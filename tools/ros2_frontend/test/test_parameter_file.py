@@ -25,6 +25,7 @@ VALUES = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(PART, st.dictionaries(PART, VALUES, min_size=1, max_size=2), max_size=3))
 def test_dump_and_load_are_inverse(tree: dict[str, dict[str, object]]) -> None:
     """Names with points and values of every type come back, texts like '5' as texts."""
