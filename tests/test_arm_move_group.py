@@ -232,6 +232,12 @@ def _answers_about_states(arm: MovingArm) -> None:
     assert not answer.valid
     assert 'crate' in {answer.contacts[0].contact_body_1, answer.contacts[0].contact_body_2}
     assert answer.contacts[0].depth > 0.0
+    check = GetStateValidity.Request(group_name='panda_arm')
+    check.constraints = goal_constraints(TURNED)
+    answer = arm.client.call(GetStateValidity, '/check_state_validity', check)
+    assert not answer.valid
+    assert [each.result for each in answer.constraint_result] == [False] + [True] * 6
+    assert answer.constraint_result[0].distance == pytest.approx(1.2, abs=0.02)
 
 
 def _trajectory(positions: Sequence[float], seconds: int) -> RobotTrajectory:

@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
 from arm_model import (
@@ -28,6 +31,22 @@ TOLERANCE = 1e-6
 """Rounding beyond a constraint that is let pass in [rad] and [m]."""
 
 
+@dataclass(frozen=True, slots=True)
+class ConstraintResult:
+    """What became of one constraint in a state.
+
+    Attributes:
+        violation: What is wrong, in words; empty where it is heeded.
+        distance: How far the state is beyond it, in [rad] or [m]; 0 where it is heeded.
+    """
+
+    violation: str
+    distance: float
+
+
+HEEDED = ConstraintResult('', 0.0)
+
+
 class ConstraintCheck:
     """Looks at states of one arm; belongs to one thread."""
 
@@ -48,62 +67,75 @@ class ConstraintCheck:
         self._links = {name: LinkKinematics(model, name) for name in names}
 
     def violated(self, positions: Array) -> str:
-        """Return what a state violates, in words; empty for nothing.
+        """Return what a state violates first, in words; empty for nothing.
+
+        Args:
+            positions: Joint positions in [rad] (n).
+        """
+        violations = (each.violation for each in self.results(positions))
+        return next(filter(None, violations), '')
+
+    def results(self, positions: Array) -> Iterator[ConstraintResult]:
+        """Yield what becomes of each constraint: of joints, orientations, then positions.
 
         Args:
             positions: Joint positions in [rad] (n).
         """
         place = dict(zip(self._joints, positions.tolist(), strict=True))
         for name, (lower, upper) in self._constraints.joints.items():
-            if not lower - TOLERANCE <= place[name] <= upper + TOLERANCE:
-                return (
-                    f'{name} is at {place[name]:.4f}, its constraint is {lower:.4f}..{upper:.4f}'
-                )
+            beyond = max(lower - place[name], place[name] - upper)
+            yield _result(
+                beyond,
+                f'{name} is at {place[name]:.4f}, its constraint is {lower:.4f}..{upper:.4f}',
+            )
         poses = {name: link.pose(positions) for name, link in self._links.items()}
         for turn in self._constraints.orientations:
-            if off := _turned(turn, poses[turn.link]):
-                return off
+            yield _turned(turn, poses[turn.link])
         for point in self._constraints.positions:
-            if off := _outside(point, poses[point.link]):
-                return off
-        return ''
+            yield _outside(point, poses[point.link])
 
 
-def _turned(constraint: OrientationConstraint, pose: Pose) -> str:
+def _result(beyond: float, violation: str) -> ConstraintResult:
+    return ConstraintResult(violation, beyond) if beyond > TOLERANCE else HEEDED
+
+
+def _turned(constraint: OrientationConstraint, pose: Pose) -> ConstraintResult:
     wanted = Pose(constraint.rotation, pose.position)
     # the rotation vector about the axes that are wanted
     off = np.abs(constraint.rotation.T @ pose_error(wanted, pose)[3:])
-    if (off <= constraint.tolerance + TOLERANCE).all():
-        return ''
     angles = ', '.join(f'{each:.3f}' for each in off.tolist())
     allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
-    return f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed'
+    return _result(
+        float((off - constraint.tolerance).max()),
+        f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed',
+    )
 
 
-def _outside(constraint: PositionConstraint, pose: Pose) -> str:
+def _outside(constraint: PositionConstraint, pose: Pose) -> ConstraintResult:
     point = pose.position + pose.rotation @ constraint.offset
-    if _holds(constraint.region, point):
-        return ''
     x, y, z = point.tolist()
-    return f'link {constraint.link} is outside of its region, at ({x:.3f}, {y:.3f}, {z:.3f})'
+    return _result(
+        min(_beyond(region, point) for region in constraint.regions),
+        f'link {constraint.link} is outside of its region, at ({x:.3f}, {y:.3f}, {z:.3f})',
+    )
 
 
-def _holds(region: PlacedShape, point: Array) -> bool:
-    """Return whether a region holds a point of the root link."""
+def _beyond(region: PlacedShape, point: Array) -> float:
+    """Return how far a point of the root link is beyond a region in [m]; 0 or less inside."""
     in_region = combined(inverse(region.pose), Pose(ORIGIN.rotation, point)).position
     height = float(in_region[2])
     aside = float(np.hypot(in_region[0], in_region[1]))
     match region.shape:
         case Box(x, y, z):
-            return bool((np.abs(in_region) <= 0.5 * np.array([x, y, z]) + TOLERANCE).all())
+            return float((np.abs(in_region) - 0.5 * np.array([x, y, z])).max())
         case Sphere(radius):
-            return float(np.linalg.norm(in_region)) <= radius + TOLERANCE
+            return float(np.linalg.norm(in_region)) - radius
         case Cylinder(radius, length):
-            return aside <= radius + TOLERANCE and abs(height) <= 0.5 * length + TOLERANCE
+            return max(aside - radius, abs(height) - 0.5 * length)
         case Cone(radius, length):
             # its tip is above its middle
             at_height = radius * (0.5 - height / length)
-            return aside <= at_height + TOLERANCE and abs(height) <= 0.5 * length + TOLERANCE
+            return max(aside - at_height, abs(height) - 0.5 * length)
     raise PlanningError(
         PlanningCode.INVALID_GOAL_CONSTRAINTS,
         f'the region of a position constraint is a {type(region.shape).__name__}; use a box,'

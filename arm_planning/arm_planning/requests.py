@@ -79,12 +79,12 @@ class PositionConstraint:
     Attributes:
         link: The link; empty for the tip.
         offset: The point in the link in [m] (3).
-        region: A box, sphere or cylinder in the root link that holds it.
+        regions: Boxes, spheres, cylinders and cones in the root link, one of which holds it.
     """
 
     link: str
     offset: Array
-    region: PlacedShape
+    regions: Sequence[PlacedShape]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

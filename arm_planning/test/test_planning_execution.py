@@ -248,6 +248,29 @@ def test_a_controller_that_says_little_is_put_into_words(
     assert bench.ends == [(PlanningCode.CONTROL_FAILED, reason)]
 
 
+def test_a_cancel_does_not_wait_for_why(bench: Bench) -> None:
+    """It is what the client asked for; what is found out later counts nothing."""
+    bench.execution.on_failure(lambda _: None)
+    running = bench.start()
+    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    bench.execution.stop(running, reason='canceled')
+    bench.execution.explain(running, 'the scene has changed')
+    assert bench.ends == [(PlanningCode.PREEMPTED, 'canceled')]
+
+
+def test_why_is_not_waited_for_for_ever(bench: Bench) -> None:
+    """The words of the controller count then, and its joints are free."""
+    bench.execution.on_failure(lambda _: None)
+    running = bench.start()
+    bench.controller.end(GoalStatus.STATUS_ABORTED)
+    running.deadline = 0.0
+    bench.watch()
+    ((code, reason),) = bench.ends
+    assert code is PlanningCode.CONTROL_FAILED
+    assert 'did not confirm' not in reason
+    bench.start()
+
+
 @pytest.mark.parametrize(
     ('status', 'outcome'),
     [

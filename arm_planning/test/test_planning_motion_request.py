@@ -120,7 +120,7 @@ def test_path_constraints_hold_on_the_path() -> None:
     assert read is not None
     assert read.joints['panda_joint2'] == pytest.approx((-0.1, 0.3))
     assert np.allclose(read.orientations[0].rotation, np.eye(3))
-    assert read.positions[0].region.pose.position == pytest.approx([0.4, 0.1, 0.5])
+    assert read.positions[0].regions[0].pose.position == pytest.approx([0.4, 0.1, 0.5])
 
 
 GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS

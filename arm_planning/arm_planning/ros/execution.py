@@ -145,6 +145,8 @@ class TrajectoryExecution:
             change: How the scene has changed that it had to; empty where its own words alone
                 count.
         """
+        if not execution.in_doubt:
+            return  # a client canceled it, or it took too long
         execution.in_doubt = False
         if change and execution.ending is not None:
             _, words = execution.ending
@@ -211,7 +213,12 @@ class TrajectoryExecution:
             code: Why.
             reason: The same in words.
         """
-        if execution.is_over or execution.ending is not None:
+        if execution.is_over:
+            return
+        if execution.ending is not None:
+            if execution.in_doubt and code is PlanningCode.PREEMPTED:
+                execution.in_doubt, execution.ending = False, (code, reason)
+                self._conclude(execution)
             return
         execution.ending = code, reason
         execution.deadline = time.monotonic() + STOP_TIMEOUT
@@ -336,6 +343,7 @@ class TrajectoryExecution:
 
         Its joints are free when it answers, does not know the goal any more, or is gone.
         """
+        self.explain(execution, '')
         if not execution.is_over and execution.ending is not None:
             _, why = execution.ending
             reason = f'{why}; {_unconfirmed(execution)}, its joints are refused until it does'

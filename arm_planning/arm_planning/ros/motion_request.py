@@ -134,9 +134,7 @@ class RequestReader:
         turns = [
             self._of_link(self._orientation(each)) for each in message.orientation_constraints
         ]
-        places = [
-            region for each in message.position_constraints for region in self._positions_in(each)
-        ]
+        places = [self._positions_in(each) for each in message.position_constraints]
         if not (joints or turns or places):
             return None
         return PathConstraints(joints, turns, places)
@@ -234,23 +232,24 @@ class RequestReader:
 
     def _region_goal(self, message: Any) -> tuple[Array, float | Array, Array]:  # noqa: ANN401
         """Return middle, tolerance and the point of the link of a position constraint."""
-        (placed,) = self._positions_in(message, most=1)
+        placed = self._positions_in(message, most=1)
+        (region,) = placed.regions
         primitive = message.constraint_region.primitives[0]
         lengths = [float(each) for each in primitive.dimensions]
         if primitive.type == SolidPrimitive.SPHERE:
-            return placed.region.pose.position, lengths[0], placed.offset
+            return region.pose.position, lengths[0], placed.offset
         if primitive.type == SolidPrimitive.BOX:
             # half the edges of the box around it, if it is turned
-            half = np.abs(placed.region.pose.rotation) @ (0.5 * np.array(lengths))
+            half = np.abs(region.pose.rotation) @ (0.5 * np.array(lengths))
             if not np.allclose(np.sort(half), np.sort(0.5 * np.array(lengths))):
                 raise _bad_goal(
                     'the region of a position goal is a box that is turned; use a'
                     ' sphere, or a box along the axes of the root link'
                 )
-            return placed.region.pose.position, frozen(half), placed.offset
+            return region.pose.position, frozen(half), placed.offset
         raise _bad_goal('the region of a position goal must be a sphere or a box')
 
-    def _positions_in(self, message: Any, most: int = 100) -> Sequence[PositionConstraint]:  # noqa: ANN401
+    def _positions_in(self, message: Any, most: int = 100) -> PositionConstraint:  # noqa: ANN401
         region, what = message.constraint_region, f'position constraint of {message.link_name!r}'
         count = len(region.primitives)
         if region.meshes or not 1 <= count <= most or len(region.primitive_poses) != count:
@@ -260,17 +259,15 @@ class RequestReader:
             )
         offset = placement(xyz(message.target_point_offset), (), what).position
         link, in_link = self.on_link(Pose(ORIGIN.rotation, -offset), message.link_name)
-        found = []
+        regions = []
         for primitive, pose in zip(region.primitives, region.primitive_poses, strict=True):
             try:
                 shape = primitive_shape(primitive, what)
             except SceneError as error:
                 raise _bad_goal(str(error)) from error
             place = self.pose(pose, message.header.frame_id, what)
-            found.append(
-                PositionConstraint(link, frozen(-in_link.position), PlacedShape(shape, place))
-            )
-        return found
+            regions.append(PlacedShape(shape, place))
+        return PositionConstraint(link, frozen(-in_link.position), regions)
 
     def _orientation(self, message: Any) -> OrientationConstraint:  # noqa: ANN401
         what = f'orientation constraint of {message.link_name!r}'

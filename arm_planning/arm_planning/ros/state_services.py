@@ -8,16 +8,18 @@ from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, Vector3
-from moveit_msgs.msg import ContactInformation
+from moveit_msgs.msg import ConstraintEvalResult, ContactInformation
 from moveit_msgs.srv import GetPositionFK, GetStateValidity
 from rclpy.node import Node
 from std_msgs.msg import Header
 
 from arm_model import Array, Clearances, combined, Contact, inverse
 
+from ..constraints import ConstraintCheck, ConstraintResult
 from ..exceptions import PlanningCode, PlanningError
 from .background import Background, error_code
 from .geometry import point_message, pose_message
+from .motion_request import RequestReader
 from .robot_groups import RobotGroups
 from .scene_changes import scene_for
 from .scene_monitor import SceneMonitor
@@ -50,21 +52,33 @@ class StateServices:
     def _validity(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         if request.group_name:
             self._monitor.robot.model(request.group_name)  # or raises
-        if any(map(len, _constraints(request.constraints))):
+        elif any(map(len, _constraints(request.constraints))):
             raise PlanningError(
-                PlanningCode.INVALID_GOAL_CONSTRAINTS,
-                'constraints are not evaluated; leave them empty',
+                PlanningCode.INVALID_GROUP_NAME,
+                f'constraints are those of a group; groups: {", ".join(self._robot.names)}',
             )
         snapshot, positions = self._monitor.start(request.robot_state)
-        return lambda: self._validity_response(request.group_name, snapshot, positions)
+        return lambda: self._validity_response(request, snapshot, positions)
 
-    def _validity_response(self, group: str, snapshot: SceneSnapshot, positions: Array) -> Any:  # noqa: ANN401
+    def _validity_response(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> Any:  # noqa: ANN401
+        group = request.group_name
         contacts = Clearances(snapshot.scene).contacts(positions)
+        results: list[ConstraintResult] = []
         if group:
             pairs = set(scene_for(snapshot, self._robot.model(group).scene).pairs)
             contacts = [each for each in contacts if each.bodies in pairs]
-        response = GetStateValidity.Response(valid=not contacts)
+            model = self._robot.model_at(group, positions)
+            reader = RequestReader(model, snapshot, positions)
+            constraints = reader.constraints(request.constraints)
+            if constraints is not None:
+                results = list(ConstraintCheck(model, constraints).results(reader.start))
+        response = GetStateValidity.Response()
+        response.valid = not contacts and not any(each.violation for each in results)
         response.contacts = [contact_message(each, snapshot) for each in contacts]
+        response.constraint_result = [
+            ConstraintEvalResult(result=not each.violation, distance=each.distance)
+            for each in results
+        ]
         return response
 
 

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Constraints of a state: joints, how a link is turned, and where a point of it is."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+from planning_messages import panda
+import pytest
+
+from arm_model import Array, Box, Cone, Cylinder, frozen, ORIGIN, PlacedShape, Pose, Sphere
+from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
+from arm_planning.constraints import ConstraintCheck, ConstraintResult, HEEDED
+
+MODEL = panda().model('panda_arm')
+READY = frozen([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+LINK = 'panda_link8'
+TIP = MODEL.kinematics.link_pose(LINK, READY)
+SHAPES = (Box(0.1, 0.2, 0.3), Sphere(0.1), Cylinder(0.1, 0.3), Cone(0.1, 0.3))
+OFFSETS = st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array)
+
+
+def results(constraints: PathConstraints) -> list[ConstraintResult]:
+    """Return what becomes of constraints at READY; the first one that is not heeded is named."""
+    check = ConstraintCheck(MODEL, constraints)
+    found = list(check.results(READY))
+    violations = [each.violation for each in found if each.violation]
+    assert check.violated(READY) == (violations[0] if violations else '')
+    return found
+
+
+def region(shape: Box | Sphere | Cylinder | Cone, offset: Array) -> PlacedShape:
+    """Return a region whose middle is beside the tip."""
+    return PlacedShape(shape, Pose(ORIGIN.rotation, frozen(TIP.position + offset)))
+
+
+def at_tip(*regions: PlacedShape) -> PathConstraints:
+    """Return that the tip is in one of some regions."""
+    return PathConstraints(positions=[PositionConstraint(LINK, frozen(np.zeros(3)), regions)])
+
+
+def test_each_constraint_has_its_result() -> None:
+    """In the order of joints, orientations and positions, with how far it is beyond."""
+    turned = TIP.rotation @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    joint, other, turn, place = results(
+        PathConstraints(
+            {'panda_joint1': (0.3, 0.5), 'panda_joint2': (-1.0, 0.0)},
+            [OrientationConstraint(LINK, frozen(turned), frozen([0.1, 0.1, 0.1]))],
+            at_tip(region(Sphere(0.1), np.array([0.0, 0.0, 0.25]))).positions,
+        )
+    )
+    assert other == HEEDED
+    assert joint.distance == pytest.approx(0.3)
+    assert 'panda_joint1 is at 0.0000' in joint.violation
+    assert turn.distance == pytest.approx(np.pi / 2 - 0.1)
+    assert 'is turned by' in turn.violation
+    assert place.distance == pytest.approx(0.15)
+    assert f'{LINK} is outside of its region' in place.violation
+
+
+def test_a_link_may_be_in_any_of_its_regions() -> None:
+    """As in MoveIt, where the primitives of one constraint are a union."""
+    near, far = region(Sphere(0.05), np.zeros(3)), region(Sphere(0.05), np.array([0.5, 0.0, 0.0]))
+    assert results(at_tip(near, far)) == results(at_tip(far, near)) == [HEEDED]
+    (outside,) = results(at_tip(far))
+    assert outside.distance == pytest.approx(0.45)
+
+
+def holds(shape: Box | Sphere | Cylinder | Cone, point: Array, margin: float) -> bool:
+    """Return whether a shape holds a point, or nearly; a cone has its tip above its middle."""
+    x, y, z = point
+    aside, is_high = np.hypot(x, y), abs(z) <= 0.15 + margin
+    match shape:
+        case Box():
+            return bool(abs(x) <= 0.05 + margin and abs(y) <= 0.1 + margin and is_high)
+        case Sphere():
+            return bool(np.hypot(aside, z) <= 0.1 + margin)
+        case Cylinder():
+            return bool(aside <= 0.1 + margin and is_high)
+        case Cone():
+            return bool(aside <= 0.1 * (0.15 - z) / 0.3 + margin and is_high)
+
+
+@given(st.sampled_from(SHAPES), OFFSETS)
+def test_a_region_holds_what_is_inside(
+    shape: Box | Sphere | Cylinder | Cone, offset: Array
+) -> None:
+    """By the definition of each shape, but for rounding at its faces."""
+    (result,) = results(at_tip(region(shape, offset)))
+    if holds(shape, -offset, -1e-9):
+        assert result == HEEDED
+    if not holds(shape, -offset, 2e-6):
+        assert result.distance > 0.0
