@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import Any, TYPE_CHECKING
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
 from control_msgs.msg import JointJog
 from controller_manager_msgs.srv import ListControllers
+from moveit_msgs.action import ExecuteTrajectory
+from moveit_msgs.msg import RobotTrajectory
 from processes import RunningProcess
 import pytest
 from ros_client import RosClient
@@ -77,8 +80,16 @@ class Robot:
 @pytest.fixture
 def robot(isolation: Isolation, tmp_path: Path) -> Iterator[Robot]:
     """Bring the robot up."""
-    folder = write_two_arms(tmp_path / 'two_arms')
-    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{folder}/', '--simulate', '--enable']
+    with bring_up(isolation, tmp_path) as robot:
+        yield robot
+
+
+@contextmanager
+def bring_up(isolation: Isolation, folder: Path, *options: str) -> Iterator[Robot]:
+    """Bring the robot up from files in a folder, with options besides."""
+    robot = write_two_arms(folder / 'two_arms')
+    options = ('--simulate', '--enable', *options)
+    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{robot}/', *options]
     with (
         RunningProcess([*command, '--can', isolation.bus], isolation.env) as bringup,
         RosClient(isolation.domain_id) as client,
@@ -133,3 +144,19 @@ def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Ro
     robot.client.node.create_timer(0.02, lambda: jogs.publish(jog))
     robot.client.spin_until(lambda: robot.at['right_slide'] > 0.05, 60.0, 'motion of the slide')
     assert [robot.at[name] for name in ARMS['left']] == pytest.approx([0.0] * 3, abs=1e-3)
+
+
+def test_a_trajectory_of_arm_and_gripper_is_split(isolation: Isolation, tmp_path: Path) -> None:
+    """move_group has the arm follow it, and the gripper close where it ends."""
+    with bring_up(isolation, tmp_path, '--plan') as robot:
+        moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
+        robot.client.spin_until(lambda: {*moved} <= {*robot.at}, 60.0, 'joint states')
+        trajectory = JointTrajectory(joint_names=moved)
+        for places, seconds in (([robot.at[name] for name in moved], 0), (target, 4)):
+            point = JointTrajectoryPoint(positions=places)
+            point.time_from_start.sec = seconds
+            trajectory.points.append(point)
+        goal = ExecuteTrajectory.Goal(trajectory=RobotTrajectory(joint_trajectory=trajectory))
+        (done,) = robot.results([robot.send(ExecuteTrajectory, '/execute_trajectory', goal)])
+        assert done.status == SUCCEEDED, done.result.error_code
+        assert [robot.at[name] for name in moved] == pytest.approx(target, abs=1e-3)

@@ -94,17 +94,26 @@ def planning_files(
     """
     try:
         tree, semantic = read_urdf(read_description(robot)), parse_srdf(read_semantic(robot))
-        joints = {group: find_group(tree, semantic, group).joints for group in groups.arms}
+        joints = {group: find_group(tree, semantic, group).joints for group in groups.names}
     except urdf_reader.DescriptionError as error:
         raise RobotError(f'{robot.name}: {error}') from error
-    names = {group: f'{group}_controller' for group in groups.arms}
+    names = {group: f'{group}_controller' for group in groups.names}
     names[groups.names[0]] = controller_name(robot, groups)
     manager: dict[str, object] = {'controller_names': list(names.values())}
-    manager |= {names[group]: {'joints': list(each)} for group, each in joints.items()}
+    manager |= {names[group]: {'joints': list(joints[group])} for group in groups.arms}
+    manager |= {
+        names[tool]: {'joints': list(joints[tool]), 'type': gripper_action(joints[tool])}
+        for tool in groups.tools
+    }
     values = {'ros__parameters': {'moveit_simple_controller_manager': manager}}
     path = folder / 'planning.yaml'
     path.write_text(json.dumps({f'{EVERY_NODE}/move_group': values}), encoding='utf-8')
     return [*motion_files(robot, folder, ros, groups), path]
+
+
+def gripper_action(joints: Sequence[str]) -> str:
+    """Return the action by which a gripper of so many joints is moved, by MoveIt's name of it."""
+    return 'GripperCommand' if len(joints) == 1 else 'ParallelGripperCommand'
 
 
 def controller_name(robot: Robot, groups: MovedGroups) -> str:

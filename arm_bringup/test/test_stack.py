@@ -218,18 +218,22 @@ def test_move_group_knows_the_controller_by_its_name(tmp_path: Path) -> None:
     joint = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
     robot.description.write_text(
         '<robot name="my"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
-        f'<parent link="a"/><child link="b"/>{joint}</joint></robot>'
+        f'<parent link="a"/><child link="b"/>{joint}</joint><link name="c"/>'
+        f'<joint name="f" type="prismatic"><parent link="b"/><child link="c"/>{joint}</joint>'
+        '</robot>'
     )
     robot.semantic.write_text(
-        '<robot name="my"><group name="arm"><joint name="j"/></group></robot>'
+        '<robot name="my"><group name="arm"><joint name="j"/></group>'
+        '<group name="hand"><joint name="f"/></group></robot>'
     )
     manager = {'controller_name': 'mine'}
     robot.controllers.write_text(json.dumps({'controller_manager': {'ros__parameters': manager}}))
-    *_, file = planning_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',)))
+    *_, file = planning_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',), ('hand',)))
     (values,) = yaml.safe_load(file.read_text()).values()
     assert values['ros__parameters'] == {
         'moveit_simple_controller_manager': {
-            'controller_names': ['mine'],
+            'controller_names': ['mine', 'hand_controller'],
             'mine': {'joints': ['j']},
+            'hand_controller': {'joints': ['f'], 'type': 'GripperCommand'},
         }
     }

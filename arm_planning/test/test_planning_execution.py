@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 import re
@@ -19,7 +20,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros import execution, scene_monitor
+from arm_planning.ros import controllers, execution, scene_monitor
+from arm_planning.ros.controllers import FOLLOW, KINDS
 from arm_planning.ros.execution import ExecutionLimits, TrajectoryExecution
 from arm_planning.ros.scene_monitor import SceneMonitor, STATE_TIMEOUT
 
@@ -34,13 +36,15 @@ class Controller:
         self.is_ready, self.cancels = True, 0
         self.result: Future[Any] = Future()
         self.forgets = False
+        self.goal: Any = None
 
     def server_is_ready(self) -> bool:
         """Return whether it runs."""
         return self.is_ready
 
-    def send_goal_async(self, _goal: Any) -> Future[Any]:
+    def send_goal_async(self, goal: Any) -> Future[Any]:
         """Accept it."""
+        self.goal = goal
         self.result = Future()
         return answered(self)
 
@@ -60,7 +64,10 @@ class Controller:
         self, status: int = GoalStatus.STATUS_CANCELED, words: str = '', code: int = 0
     ) -> None:
         """Confirm the end."""
-        result = FollowJointTrajectory.Result(error_string=words, error_code=code)
+        self.answer(status, FollowJointTrajectory.Result(error_string=words, error_code=code))
+
+    def answer(self, status: int, result: Any) -> None:
+        """End with a result."""
         self.result.set_result(SimpleNamespace(status=status, result=result))
 
 
@@ -71,18 +78,26 @@ def answered(value: Any) -> Future[Any]:
     return future
 
 
-class Bench:
-    """An execution with one controller of two joints, which stand at 0."""
+ARM = {'arm': controllers.Controller(JOINTS, FOLLOW, FOLLOW.namespace)}
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+
+class Bench:
+    """An execution with controllers of two joints, which stand at 0."""
+
+    def __init__(
+        self,
+        monkeypatch: pytest.MonkeyPatch,
+        known: Mapping[str, controllers.Controller] = ARM,
+    ) -> None:
         """Put it together."""
-        self.controller = Controller()
+        self.clients = {each.action(name): Controller() for name, each in known.items()}
+        self.controller = next(iter(self.clients.values()))
         self.ends: list[tuple[PlanningCode, str]] = []
         self.watch: Callable[[], None] = lambda: None
-        monkeypatch.setattr(execution, 'ActionClient', lambda *_: self.controller)
+        monkeypatch.setattr(execution, 'ActionClient', lambda *parts: self.clients[parts[2]])
         self.execution = TrajectoryExecution(
             self,  # type: ignore[arg-type]
-            {'arm': JOINTS},
+            known,
             self.received,
             ExecutionLimits(),
         )
@@ -184,6 +199,29 @@ def test_a_controller_that_does_not_confirm_keeps_its_joints(bench: Bench) -> No
     bench.controller.end()
     assert len(bench.ends) == 1
     bench.start()
+
+
+@pytest.mark.parametrize('kind', ['GripperCommand', 'ParallelGripperCommand'])
+def test_a_gripper_gets_where_the_trajectory_ends(
+    monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    """Beside the arm, which follows the rest; one that stalls has not arrived."""
+    hand = controllers.Controller(['right'], KINDS[kind], 'grip')
+    arm = controllers.Controller(['left'], FOLLOW, FOLLOW.namespace)
+    bench = Bench(monkeypatch, {'arm': arm, 'hand': hand})
+    follower, gripper = bench.clients['arm/follow_joint_trajectory'], bench.clients['hand/grip']
+    for status, code, words in (
+        (GoalStatus.STATUS_SUCCEEDED, PlanningCode.SUCCESS, ''),
+        (GoalStatus.STATUS_ABORTED, PlanningCode.CONTROL_FAILED, 'hand: stalled before its goal'),
+    ):
+        bench.start()
+        trajectory, command = follower.goal.trajectory, gripper.goal.command
+        assert list(trajectory.joint_names) == ['left']
+        assert [list(point.positions) for point in trajectory.points] == [[0.0], [0.5], [1.0]]
+        assert command.position in (1.0, array('d', [1.0]))
+        follower.end(GoalStatus.STATUS_SUCCEEDED)
+        gripper.answer(status, KINDS[kind].action.Result(stalled=bool(words)))
+        assert bench.ends.pop() == (code, words)
 
 
 @pytest.mark.parametrize('fate', ['forgets', 'is_ready'])

@@ -17,6 +17,7 @@ from node_runner import (
     destroyed_when_refused,
     LATCHED,
     notify_ready,
+    ParameterError,
     ParameterReader,
     refuse_misspelt,
     run_program,
@@ -24,6 +25,7 @@ from node_runner import (
 )
 
 from ..ros.background import Background
+from ..ros.controllers import Controller, FOLLOW, KINDS
 from ..ros.execute_action import ExecuteAction
 from ..ros.execution import ExecutionLimits, TrajectoryExecution
 from ..ros.kinematic_services import KinematicServices
@@ -49,6 +51,10 @@ parameters:
   trajectory_execution.allowed_goal_duration_margin             [s] (default 0.5)
   moveit_simple_controller_manager.controller_names             (default: <group>_controller)
   <controller>.joints                                           joints that it moves
+  <controller>.type                                             FollowJointTrajectory (default),
+                                            GripperCommand or ParallelGripperCommand
+  <controller>.action_ns                                        its action (default: by type)
+  <controller>.default                                          it comes first (default false)
 """
 
 
@@ -122,21 +128,30 @@ def _execution_limits(node: Node) -> ExecutionLimits:
     )
 
 
-def _controllers(node: Node, robot: RobotGroups) -> dict[str, list[str]]:
-    """Return the joints of each controller; by default those of bring-up, one for each group."""
+def _controllers(node: Node, robot: RobotGroups) -> dict[str, Controller]:
+    """Return the controllers; by default those of bring-up, one for each group.
+
+    Those that are default come first: they get the joints that several move.
+    """
     defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
     manager = 'moveit_simple_controller_manager.'
     names = ParameterReader(node, manager).texts(
-        'controller_names', list(defaults), 'controllers with an action follow_joint_trajectory'
+        'controller_names', list(defaults), 'controllers that follow trajectories'
     )
-    return {
-        name: list(
-            ParameterReader(node, f'{manager}{name}.').texts(
-                'joints', defaults.get(name, []), f'joints that {name} moves'
+    found, first = {}, []
+    for name in names:
+        read = ParameterReader(node, f'{manager}{name}.')
+        joints = read.texts('joints', defaults.get(name, []), f'joints that {name} moves')
+        kind = read.choice('type', FOLLOW.name, KINDS, f'what {name} takes')
+        namespace = read.text('action_ns', kind.namespace, f'name of the action of {name}')
+        if kind.single and len(joints) != 1:
+            raise ParameterError(
+                f'{manager}{name}.joints has {len(joints)} joints; a {kind.name} moves one'
             )
-        )
-        for name in names
-    }
+        if read.flag('default', f'{name} comes before those that are not', default=False):
+            first.append(name)
+        found[name] = Controller(tuple(joints), kind, namespace)
+    return {name: found[name] for name in sorted(found, key=lambda name: name not in first)}
 
 
 def _serve(stop: threading.Event) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Execution of trajectories through the action FollowJointTrajectory of the controllers.
+"""Execution of trajectories through the actions of the controllers.
 
 Limits and codes are those of MoveIt's trajectory_execution_manager.
 """
@@ -14,7 +14,6 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
-from control_msgs.action import FollowJointTrajectory
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
 from trajectory_msgs.msg import JointTrajectory
@@ -23,6 +22,7 @@ from arm_model.ros import seconds
 from arm_trajectory import GoalCode
 
 from ..exceptions import PlanningCode, PlanningError
+from .controllers import Controller
 from .joint_trajectory import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05
@@ -92,7 +92,7 @@ class TrajectoryExecution:
     def __init__(
         self,
         node: Node,
-        controllers: Mapping[str, Sequence[str]],
+        controllers: Mapping[str, Controller],
         received: Callable[[Sequence[str]], Mapping[str, float]],
         limits: ExecutionLimits,
     ) -> None:
@@ -100,7 +100,7 @@ class TrajectoryExecution:
 
         Args:
             node: The node.
-            controllers: Joints of each controller, by its name.
+            controllers: By their names.
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
             limits: When an execution is refused or ended.
@@ -108,8 +108,8 @@ class TrajectoryExecution:
         self._node, self._controllers, self._received = node, controllers, received
         self._limits = limits
         self._clients = {
-            name: ActionClient(node, FollowJointTrajectory, f'{name}/follow_joint_trajectory')
-            for name in controllers
+            name: ActionClient(node, each.kind.action, each.action(name))
+            for name, each in controllers.items()
         }
         self._running: list[Execution] = []
         self._find_out: Callable[[Execution], None] | None = None
@@ -191,7 +191,7 @@ class TrajectoryExecution:
         self._running.append(execution)
         execution.waits_for = set(parts)
         for name, part in parts.items():
-            goal = FollowJointTrajectory.Goal(trajectory=part)
+            goal = self._controllers[name].kind.goal(part)
             sent = self._clients[name].send_goal_async(goal)
             sent.add_done_callback(
                 lambda answer, name=name: self._accepted(execution, name, answer)
@@ -259,11 +259,12 @@ class TrajectoryExecution:
         left = list(trajectory.joint_names)
         parts: dict[str, JointTrajectory] = {}
         for name in names or self._controllers:
-            joints = [joint for joint in left if joint in self._controllers[name]]
+            controller = self._controllers[name]
+            joints = [joint for joint in left if joint in controller.joints]
             if not joints:
                 continue
             if not self._clients[name].server_is_ready():
-                action = f'{self._node.resolve_topic_name(name)}/follow_joint_trajectory'
+                action = self._node.resolve_topic_name(controller.action(name))
                 raise PlanningError(
                     PlanningCode.CONTROL_FAILED, f'no action {action}; start the controller {name}'
                 )
@@ -271,7 +272,7 @@ class TrajectoryExecution:
             parts[name] = part_of(trajectory, joints)
         if left:
             known = '; '.join(
-                f'{name}: {", ".join(joints)}' for name, joints in self._controllers.items()
+                f'{name}: {", ".join(each.joints)}' for name, each in self._controllers.items()
             )
             raise PlanningError(
                 PlanningCode.CONTROL_FAILED, f'no controller moves {left[0]}; there are {known}'
@@ -294,7 +295,7 @@ class TrajectoryExecution:
     def _ended(self, execution: Execution, name: str, answer: Any) -> None:  # noqa: ANN401
         execution.waits_for.discard(name)
         wrapped = answer.result()
-        if wrapped.status == GoalStatus.STATUS_SUCCEEDED and not wrapped.result.error_code:
+        if wrapped.status == GoalStatus.STATUS_SUCCEEDED and not _code(wrapped.result):
             self._conclude(execution)
             return
         self._fail(execution, f'{name}: {_words(wrapped)}')
@@ -365,11 +366,18 @@ class TrajectoryExecution:
             self._conclude(execution)
 
 
+def _code(result: Any) -> int:  # noqa: ANN401
+    """Return the error code of a result; those of grippers have none."""
+    return int(getattr(result, 'error_code', 0))
+
+
 def _words(ended: Any) -> str:  # noqa: ANN401
     """Return why a controller did not reach the end; some say little."""
-    code = ended.result.error_code
-    if ended.result.error_string:
-        return str(ended.result.error_string)
+    code = _code(ended.result)
+    if words := getattr(ended.result, 'error_string', ''):
+        return str(words)
+    if getattr(ended.result, 'stalled', False):
+        return 'stalled before its goal'
     if code:
         return GoalCode(code).name if code in set(GoalCode) else f'error code {code}'
     if ended.status == GoalStatus.STATUS_CANCELED:
