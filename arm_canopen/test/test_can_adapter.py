@@ -109,12 +109,12 @@ def test_stamps_of_drivers_become_steady_time(opened_with: dict[str, object], ag
     """Wall clock stamps are moved over; those that count from something else become now."""
     messages = opened_with['messages']
     assert isinstance(messages, list)
+    before, expected = monotonic(), age if age == 0.5 else 0.0
     messages.append(_message(timestamp=time() - age))
-    before = monotonic()
     with open_bus('pcan:X') as bus:
         (frame,) = bus.receive(0.0)
-    expected = before - age if age == 0.5 else before
-    assert expected - 1e-3 <= frame.timestamp <= monotonic()
+    # a busy machine may pause between two looks at the clocks
+    assert before - 0.2 <= frame.timestamp + expected <= monotonic() + 0.2
 
 
 def test_a_refused_frame_is_counted_and_reported(opened_with: dict[str, object]) -> None:
