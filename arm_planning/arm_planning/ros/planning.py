@@ -142,7 +142,7 @@ class PlanningThread:
             return lambda: PlannedMotion(StateMessage(), [], 0.0)
         runs = group_runs(items)
         snapshot, positions = self._monitor.start(items[0].req.start_state, runs[0].group)
-        for number, run in enumerate(runs):
+        for number, run in enumerate(runs[1:], 1):
             if run.group not in [each.group for each in runs[:number]]:
                 positions = self._begin(run, positions)
         snapshot = _changed(snapshot, scene_diff, positions)
@@ -151,7 +151,7 @@ class PlanningThread:
     def _begin(self, run: GroupRun, positions: Array) -> Array:
         """Return all positions with those at which the first item of a group begins."""
         state = run.items[0].req.start_state
-        if run.first and state.attached_collision_objects:
+        if state.attached_collision_objects:
             raise PlanningError(
                 PlanningCode.INVALID_ROBOT_STATE,
                 f'sequence: item {run.first} attaches bodies; the first item of all may',
