@@ -88,10 +88,9 @@ def robot(isolation: Isolation, tmp_path: Path) -> Iterator[Robot]:
 def bring_up(isolation: Isolation, folder: Path, *options: str) -> Iterator[Robot]:
     """Bring the robot up from files in a folder, with options besides."""
     robot = write_two_arms(folder / 'two_arms')
-    options = ('--simulate', '--enable', *options)
-    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{robot}/', *options]
+    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{robot}/', '--simulate', '--enable']
     with (
-        RunningProcess([*command, '--can', isolation.bus], isolation.env) as bringup,
+        RunningProcess([*command, '--can', isolation.bus, *options], isolation.env) as bringup,
         RosClient(isolation.domain_id) as client,
     ):
         bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
@@ -148,7 +147,8 @@ def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Ro
 
 def test_a_trajectory_of_arm_and_gripper_is_split(isolation: Isolation, tmp_path: Path) -> None:
     """move_group has the arm follow it, and the gripper close where it ends."""
-    with bring_up(isolation, tmp_path, '--plan') as robot:
+    margin = 'move_group:trajectory_execution.allowed_goal_duration_margin:=60.0'  # [s]
+    with bring_up(isolation, tmp_path, '--plan', '--ros-args', '-p', margin) as robot:
         moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
         robot.client.spin_until(lambda: {*moved} <= {*robot.at}, 60.0, 'joint states')
         trajectory = JointTrajectory(joint_names=moved)

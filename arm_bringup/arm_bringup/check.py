@@ -20,7 +20,7 @@ from .exceptions import BringupError, DescriptionError, RobotError
 from .findings import error, Finding, Severity, warning
 from .motion_check import check_motion
 from .robots import Robot
-from .semantic_check import check_semantic
+from .semantic_check import check_semantic, srdf_command
 from .session import add_robot, locate, robots_epilog
 from .start_positions import given_positions
 
@@ -48,7 +48,7 @@ def check_robot(robot: Robot) -> list[Finding]:
             warning(
                 f'{robot.name}/',
                 f'lacks {robot.lacking} for trajectories and jogging',
-                'write them as in robots/gp110/: the group to move, and the limits of its joints',
+                f'{srdf_command(robot)} makes the SRDF, robots/gp110/limits.yaml shows limits',
             ),
         ]
     found, semantic = check_semantic(robot, tree)

@@ -15,6 +15,15 @@ from .findings import error, Finding
 from .robots import Robot
 
 
+def srdf_command(robot: Robot) -> str:
+    """Return the command that makes or completes the SRDF of a robot.
+
+    Args:
+        robot: The robot.
+    """
+    return f'ros2 run arm_planning srdf {robot.folder}/ --output {robot.semantic}'
+
+
 def check_semantic(
     robot: Robot, tree: KinematicTree
 ) -> tuple[list[Finding], SemanticDescription | None]:
@@ -38,7 +47,7 @@ def check_semantic(
         for finding in _group(place, group, semantic, tree)
     ]
     if not semantic.groups:
-        remedy = 'add the joints to move, as in robots/gp110/gp110.srdf'
+        remedy = f'{srdf_command(robot)} adds groups from the chains of the description'
         wrong.append(error(place, 'it has no group', remedy))
     return wrong, None if wrong else semantic
 

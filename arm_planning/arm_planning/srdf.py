@@ -87,7 +87,7 @@ def make_srdf(
     Args:
         urdf: Robot description as XML text.
         previous: The SRDF that is there already; empty when there is none.
-        limits: The table ``joint_limits`` of a limits file; None takes what the URDF has.
+        limits: The table ``joint_limits`` of a limits file; what it lacks is taken from the URDF.
         samples: Number of poses that are drawn.
         folder: Folder of the URDF, where names of mesh files are relative.
 
@@ -102,8 +102,12 @@ def make_srdf(
     pairs = sample_link_pairs(urdf, samples, folder)
     chosen = _by_user(previous)
     reasons = _reasons(pairs) | chosen
-    head = END.sub('', PAIR_LINE.sub('', previous)) if previous else _head(tree)
-    table = dict(limits) if limits is not None else {each: {} for each in tree.ranges()}
+    opening = previous or f'<?xml version="1.0"?>\n<robot name={quoteattr(tree.name)}>\n'
+    head = END.sub('', PAIR_LINE.sub('', opening))
+    if before is None or not before.groups:
+        head = '\n'.join([head.rstrip(), '', *_groups(tree)])
+    table: dict[str, Any] = {each: {} for each in tree.ranges()}  # what a limits file may lack
+    table |= limits or {}
     draft = _closed(head, reasons)
     poses, notes = _ready_poses(urdf, draft, table, folder)
     report = [
@@ -145,9 +149,9 @@ def _by_user(previous: str) -> dict[Pair, str]:
     }
 
 
-def _head(tree: KinematicTree) -> str:
-    """Return a new SRDF without pairs and poses, and without its end."""
-    lines = ['<?xml version="1.0"?>', f'<robot name={quoteattr(tree.name)}>', '']
+def _groups(tree: KinematicTree) -> list[str]:
+    """Return the groups and end effectors of a description as lines of XML."""
+    lines: list[str] = []
     chains = list(_Branches(tree).chains())
     if not chains:
         raise ModelError(f'{tree.name}: no chain of joints that move; there is no group to make')
@@ -166,7 +170,7 @@ def _head(tree: KinematicTree) -> str:
                 f'  <end_effector name={quoteattr(tool)} group={quoteattr(tool)}',
                 f'    parent_link={quoteattr(chain.tip)} parent_group={quoteattr(chain.name)}/>',
             ]
-    return '\n'.join(lines)
+    return lines
 
 
 class _Branches:

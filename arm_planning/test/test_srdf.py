@@ -115,6 +115,28 @@ def test_groups_from_chains() -> None:
         assert pose_quality(model, model.poses['ready']) > 0.0
 
 
+def test_groups_are_added_where_an_srdf_has_none() -> None:
+    """Descriptions come with SRDFs that have pairs only; a person's own pair stays."""
+    urdf = robot(link('base'), *arm('left', 'base', '0 1 0'))
+    mine = '<disable_collisions link1="left1" link2="left4" reason="User says so"/>'
+    text = make_srdf(urdf, f'<robot name="made_up">{mine}\n</robot>', samples=SAMPLES).text
+    semantic = parse_srdf(text)
+    assert semantic.arms == ('arm',)
+    assert 'ready' in semantic.poses['arm']
+    assert reasons(text)[frozenset(('left1', 'left4'))] == 'User says so'
+
+
+def test_joints_that_the_limits_file_lacks_have_those_of_the_description() -> None:
+    """The wheels of a mobile arm have no drive on the bus of the arm, and no line in its file."""
+    urdf = robot(
+        *(link('base'), link('wheel'), joint('base', 'wheel', '0 0.5 0')),
+        *arm('left', 'base', '0 1 0'),
+    )
+    limits = {f'to_left{number}': {'max_velocity': 0.5} for number in range(1, 5)}
+    semantic = parse_srdf(make_srdf(urdf, '', limits, SAMPLES).text)
+    assert 'arm_left4' in semantic.arms
+
+
 def test_a_gripper_is_an_end_effector() -> None:
     """Two fingers at the end are no arms; the arm ends where they begin."""
     fingers = [

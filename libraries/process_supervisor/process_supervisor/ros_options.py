@@ -39,12 +39,16 @@ class RosOptions:
 
     @property
     def node_arguments(self) -> tuple[str, ...]:
-        """Words for the command line of a node, behind its ``--ros-args``."""
+        """Words for the command line of a node, behind its ``--ros-args``.
+
+        Raises:
+            StartError: ``-p NODE:NAME:=VALUE`` in a namespace, where rcl finds no node by it.
+        """
         words = ['-r', f'__ns:=/{self.namespace}'] if self.namespace else []
         for option, value in _pairs(self.arguments):
             of_node = _NODE_PARAMETER.fullmatch(value) if option in _PARAMETERS else None
             if of_node is not None:
-                value = f'{self.node_name(of_node[1])}:{of_node[2]}'  # noqa: PLW2901
+                value = f'{self._in_root(of_node[1], value)}:{of_node[2]}'  # noqa: PLW2901
             words += [option, value] if value else [option]
         return tuple(words)
 
@@ -65,6 +69,16 @@ class RosOptions:
         full = f'/{name.strip("/")}'
         inside = full.startswith(('/*', f'/{self.namespace}/'))
         return full if inside or not self.namespace else self.resolve(full[1:])
+
+    def _in_root(self, node: str, value: str) -> str:
+        """Return the name of a node as rcl takes it in ``-p``: without slashes."""
+        full = self.node_name(node)
+        if '/' in full[1:] or '*' in full:
+            raise StartError(
+                f'-p {value}: ROS takes only nodes of the root namespace there; write it into a'
+                f' file as {full}: ros__parameters:, and give that with --params-file'
+            )
+        return full[1:]
 
     def within(self, namespace: str) -> RosOptions:
         """Return the same in another namespace, unless a person has named one."""

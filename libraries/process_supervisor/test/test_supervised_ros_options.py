@@ -178,16 +178,39 @@ def test_what_is_no_parameter_file_is_refused(tmp_path: Path, document: object) 
         moved(document, RosOptions('left'), tmp_path)
 
 
-@pytest.mark.parametrize(
-    ('word', 'handed_over'),
-    [
-        ('servo_node:rate:=2', '/left/servo_node:rate:=2'),
-        ('/left/servo_node:rate:=2', '/left/servo_node:rate:=2'),
-        ('rate:=2', 'rate:=2'),
-        ('url:=http://x:=y', 'url:=http://x:=y'),
-    ],
-)
-def test_parameters_for_one_node_reach_it_in_its_namespace(word: str, handed_over: str) -> None:
-    """A person names the node as the bring-up without namespace has it, or in full."""
-    assert RosOptions('left', ('-p', word)).node_arguments[-1] == handed_over
-    assert RosOptions('left', ('-r', 'servo_node:a:=b')).node_arguments[-1] == 'servo_node:a:=b'
+@pytest.mark.parametrize('word', ['node:rate:=2', '/node:rate:=2', 'rate:=2'])
+def test_parameters_for_one_node_reach_it(word: str) -> None:
+    """A person names the node by itself or in full; rcl takes no slash."""
+    assert rate_of('node', RosOptions('', ('-p', word))) == 2
+    assert rate_of('other', RosOptions('', ('-p', word))) == (2 if word == 'rate:=2' else None)
+
+
+@pytest.mark.parametrize('word', ['node:rate:=2', '/left/node:rate:=2', '/**:rate:=2'])
+def test_parameters_for_one_node_in_a_namespace_belong_into_a_file(
+    word: str, tmp_path: Path
+) -> None:
+    """By -p rcl finds nodes of the root namespace only: it would say so, or find nobody."""
+    with pytest.raises(StartError, match='--params-file'):
+        assert RosOptions('left', ('-p', word)).node_arguments
+    file = tmp_path / 'rates.yaml'
+    file.write_text('/left/node: {ros__parameters: {rate: 2}}')
+    assert rate_of('node', RosOptions('left', ('--params-file', str(file)))) == 2
+
+
+def test_values_with_colons_and_remaps_are_passed_on() -> None:
+    """They are no names of nodes."""
+    arguments = ('-p', 'url:=http://x:=y', '-r', 'servo_node:a:=b')
+    assert RosOptions('left', arguments).node_arguments[2:] == arguments
+
+
+def rate_of(name: str, ros: RosOptions) -> object:
+    """Return the parameter ``rate`` of a real node with these options; None where it has none."""
+    context = Context()
+    rclpy.init(args=['--ros-args', *ros.node_arguments], context=context)
+    try:
+        node = Node(name, context=context, automatically_declare_parameters_from_overrides=True)
+        rate: object = node.get_parameter_or('rate').value
+        node.destroy_node()
+        return rate
+    finally:
+        rclpy.shutdown(context=context)
