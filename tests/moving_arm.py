@@ -86,9 +86,9 @@ class MovingArm(SimulatedArm):
         return GoalRun(self.client, goal)
 
 
-def trajectory_client(client: RosClient) -> ActionClient:
-    """Return the client of the arm's trajectory controller."""
-    return client.action(FollowJointTrajectory, f'{CONTROLLER}/follow_joint_trajectory')
+def trajectory_client(client: RosClient, controller: str = CONTROLLER) -> ActionClient:
+    """Return the client of a trajectory controller."""
+    return client.action(FollowJointTrajectory, f'{controller}/follow_joint_trajectory')
 
 
 class GoalRun:
@@ -98,11 +98,13 @@ class GoalRun:
         feedback: What was fed back so far.
     """
 
-    def __init__(self, client: RosClient, goal: FollowJointTrajectory.Goal) -> None:
+    def __init__(
+        self, client: RosClient, goal: FollowJointTrajectory.Goal, controller: str = CONTROLLER
+    ) -> None:
         """Send it and wait until it is accepted."""
         self.feedback: list[Any] = []
         self._client = client
-        action = trajectory_client(client)
+        action = trajectory_client(client, controller)
         # not wait_for_server: the client may have joint states to publish meanwhile
         client.spin_until(action.server_is_ready, 20.0, 'the action server')
         sent = action.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 import threading
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from isolation import Isolation
@@ -28,6 +29,9 @@ LIFETIME = 600.0
 
 PATIENT = {'joint_state_timeout': '3.0', 'following_delay': '0.8'}
 """How late joint states may be in [s]: on a busy machine the drives wait for the processor."""
+
+PANDA = {'/forward_position_controller/commands': JOINTS}
+"""Joints of the topics on which set-points of the Panda arrive."""
 
 RECEIVED_STATES = 10
 """Joint states that a subscriber has received before the arm counts as there."""
@@ -53,24 +57,42 @@ class TopicArm:
     """Drives that follow set-points and publish joint states, and the program that commands them.
 
     Attributes:
-        at: Where it is in [rad].
+        joints: Names of its joints.
+        at: Where they are in [rad] or [m].
         moves: Whether it goes to its set-points.
         publishes: Whether it publishes where it is.
         arrays: Set-points as arrays so far.
         trajectories: Set-points as trajectories so far.
     """
 
-    def __init__(self, isolation: Isolation, command: Sequence[str], ready: str) -> None:
-        """Start the program, and wait until it says that it is ready."""
+    def __init__(
+        self,
+        isolation: Isolation,
+        command: Sequence[str],
+        ready: str,
+        *,
+        topics: Mapping[str, Sequence[str]] = PANDA,
+        start: Sequence[float] = READY,
+    ) -> None:
+        """Start the program, and wait until it says that it is ready.
+
+        Args:
+            isolation: Of the test.
+            command: Starts the program.
+            ready: What it says then.
+            topics: The joints of each topic of arrays.
+            start: Where all of them are at first, in the order of topics, in [rad] or [m].
+        """
         self.moves = True
-        self.at = list(READY)
+        self.joints = [name for names in topics.values() for name in names]
+        self.at = list(start)
         self.arrays: list[list[float]] = []
         self.trajectories: list[JointTrajectory] = []
         self.publishes = True
         self._received = 0
         self._stopped = threading.Event()
         with ExitStack() as stack:
-            self._start(isolation, stack)
+            self._start(isolation, stack, topics)
             self.process = stack.enter_context(RunningProcess(command, isolation.env))
             self.process.wait_for(ready)
             self.client.spin_until(
@@ -78,14 +100,16 @@ class TopicArm:
             )
             self._stack = stack.pop_all()
 
-    def _start(self, isolation: Isolation, stack: ExitStack) -> None:
+    def _start(
+        self, isolation: Isolation, stack: ExitStack, topics: Mapping[str, Sequence[str]]
+    ) -> None:
         self.client = stack.enter_context(RosClient(isolation.domain_id))
         self._drives = stack.enter_context(RosClient(isolation.domain_id, 'drives'))
         node = self._drives.node
         self._states = node.create_publisher(JointState, '/joint_states', 10)
-        node.create_subscription(
-            Float64MultiArray, '/forward_position_controller/commands', self._take_array, 10
-        )
+        for topic, names in topics.items():
+            take = partial(self._take_array, self.joints.index(names[0]))
+            node.create_subscription(Float64MultiArray, topic, take, 10)
         node.create_subscription(
             JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
         )
@@ -105,13 +129,14 @@ class TopicArm:
     def _speak(self) -> None:
         if not self.publishes:
             return
-        self._states.publish(JointState(name=JOINTS, position=self.at))
+        self._states.publish(JointState(name=self.joints, position=self.at))
         self._received += self._states.get_subscription_count() > 0
 
-    def _take_array(self, message: Float64MultiArray) -> None:
-        self.arrays.append(list(message.data))
+    def _take_array(self, first: int, message: Float64MultiArray) -> None:
+        places = list(message.data)
+        self.arrays.append(places)
         if self.moves:
-            self.at = self.arrays[-1]
+            self.at[first : first + len(places)] = places
 
     def _take_trajectory(self, message: JointTrajectory) -> None:
         assert list(message.joint_names) == JOINTS

@@ -27,7 +27,7 @@ from .bus import in_namespace_of_bus, read_bus
 from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
-from .groups import moved_groups, MovedGroups
+from .groups import moved_groups
 from .motion import choose_master, motion_files, planning_files
 from .session import (
     add_arguments,
@@ -157,7 +157,7 @@ def _controllers(arguments: argparse.Namespace, ros: RosOptions) -> int:
     with tempfile.TemporaryDirectory(prefix='arm_bringup-') as folder:
         parameters = Path(folder) / 'robot_description.yaml'
         write_parameters(parameters, read_description(robot))
-        files = motion_files(robot, Path(folder), ros, MovedGroups(moved_groups(robot).arms[:1]))
+        files = motion_files(robot, Path(folder), ros, moved_groups(robot))
         _say(f'{robot.name}: trajectories and jogging for drives of another process')
         process = controller_process(files, parameters, arguments.timeout, find_executable, ros)
         return supervise([process]).exit_code

@@ -51,6 +51,23 @@ def moved_groups(robot: Robot) -> MovedGroups:
         raise RobotError(f'{robot.folder}: {error}') from error
 
 
+def joints_of_groups(robot: Robot, groups: MovedGroups) -> dict[str, Sequence[str]]:
+    """Return the joints of each group that is moved.
+
+    Args:
+        robot: The robot.
+        groups: Its groups that are moved.
+
+    Raises:
+        RobotError: A group is not in the description, or a file cannot be read.
+    """
+    try:
+        tree, semantic = read_urdf(read_description(robot)), parse_srdf(read_semantic(robot))
+        return {name: find_group(tree, semantic, name).joints for name in groups.names}
+    except (DescriptionError, urdf_reader.DescriptionError) as error:
+        raise RobotError(f'{robot.folder}: {error}') from error
+
+
 def choose_groups(
     robot: Robot, semantic: SemanticDescription, tree: KinematicTree, drives: Collection[str]
 ) -> MovedGroups:

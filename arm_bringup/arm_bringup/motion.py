@@ -12,9 +12,6 @@ from collections.abc import Sequence
 import json
 from pathlib import Path
 
-import urdf_reader
-from urdf_reader import find_group, parse_srdf, read_urdf
-
 from process_supervisor import (
     EVERY_NODE,
     Executable,
@@ -25,9 +22,9 @@ from process_supervisor import (
     StartError,
 )
 
-from .description import read_description, read_semantic
+from .description import read_semantic
 from .exceptions import RobotError
-from .groups import MovedGroups
+from .groups import joints_of_groups, MovedGroups
 from .robots import Robot
 from .stack import MASTER, MOTION_NODE
 
@@ -92,13 +89,8 @@ def planning_files(
     Raises:
         RobotError: A group is not in the description, or a file cannot be read.
     """
-    try:
-        tree, semantic = read_urdf(read_description(robot)), parse_srdf(read_semantic(robot))
-        joints = {group: find_group(tree, semantic, group).joints for group in groups.names}
-    except urdf_reader.DescriptionError as error:
-        raise RobotError(f'{robot.name}: {error}') from error
-    names = {group: f'{group}_controller' for group in groups.names}
-    names[groups.names[0]] = controller_name(robot, groups)
+    joints = joints_of_groups(robot, groups)
+    names = controller_names(robot, groups)
     manager: dict[str, object] = {'controller_names': list(names.values())}
     manager |= {names[group]: {'joints': list(joints[group])} for group in groups.arms}
     manager |= {
@@ -116,12 +108,11 @@ def gripper_action(joints: Sequence[str]) -> str:
     return 'GripperCommand' if len(joints) == 1 else 'ParallelGripperCommand'
 
 
-def controller_name(robot: Robot, groups: MovedGroups) -> str:
-    """Return the name of a robot's trajectory controller.
+def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
+    """Return the name of each group's controller; controllers.yaml may name that of the first.
 
     Args:
-        robot: A robot with an SRDF; without a name in controllers.yaml, that of its first group
-            is used.
+        robot: A robot with an SRDF.
         groups: Its groups that are moved.
 
     Raises:
@@ -132,8 +123,9 @@ def controller_name(robot: Robot, groups: MovedGroups) -> str:
     except StartError as error:
         raise RobotError(f'{robot.folder}: {error}') from error
     manager = table.get('controller_manager', {}).get('ros__parameters', {})
-    named = manager.get('controller_name')
-    return str(named or f'{groups.names[0]}_controller')
+    names = {group: f'{group}_controller' for group in groups.names}
+    main = groups.names[0]
+    return names | {main: str(manager.get('controller_name') or names[main])}
 
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:

@@ -14,7 +14,8 @@ from process_supervisor import parameters_by_node, StartError
 from .description import read_semantic
 from .exceptions import RobotError
 from .findings import error, Finding, warning
-from .groups import choose_groups
+from .groups import choose_groups, MovedGroups
+from .motion import controller_names
 from .robots import Robot, SETTINGS
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def check_motion(
             notes.update(dict.fromkeys(filter(None, [model.assumption(drives)])))
             findings += _start(robot, model)
     findings += [warning(*_note(robot, note)) for note in notes]
-    return findings + list(_controllers(robot, models))
+    return findings + list(_controllers(robot, groups, models))
 
 
 def _limits_remedy(robot: Robot) -> str:
@@ -183,31 +184,47 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
         )
 
 
-def _controllers(robot: Robot, models: Mapping[str, RobotModel]) -> Iterable[Finding]:
+def _controllers(
+    robot: Robot, groups: MovedGroups, models: Mapping[str, RobotModel]
+) -> Iterable[Finding]:
+    from arm_model.ros import GroupModels
     from arm_servo import check_parameters
 
-    if not robot.controllers.is_file() or not models:
-        return
-    place, model = robot.controllers.name, next(iter(models.values()))
+    if not robot.controllers.is_file() or len(models) < len(groups.names):
+        return  # what is wrong with a group is reported already
+    place = robot.controllers.name
+    moved = GroupModels(
+        *([models[name] for name in names] for names in (groups.arms, groups.tools))
+    )
     try:
         table = parameters_by_node(robot.controllers)
-        manager = table.get('controller_manager', {}).get('ros__parameters', {})
-        name = manager.get('controller_name', f'{model.group}_controller')
-        constraints = table.get(name, {}).get('ros__parameters', {}).get('constraints', {})
-        refused = check_parameters(model, table)
-    except (StartError, AttributeError, TypeError) as problem:
+        names = controller_names(robot, groups)
+        constraints = {
+            name: table.get(name, {}).get('ros__parameters', {}).get('constraints', {}).items()
+            for name in names.values()
+        }
+        refused = check_parameters(moved, table)
+    except (StartError, RobotError, AttributeError, TypeError) as problem:
         yield error(place, f'not a parameter file: {problem}', 'see robots/gp110/controllers.yaml')
         return
-    if name not in table:
+    main = names[groups.names[0]]
+    if main not in table:
         known = ', '.join(table)
-        yield warning(place, f'no parameters of {name!r}; nodes: {known}', f'name one {name}')
-    for joint, values in constraints.items():
-        if isinstance(values, dict) and joint not in model.joints:
-            yield error(
-                f'{place}, {name}, constraints',
-                f'group {model.group} has no joint {joint!r}',
-                f'joints: {", ".join(model.joints)}',
-            )
+        yield warning(place, f'no parameters of {main!r}; nodes: {known}', f'name one {main}')
+    if main in [name for group, name in names.items() if group != groups.names[0]]:
+        yield error(
+            f'{place}, controller_manager',
+            f'controller_name {main} is the name of the controller of another group, too',
+            f'choose another one, or leave it out: {groups.names[0]}_controller',
+        )
+    for group, name in names.items():
+        for joint, values in constraints[name]:
+            if isinstance(values, dict) and joint not in models[group].joints:
+                yield error(
+                    f'{place}, {name}, constraints',
+                    f'group {group} has no joint {joint!r}',
+                    f'joints: {", ".join(models[group].joints)}',
+                )
     for node, reason in refused:
         remedy = 'mend it: the node would end with these words; README of arm_servo has them all'
         yield error(f'{place}, {node}', reason, remedy)

@@ -28,6 +28,7 @@ from process_supervisor.arguments import add_network, add_timeout, apply_network
 from .bus import in_namespace_of_bus, read_bus, stream_mode_service
 from .description import read_description
 from .exceptions import RobotError
+from .groups import moved_groups
 from .robots import find_robot, installed_robots_folder, Robot, robot_names
 from .stack import arm_processes, Stack
 from .start_positions import start_positions, StartPositions
@@ -141,11 +142,14 @@ def locate(arguments: argparse.Namespace) -> Robot:
     folder = Path() if os.sep in arguments.robot else installed_robots_folder()
     robot = find_robot(arguments.robot, folder)
     groups = tuple(arguments.group) or robot.groups
+    tip_link = robot.tip_link
+    if arguments.group and tip_link:  # it is of the group that is the main one without --group
+        main = (robot.groups or moved_groups(robot).arms)[0]
+        tip_link = tip_link if groups[0] == main else ''
     return replace(
         robot,
         groups=groups,
-        # of robot.yaml, it belongs to the main group there
-        tip_link='' if robot.groups and groups[0] != robot.groups[0] else robot.tip_link,
+        tip_link=tip_link,
         xacro_args={**robot.xacro_args, **dict(arguments.xacro_arg)},
     )
 

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 import shutil
 
 import pytest
+from two_arms import write_two_arms
 import yaml
 
 from arm_bringup.bus import in_namespace_of_bus, read_bus
@@ -15,7 +17,7 @@ from arm_bringup.check import check_robot, main
 from arm_bringup.exceptions import RobotError
 from arm_bringup.findings import Severity
 from arm_bringup.groups import moved_groups
-from arm_bringup.motion import controller_name
+from arm_bringup.motion import controller_names
 from arm_bringup.robots import find_robot, Robot
 from process_supervisor import RosOptions
 
@@ -130,10 +132,38 @@ def test_without_the_files_of_motion(robot: Robot) -> None:
     assert 'gp110.srdf and limits.yaml' in finding.problem
 
 
+def main_controller(robot: Robot) -> str:
+    """Return the name of the main group's controller."""
+    groups = moved_groups(robot)
+    return controller_names(robot, groups)[groups.names[0]]
+
+
+@pytest.mark.parametrize(
+    ('node', 'parameters', 'words'),
+    [
+        ('right_controller', '{constraints: {left_turn: {goal: 0.1}}}', "no joint 'left_turn'"),
+        ('right_servo_node', '{moveit_servo: {scale: {linea: 0.1}}}', "'moveit_servo.scale.linea"),
+        ('hand_controller', '{goal_tolerance: -1.0}', 'goal_tolerance is -1'),
+        ('controller_manager', '{controller_name: hand_controller}', 'of another group, too'),
+    ],
+)
+def test_parameters_of_every_group_are_looked_at(
+    tmp_path: Path, node: str, parameters: str, words: str
+) -> None:
+    """Further arms and grippers have controllers and servos of their own."""
+    robot = find_robot(f'{write_two_arms(tmp_path / "two_arms")}{os.sep}', tmp_path)
+    before = {str(each) for each in check_robot(robot)}
+    lines = [f'{node}: {{ros__parameters: {parameters}}}']
+    lines += ['left_controller: {ros__parameters: {}}'] * (node != 'controller_manager')
+    robot.controllers.write_text('\n'.join(lines))
+    found = [each for each in check_robot(robot) if str(each) not in before]
+    assert any(each.severity is ERROR and words in each.problem for each in found), found
+
+
 @pytest.mark.parametrize('name', ['/left/{}', '/**/{}', 'cell/left/{}'])
 def test_nodes_of_controllers_yaml_may_have_a_namespace(robot: Robot, name: str) -> None:
     """They are looked at all the same, and the controller keeps its name."""
-    plain = controller_name(robot, moved_groups(robot))
+    plain = main_controller(robot)
     table = yaml.safe_load(robot.controllers.read_text())
     named = {name.format(node): values for node, values in table.items()}
     robot.controllers.write_text(yaml.safe_dump(named))
@@ -141,7 +171,7 @@ def test_nodes_of_controllers_yaml_may_have_a_namespace(robot: Robot, name: str)
     replace(robot.controllers, 'goal_time', 'goal_tim')
     assert [finding.severity for finding in check_robot(robot)] == [ERROR]
     replace(robot.controllers, f'controller_name: {plain}', 'controller_name: arm')
-    assert controller_name(robot, moved_groups(robot)) == 'arm'
+    assert main_controller(robot) == 'arm'
 
 
 def test_channels_of_a_drive_are_joints(robot: Robot) -> None:

@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 import os
 from pathlib import Path
 import re
 
 import pytest
+from two_arms import ARMS, DRIVES, GRIPPER, write_two_arms
 from urdf_reader import parse_srdf, read_urdf
 
 from arm_bringup.bringup import parse
+from arm_bringup.demos.wave.main import waving_joints
 from arm_bringup.description import expand_xacro, read_description, read_semantic
 from arm_bringup.exceptions import DescriptionError, RobotError
 from arm_bringup.groups import choose_groups, MovedGroups
@@ -107,6 +110,31 @@ def test_the_tip_of_robot_yaml_is_that_of_its_main_group(folder: Path) -> None:
         (['--group', 'right', '--group', 'left'], ''),
     ):
         assert locate(parse([place, *argv])[0]).tip_link == tip
+
+
+def test_the_tip_of_a_robot_yaml_without_group_is_that_of_the_default_one(tmp_path: Path) -> None:
+    """Where the SRDF has several arms, it is the end of the first."""
+    place = f'{write_two_arms(tmp_path / "two_arms")}{os.sep}'
+    with (tmp_path / 'two_arms' / 'robot.yaml').open('a') as file:
+        file.write('tip_link: left_lift_link\n')
+    for argv, tip in (([], True), (['--group', 'left'], True), (['--group', 'right'], False)):
+        assert bool(locate(parse([place, *argv])[0]).tip_link) == tip
+
+
+@pytest.mark.parametrize(
+    ('argv', 'waving'),
+    [
+        ([], DRIVES),
+        (['--group', 'right'], ARMS['right']),
+        (['--group', 'right', '--group', 'hand'], (*ARMS['right'], GRIPPER)),
+    ],
+)
+def test_groups_that_are_asked_for_wave(
+    tmp_path: Path, argv: Sequence[str], waving: Collection[str]
+) -> None:
+    """The demo enables the others as little as it waves with them."""
+    place = f'{write_two_arms(tmp_path / "two_arms")}{os.sep}'
+    assert {*waving_joints(locate(parse([place, *argv])[0]), DRIVES)} == {*waving}
 
 
 def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_path: Path) -> None:

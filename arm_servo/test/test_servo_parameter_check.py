@@ -9,6 +9,7 @@ from typing import Any
 from model_robots import robot
 import pytest
 
+from arm_model.ros import GroupModels
 from arm_servo import check_parameters
 
 CONTROLLER = 'gp110_arm_controller'
@@ -18,7 +19,7 @@ NAMED = {'controller_manager': {'ros__parameters': {'controller_name': CONTROLLE
 def refused(node: str, **parameters: object) -> list[tuple[str, str]]:
     """Check a file that has parameters of one node."""
     document: dict[str, Any] = {**NAMED, node: {'ros__parameters': parameters}}
-    return check_parameters(robot('gp110'), document)
+    return check_parameters(GroupModels([robot('gp110')]), document)
 
 
 @pytest.mark.parametrize(

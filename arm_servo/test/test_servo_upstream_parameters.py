@@ -17,6 +17,7 @@ from rclpy.node import Node
 import yaml
 
 from arm_model import ModelError
+from arm_model.ros import GroupModels
 from arm_servo import check_parameters, CoreSettings, MotionCore
 from arm_servo.ros.group_motion import Offers
 from arm_servo.ros.parameter_sheet import ParameterSheet
@@ -262,7 +263,7 @@ def document(**nodes: dict[str, Any]) -> dict[str, Any]:
 )
 def test_upstream_parameters_are_accepted(nodes: dict[str, dict[str, Any]]) -> None:
     """No node refuses one of them, in one process or in several."""
-    assert check_parameters(robot('panda'), document(**nodes)) == []
+    assert check_parameters(GroupModels([robot('panda')]), document(**nodes)) == []
 
 
 @pytest.mark.parametrize('offers', [Offers(trajectories=False), Offers()])

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
-from functools import partial
 import threading
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,7 @@ from urdf_reader import Mimic, read_urdf
 
 from arm_canopen import CanopenError, serve_buses
 from arm_model import ModelError, RobotModel
-from arm_model.ros import declare_groups, same_robot
+from arm_model.ros import declare_groups
 from node_runner import destroyed_if_refused
 
 from ..core.gateway import CommandGateway, start_worker
@@ -24,7 +22,7 @@ from ..core.settings import CoreSettings
 from ..exceptions import BackendError
 from ..io.drive_source import DriveSource
 from .controller_manager import ControllerManager, declare_manager
-from .group_motion import ArmMotion, Offers, ToolMotion
+from .group_motion import MakeNode, Offers, RobotMotion
 from .joint_state_broadcaster import JointStateBroadcaster
 from .other_programs import watch_other_programs
 from .scene_listener import SceneListener
@@ -121,59 +119,28 @@ class CanopenMotion:
         watch_other_programs(self.nodes)
         self._attaching = self._manager.create_timer(ATTACH_PERIOD, self._attach_first)
 
-    def _build(self, make_node: Callable[[str], Node], offers: Offers) -> None:
+    def _build(self, make_node: MakeNode, offers: Offers) -> None:
         self._manager = manager = make_node('controller_manager')
         models = declare_groups(manager)
-        main, *others = models.arms
+        main = models.arms[0]
         name, broadcasts = declare_manager(manager, main)
-        names = [f'{model.group}_controller' for model in (*others, *models.tools)]
-        if name in names:  # each goal would reach both
-            raise ModelError(
-                f'controller_name {name}: another group of this robot has a controller of that'
-                ' name; choose another one, or let it be named after its group'
-            )
-        on_bus = partial(BusDrives, self._master)
 
-        def make_arm(model: RobotModel, controller: str, servo: str) -> ArmMotion[BusDrives]:
-            trajectories = make_node(controller) if offers.trajectories else None
-            jogging = make_node(servo) if offers.jogging else None
-            if jogging is not None:
-                same_robot(jogging, model)
-            return ArmMotion(model, trajectories, jogging, on_bus)
+        def on_bus(_: Node, model: RobotModel, settings: CoreSettings) -> BusDrives:
+            return BusDrives(self._master, model, settings)
 
-        arms = [make_arm(main, name, 'servo_node')]
-        arms += [
-            make_arm(model, f'{model.group}_controller', f'{model.group}_servo_node')
-            for model in others
-        ]
-        tools = [
-            ToolMotion(model, make_node(f'{model.group}_controller'), on_bus)
-            for model in models.tools
-        ]
-        self._groups: list[ArmMotion[BusDrives] | ToolMotion[BusDrives]] = [*arms, *tools]
-        SceneListener(
-            manager,
-            [
-                *(arm.drives.gateway for arm in arms),
-                *(tool.drives.gateway for tool in tools if tool.checks),
-            ],
-            [tool.drives.gateway for tool in tools if not tool.checks],
-        )
+        robot = RobotMotion.build(models, name, make_node, offers, on_bus)
+        self._drives = robot.drives
+        SceneListener(manager, robot.checked, robot.unchecked)
         broadcaster = make_node('joint_state_broadcaster')
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
-            self._groups[0].drives.gateway,
+            self._drives[0].gateway,
             [name for name in self._master.bus.joints if name not in main.joints],
             _mimics(manager),
             active=broadcasts,
         )
-        self.nodes = [
-            manager,
-            *(node for group in self._groups for node in group.nodes),
-            broadcaster,
-        ]
-        period = self._master.bus.master.sync_period
-        entries = [entry for group in self._groups for entry in group.entries(period)]
+        self.nodes = [manager, *robot.nodes, broadcaster]
+        entries = robot.entries(self._master.bus.master.sync_period)
         self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
         for node in self.nodes:
             check_names(node)
@@ -182,7 +149,7 @@ class CanopenMotion:
             manager.get_logger().warning(note)
 
     def _attach_first(self) -> None:
-        waiting = [group.drives for group in self._groups if not group.drives.running]
+        waiting = [drives for drives in self._drives if not drives.running]
         for drives in waiting:
             drives.prepare()
         if not waiting:  # the cycle asks for set-points

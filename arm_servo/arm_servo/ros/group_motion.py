@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One group of joints: its motion core, and the nodes that command it."""
+"""The groups of a robot that are moved: the motion core of each, and the nodes that command it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Generic, Protocol, TypeVar
 
 from rclpy.node import Node
 
-from arm_model import RobotModel
+from arm_model import ModelError, RobotModel
+from arm_model.ros import GroupModels, same_robot
 from node_runner import ParameterReader
 
 from ..core.gateway import CommandGateway
@@ -51,8 +52,10 @@ class Drives(Protocol):
 
 
 AnyDrives = TypeVar('AnyDrives', bound=Drives)
-MakeDrives = Callable[[RobotModel, CoreSettings], AnyDrives]
-"""Builds the core of a group over its drives."""
+MakeDrives = Callable[[Node, RobotModel, CoreSettings], AnyDrives]
+"""Builds the core of a group over its drives; its first node may say how."""
+MakeNode = Callable[[str], Node]
+"""Makes the node of a name."""
 
 
 class ArmMotion(Generic[AnyDrives]):
@@ -86,7 +89,9 @@ class ArmMotion(Generic[AnyDrives]):
         trajectory = None if controller is None else declare_trajectory(controller, model.joints)
         jogging = None if servo is None else declare_servo(servo, model)
         check = trajectory.check if trajectory is not None else _check_of_servo(servo)
-        self.drives = drives = make_drives(model, _settings(trajectory, jogging, check=check))
+        self.drives = drives = make_drives(
+            self.nodes[0], model, _settings(trajectory, jogging, check=check)
+        )
         if servo is not None and jogging is not None:
             self._servo = Servo(servo, drives.gateway, jogging, drives.prepare)
         self._controller: TrajectoryController | None = None
@@ -156,7 +161,7 @@ class ToolMotion(Generic[AnyDrives]):
         )
         self.checks = trajectory.check
         self.nodes: Sequence[Node] = (controller,)
-        self.drives = drives = make_drives(model, settings)
+        self.drives = drives = make_drives(controller, model, settings)
         self._controller = TrajectoryController(
             controller, drives.gateway, trajectory, drives.prepare
         )
@@ -177,6 +182,101 @@ class ToolMotion(Generic[AnyDrives]):
         if not active:
             stop = StopRequest('the controller was deactivated', (Source.TARGET,))
             self.drives.gateway.command(stop)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotMotion(Generic[AnyDrives]):
+    """The groups of a robot that are moved, each by itself.
+
+    Attributes:
+        arms: The arms, the main one first.
+        tools: The end effectors.
+    """
+
+    arms: Sequence[ArmMotion[AnyDrives]]
+    tools: Sequence[ToolMotion[AnyDrives]]
+
+    @classmethod
+    def build(
+        cls,
+        models: GroupModels,
+        main: str,
+        make_node: MakeNode,
+        offers: Offers,
+        make_drives: MakeDrives[AnyDrives],
+    ) -> RobotMotion[AnyDrives]:
+        """Make the nodes and cores of all groups; nothing moves yet.
+
+        Args:
+            models: The groups.
+            main: Name of the main arm's trajectory controller; that of another group is
+                ``<group>_controller``.
+            make_node: Makes the nodes.
+            offers: What is offered for the arms.
+            make_drives: Builds the cores.
+
+        Raises:
+            ParameterError: A parameter is misspelt, of another kind or out of its range.
+            ModelError: The parameters do not fit a group, or two controllers have one name.
+        """
+        first, *others = models.arms
+        names = [f'{model.group}_controller' for model in (*others, *models.tools)]
+        if main in names:  # each goal would reach both
+            raise ModelError(
+                f'controller_name {main}: another group of this robot has a controller of that'
+                ' name; choose another one, or let it be named after its group'
+            )
+
+        def arm(model: RobotModel, controller: str, servo: str) -> ArmMotion[AnyDrives]:
+            trajectories = make_node(controller) if offers.trajectories else None
+            jogging = make_node(servo) if offers.jogging else None
+            if jogging is not None:
+                same_robot(jogging, model)
+            return ArmMotion(model, trajectories, jogging, make_drives)
+
+        arms = [arm(first, main, 'servo_node')]
+        arms += [
+            arm(model, f'{model.group}_controller', f'{model.group}_servo_node')
+            for model in others
+        ]
+        tools = [
+            ToolMotion(model, make_node(f'{model.group}_controller'), make_drives)
+            for model in models.tools
+        ]
+        return cls(arms, tools)
+
+    @property
+    def drives(self) -> list[AnyDrives]:
+        """The drives of each group, the main arm's first."""
+        return [group.drives for group in self._groups]
+
+    @property
+    def nodes(self) -> list[Node]:
+        """The nodes of all groups."""
+        return [node for group in self._groups for node in group.nodes]
+
+    @property
+    def checked(self) -> list[CommandGateway]:
+        """Commands to the cores of the groups that are checked for collision."""
+        tools = [tool.drives.gateway for tool in self.tools if tool.checks]
+        return [*(arm.drives.gateway for arm in self.arms), *tools]
+
+    @property
+    def unchecked(self) -> list[CommandGateway]:
+        """The same of the other groups, which the checked ones may meet."""
+        return [tool.drives.gateway for tool in self.tools if not tool.checks]
+
+    def entries(self, period: float) -> list[Controller]:
+        """Return the controllers as the manager shows them.
+
+        Args:
+            period: Period of the cycle in [s].
+        """
+        return [entry for group in self._groups for entry in group.entries(period)]
+
+    @property
+    def _groups(self) -> Sequence[ArmMotion[AnyDrives] | ToolMotion[AnyDrives]]:
+        return (*self.arms, *self.tools)
 
 
 def _entry(

@@ -15,17 +15,19 @@ OWN_SERVICE = 'pause'
 """Service that the trajectory controller of this package has, and no other."""
 
 
-def watch_other_programs(nodes: Sequence[Node], output: str = '') -> None:
+def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> None:
     """Log an error for each program that moves the arm, too, when it appears.
 
     Args:
         nodes: The nodes of this program.
-        output: Topic on which set-points leave; empty for none.
+        outputs: Topics on which set-points leave.
     """
     known: set[str] = set()
 
     def look() -> None:
-        conflicts = {*same_names(nodes), *_around_output(nodes[0], output)}
+        conflicts = {*same_names(nodes)}.union(
+            *(_around_output(nodes[0], output) for output in outputs)
+        )
         for conflict in sorted(conflicts - known):
             nodes[0].get_logger().error(conflict)
         known.clear()
@@ -55,8 +57,6 @@ def same_names(nodes: Sequence[Node]) -> list[str]:
 
 def _around_output(node: Node, output: str) -> list[str]:
     """Return what is wrong with others that publish set-points, or that receive them."""
-    if not output:
-        return []
     topic = node.resolve_topic_name(output)
     publishers = node.get_publishers_info_by_topic(topic)
     conflicts = []

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, TYPE_CHECKING
 
 from arm_model import ModelError, RobotModel
@@ -12,18 +13,23 @@ from arm_model import ModelError, RobotModel
 if TYPE_CHECKING:
     from rclpy.node import Node
 
+    from arm_model.ros import GroupModels
+
+Declare = Callable[['Node'], object]
+"""Declares the parameters of a node."""
+
 EVERY_NODE = '/**'
 """Name in a parameter file that stands for all nodes."""
 
 
-def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tuple[str, str]]:
+def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what motion_node would refuse.
 
     They are asked themselves: the parameters are declared by the same functions, on nodes that
     are not there. This needs rclpy, and starts nothing.
 
     Args:
-        model: The arm.
+        models: The groups that are moved.
         document: A parameter file: nodes, ``ros__parameters``, parameters.
 
     Returns:
@@ -35,7 +41,7 @@ def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tup
     from .upstream_parameters import is_upstream
 
     problems = []
-    for name, declare in _nodes(model, document).items():
+    for name, declare in _nodes(models, document).items():
         sheet = ParameterSheet(name, _given(document, name))
         try:
             declare(sheet.node)
@@ -45,28 +51,35 @@ def check_parameters(model: RobotModel, document: Mapping[str, Any]) -> list[tup
     return problems
 
 
-def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable[[Node], object]]:
+def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declare]:
     """Return what declares the parameters of each node."""
     from arm_model.ros import same_robot
     from node_runner import ParameterReader
 
     from ..io.topic_output import ARRAY, declare_output, TRAJECTORY
     from .controller_manager import declare_manager
+    from .gripper.parameters import declare_gripper
     from .joint_state_broadcaster import declare_broadcaster
     from .servo.parameters import declare_servo, PREFIX
     from .topics_backend import declare_loop
     from .trajectory.parameters import declare_check, declare_trajectory
 
-    def manager(node: Node) -> None:
-        same_robot(node, model)
-        declare_manager(node, model)
+    main, *others = models.arms
 
-    def controller(node: Node) -> None:
-        declare_trajectory(node, model.joints)
+    def manager(node: Node) -> None:
+        same_robot(node, main)
+        declare_manager(node, main)
+
+    def controller(model: RobotModel, node: Node, *, checks: bool = True) -> None:
+        declare_trajectory(node, model.joints, checks=checks)
         declare_loop(node, '')
         declare_output(node, '', '', ARRAY)
 
-    def servo(node: Node) -> None:
+    def tool(model: RobotModel, node: Node) -> None:
+        controller(model, node, checks=False)
+        declare_gripper(node)
+
+    def servo(model: RobotModel, node: Node) -> None:
         same_robot(node, model)
         declare_servo(node, model)
         declare_loop(node, PREFIX)
@@ -74,12 +87,16 @@ def _nodes(model: RobotModel, document: Mapping[str, Any]) -> dict[str, Callable
         declare_check(ParameterReader(node, PREFIX))
 
     named = _given(document, 'controller_manager').get('controller_name')
-    return {
+    nodes: dict[str, Declare] = {
         'controller_manager': manager,
-        str(named or f'{model.group}_controller'): controller,
-        'servo_node': servo,
+        str(named or f'{main.group}_controller'): partial(controller, main),
+        'servo_node': partial(servo, main),
         'joint_state_broadcaster': declare_broadcaster,
     }
+    for model in others:
+        nodes[f'{model.group}_controller'] = partial(controller, model)
+        nodes[f'{model.group}_servo_node'] = partial(servo, model)
+    return nodes | {f'{model.group}_controller': partial(tool, model) for model in models.tools}
 
 
 def _given(document: Mapping[str, Any], node: str) -> dict[str, Any]:

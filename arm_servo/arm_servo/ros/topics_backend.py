@@ -1,13 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The back end for drives elsewhere: joint states in, a loop of its own, set-points out."""
+"""The back end for drives elsewhere: joint states in, a loop for each group, set-points out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 import threading
 import time
 
@@ -15,7 +14,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from arm_model import RobotModel
-from arm_model.ros import declare_robot, same_robot
+from arm_model.ros import declare_groups, declare_robot
 from node_runner import (
     declare_thread_priority,
     LINGER,
@@ -34,7 +33,7 @@ from ..io.joint_feedback import JointFeedback
 from ..io.motion_thread import MotionCycle, MotionThread
 from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
-from .group_motion import ArmMotion, Offers
+from .group_motion import ArmMotion, MakeNode, Offers, RobotMotion
 from .other_programs import watch_other_programs
 from .scene_listener import SceneListener
 from .servo.parameters import PREFIX
@@ -43,11 +42,9 @@ from .upstream_parameters import check_names
 THREAD_PRIORITY = 40
 """SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
 
-MakeNode = Callable[[str], Node]
-"""Makes the node of a name; it lives until the program ends."""
-
 ARRAY_TOPIC = 'forward_position_controller/commands'
-"""Default of command_out_topic, the name that ros2_controllers' examples use."""
+"""Default of command_out_topic, the name that ros2_controllers' examples use; that of a group
+beside the main one begins with the group's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +100,7 @@ def declare_loop(node: Node, prefix: str) -> LoopParameters:
 
 
 def serve_topics(stop: threading.Event, offers: Offers) -> None:
-    """Move an arm until stopped; it comes to rest before that ends.
+    """Move a robot until stopped; it comes to rest before that ends.
 
     Args:
         stop: Set by Ctrl-C and SIGTERM.
@@ -118,48 +115,66 @@ def serve_topics(stop: threading.Event, offers: Offers) -> None:
             nodes.append(node)
             return node
 
-        thread = build_motion(make_node, offers)
+        threads = build_motion(make_node, offers)
         for node in nodes:
             check_names(node)
         settle_process_memory(nodes[0])
-        thread.start(failed=stop.set)
-        stack.callback(thread.stop)
+        for thread in threads:
+            thread.start(failed=stop.set)
+            stack.callback(thread.stop)
         nodes[0].get_logger().info('ready for commands')
         notify_ready()
         spin(nodes, stop)
-        thread.end()
-        spin(nodes, thread.ended, linger=LINGER)  # goals get their results
-    if thread.error is not None:
-        raise thread.error
+        for thread in threads:
+            thread.end()
+        for thread in threads:
+            spin(nodes, thread.ended, linger=LINGER)  # goals get their results
+    for thread in threads:
+        if thread.error is not None:
+            raise thread.error
 
 
-def build_motion(make_node: MakeNode, offers: Offers) -> MotionThread:
-    """Put interfaces, core, feedback and output together; nothing runs yet.
+def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
+    """Put interfaces, cores, feedback and output together; nothing runs yet.
 
     Args:
-        make_node: Makes the nodes.
+        make_node: Makes the nodes; they live until the program ends.
         offers: What is offered to clients.
+
+    Returns:
+        The loop of each group.
     """
     if not offers.trajectories:
-        servo = make_node('servo_node')
-        model = declare_robot(servo)
-        topic = f'{model.group}_controller/joint_trajectory'
-        make_drives = partial(TopicDrives, servo, PREFIX, (topic, TRAJECTORY))
-        drives = ArmMotion(model, None, servo, make_drives).drives
-        watch_other_programs([servo], drives.topic)
-        return drives.thread
+        return [_beside_a_controller(make_node('servo_node'))]
     manager = make_node('controller_manager')
-    model = declare_robot(manager)
-    name, _ = declare_manager(manager, model)
-    controller = make_node(name)
-    make_drives = partial(TopicDrives, controller, '', (ARRAY_TOPIC, ARRAY))
-    jogging = make_node('servo_node') if offers.jogging else None
-    if jogging is not None:
-        same_robot(jogging, model)
-    arm = ArmMotion(model, controller, jogging, make_drives)
-    ControllerManager(manager, arm.entries(arm.drives.period))
-    watch_other_programs([manager, *arm.nodes], arm.drives.topic)
-    return arm.drives.thread
+    models = declare_groups(manager)
+    main = models.arms[0]
+    name, _ = declare_manager(manager, main)
+
+    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
+        topic = ARRAY_TOPIC if model is main else f'{model.group}_{ARRAY_TOPIC}'
+        return TopicDrives(node, model, settings, output=(topic, ARRAY))
+
+    robot = RobotMotion.build(models, name, make_node, offers, make_drives)
+    first = robot.drives[0]
+    SceneListener(manager, robot.checked, robot.unchecked, joint_topic=first.joint_topic)
+    ControllerManager(manager, robot.entries(first.period))
+    watch_other_programs([manager, *robot.nodes], [drives.topic for drives in robot.drives])
+    return [drives.thread for drives in robot.drives]
+
+
+def _beside_a_controller(servo: Node) -> MotionThread:
+    """Put a servo together that jogs the arm of a trajectory controller elsewhere."""
+    model = declare_robot(servo)
+    topic = f'{model.group}_controller/joint_trajectory'
+
+    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
+        return TopicDrives(node, model, settings, prefix=PREFIX, output=(topic, TRAJECTORY))
+
+    drives = ArmMotion(model, None, servo, make_drives).drives
+    SceneListener(servo, [drives.gateway], joint_topic=drives.joint_topic)
+    watch_other_programs([servo], [drives.topic])
+    return drives.thread
 
 
 class TopicDrives:
@@ -170,30 +185,32 @@ class TopicDrives:
         thread: Steps the core; not started yet.
         period: Period of its loop in [s].
         topic: Where set-points leave.
+        joint_topic: Joint states of the robot.
     """
 
     def __init__(
         self,
         node: Node,
-        prefix: str,
-        output: tuple[str, str],
         model: RobotModel,
         settings: CoreSettings,
+        *,
+        prefix: str = '',
+        output: tuple[str, str],
     ) -> None:
         """Declare how the loop runs, subscribe and advertise.
 
         Args:
             node: The node for that.
+            model: The group.
+            settings: How the core behaves.
             prefix: Before the names of its parameters, with its dot.
             output: Default of topic and type of the set-points.
-            model: The arm.
-            settings: How the core behaves.
         """
         for note in model.notes:
             node.get_logger().warning(note)
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
-        self.period, self.topic = loop.period, wanted.topic
+        self.period, self.topic, self.joint_topic = loop.period, wanted.topic, loop.joint_topic
         feedback = JointFeedback(model.joints, loop.joint_timeout)
 
         def receive(message: JointState) -> None:
@@ -203,7 +220,6 @@ class TopicDrives:
             raise_thread_priority(node, loop.priority, 'the motion loop')
 
         node.create_subscription(JointState, loop.joint_topic, receive, 10)
-        SceneListener(node, [self.gateway], joint_topic=loop.joint_topic)
         publish = TopicOutput(node, wanted, list(model.joints), loop.period)
         watch = FollowingWatch(model.limits, loop.following, loop.period)
         cycle = MotionCycle(self.gateway, feedback, publish, watch)

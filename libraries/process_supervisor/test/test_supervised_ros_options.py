@@ -210,7 +210,7 @@ def rate_of(name: str, ros: RosOptions) -> object:
     try:
         node = Node(name, context=context, automatically_declare_parameters_from_overrides=True)
         rate: object = node.get_parameter_or('rate').value
-        node.destroy_node()
+        node.destroy_node()  # type: ignore[no-untyped-call]
         return rate
     finally:
         rclpy.shutdown(context=context)

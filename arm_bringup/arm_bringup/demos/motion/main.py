@@ -25,7 +25,7 @@ from process_supervisor.arguments import seconds_from
 from ...description import joint_limits, read_semantic
 from ...exceptions import BringupError, RobotError
 from ...groups import moved_groups, MovedGroups
-from ...motion import controller_name, motion_files
+from ...motion import controller_names, motion_files
 from ...robots import Robot
 from ...session import (
     add_arguments,
@@ -83,7 +83,9 @@ def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups)
         groups: Its groups that are moved.
     """
     values = {
-        controller_name(robot, groups): {'ros__parameters': {'state_publish_rate': RATE}},
+        controller_names(robot, groups)[groups.names[0]]: {
+            'ros__parameters': {'state_publish_rate': RATE}
+        },
         'servo_node': {
             'ros__parameters': {
                 'moveit_servo': {
@@ -138,7 +140,7 @@ def run(arm: Session, groups: MovedGroups, duration: float | None) -> int:
     model = build_model(arm.robot, arm.urdf, groups.arms[0])
     start = choose_start(model)
     period = load_bus(arm.robot.bus_config).master.sync_period
-    controller = controller_name(arm.robot, groups)
+    controller = controller_names(arm.robot, groups)[groups.names[0]]
     limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
     if arm.start:
         sys.stdout.write(f'{arm.start}\n')

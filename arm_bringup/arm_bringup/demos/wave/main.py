@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
+import itertools
 import os
 import sys
 
@@ -22,6 +23,8 @@ from process_supervisor.arguments import seconds_from
 
 from ...description import joint_limits
 from ...exceptions import BringupError
+from ...groups import joints_of_groups, moved_groups, MovedGroups
+from ...robots import Robot
 from ...session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
 from ..figures import Figures
 from ..table import ArmView
@@ -93,6 +96,22 @@ def commands(joint: str, mode_service: str, candump: str, ros: RosOptions) -> li
     ]
 
 
+def waving_joints(robot: Robot, drives: Collection[str]) -> Collection[str]:
+    """Return the joints that wave: those of the groups that are asked for, else all with a drive.
+
+    Args:
+        robot: The robot.
+        drives: Names of its drives.
+
+    Raises:
+        RobotError: There is no such group.
+    """
+    if not robot.groups:
+        return drives
+    joints = joints_of_groups(robot, MovedGroups(moved_groups(robot).arms))
+    return list(itertools.chain(*joints.values()))
+
+
 def run(arm: Session, duration: float | None) -> int:
     """Run the demo.
 
@@ -110,6 +129,7 @@ def run(arm: Session, duration: float | None) -> int:
     if arm.start:
         sys.stdout.write(f'{arm.start}\n')
     bus_config = os.path.relpath(arm.robot.bus_config)
+    waving = waving_joints(arm.robot, arm.drives)
     view = ArmView(
         f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
         {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
@@ -121,7 +141,10 @@ def run(arm: Session, duration: float | None) -> int:
         figures=Figures(),
         commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
         make_scenario=lambda display: WaveScenario(
-            display, view.limits, arm.mode_service, duration
+            display,
+            {name: limits for name, limits in view.limits.items() if name in waving},
+            arm.mode_service,
+            duration,
         ),
         make_client=partial(join_ros, arm.ros.namespace),
         endless=duration is None,
