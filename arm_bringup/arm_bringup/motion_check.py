@@ -175,13 +175,13 @@ def _start(robot: Robot, model: RobotModel) -> Iterable[Finding]:
     clearance = model.clearance(start)
     if clearance < CLEARANCE:
         pair = model.nearest(start, CLEARANCE, 1)[0].links
-        yield error(
-            place,
-            f'{pair[0]} and {pair[1]} are {1e3 * clearance:.0f} mm apart'
-            if clearance > 0.0
-            else f'{pair[0]} and {pair[1]} collide, by {-1e3 * clearance:.0f} mm',
-            'move them apart, or disable the pair in the SRDF if they can never meet',
-        )
+        if clearance > 0.0:  # some links of an arm are as near as that wherever it is
+            problem = f'{pair[0]} and {pair[1]} are {1e3 * clearance:.0f} mm apart'
+            yield warning(place, problem, 'fine where they are never much further apart')
+            return
+        problem = f'{pair[0]} and {pair[1]} collide, by {-1e3 * clearance:.0f} mm'
+        remedy = 'move them apart, or disable the pair in the SRDF if they can never meet'
+        yield error(place, problem, remedy)
 
 
 def _controllers(
