@@ -1,11 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a state heeds constraints of joints, orientations and positions."""
+"""Constraints of joints, orientations and positions: whether states heed them, and which near do.
+
+Each is made of rows: a function of the joint positions that stays between two bounds, with its
+gradient. States are led to them by Newton steps of the rows that are broken (Berenson et al.,
+"Manipulation planning on constraint manifolds", ICRA 2009).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,13 +28,37 @@ from arm_model import (
     RobotModel,
     Sphere,
 )
+from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
 from .ik.link_kinematics import LinkKinematics, pose_error
 from .requests import OrientationConstraint, PathConstraints, PositionConstraint
+from .validity import Violation
 
 TOLERANCE = 1e-6
 """Rounding beyond a constraint that is let pass in [rad] and [m]."""
+
+
+STEP = 4e-3
+"""Turn of all joints together between two looks at a path in [rad] or [m]."""
+
+LEAST_ROOMS = 4.0
+"""Width of a constraint that a path can be kept in, in what may happen between two looks."""
+
+WIDEST = 0.1
+"""Half width beyond which the share of a constraint grows no more, in [rad] or [m]."""
+
+COARSE_LOOKS = 2000
+"""Looks at a path by which the others are laid out."""
+
+INNER = 0.8
+"""Share of a constraint into which a state is led that broke it."""
+
+MAX_ITERATIONS = 12
+"""Newton steps at most."""
+
+DAMPING = 1e-3
+"""Of the steps, for rows of which the joints can move one with another only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +77,38 @@ class ConstraintResult:
 HEEDED = ConstraintResult('', 0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Functions of the joint positions, and between what they are to be.
+
+    Attributes:
+        values: In [rad] or [m] (k).
+        lower: Least values (k).
+        upper: Greatest values (k).
+        gradients: By the joint positions (k, n).
+        room: How far a value changes between a look at a path and the middle to the next.
+    """
+
+    values: Array
+    lower: Array
+    upper: Array
+    gradients: Array
+    room: float
+
+    @property
+    def beyond(self) -> float:
+        """How far they are out of their bounds, in [rad] or [m]; 0 or less inside."""
+        return float(np.maximum(self.lower - self.values, self.values - self.upper).max())
+
+    def excess(self, share: float, rooms: float) -> Array:
+        """Return by how much each is to change (k), to be in a share of its bounds with rooms."""
+        half = 0.5 * (self.upper - self.lower)
+        inset = rooms * self.room + (1.0 - share) * np.minimum(half, WIDEST)
+        return self.values - np.clip(self.values, self.lower + inset, self.upper - inset)
+
+
 class ConstraintCheck:
-    """Looks at states of one arm; belongs to one thread."""
+    """Looks at states and paths of one arm; belongs to one thread."""
 
     def __init__(self, model: RobotModel, constraints: PathConstraints) -> None:
         """Prepare.
@@ -61,6 +121,8 @@ class ConstraintCheck:
             PlanningError: A link is unknown, or no joint moves it.
         """
         self._joints = tuple(model.joints)
+        self._limits = model.limits
+        self._reach = max(model.reach, 1.0)
         self._constraints = constraints
         names = {each.link for each in constraints.orientations}
         names |= {each.link for each in constraints.positions}
@@ -81,63 +143,182 @@ class ConstraintCheck:
         Args:
             positions: Joint positions in [rad] (n).
         """
-        place = dict(zip(self._joints, positions.tolist(), strict=True))
-        for name, (lower, upper) in self._constraints.joints.items():
-            beyond = max(lower - place[name], place[name] - upper)
-            yield _result(
-                beyond,
-                f'{name} is at {place[name]:.4f}, its constraint is {lower:.4f}..{upper:.4f}',
-            )
-        poses = {name: link.pose(positions) for name, link in self._links.items()}
+        for rows, words in self._all(positions):
+            beyond = rows.beyond
+            yield ConstraintResult(words(), beyond) if beyond > TOLERANCE else HEEDED
+
+    def heeds(self, positions: Array) -> bool:
+        """Whether all constraints hold, and go on to hold until the next look at a path.
+
+        Args:
+            positions: Joint positions in [rad] (n).
+        """
+        return not any(rows.excess(1.0, 1.0).any() for rows, _ in self._all(positions))
+
+    def projected(self, positions: Array) -> Array | None:
+        """Return a state that heeds the constraints near one that may not; None for none.
+
+        Args:
+            positions: Joint positions in [rad] (n).
+        """
+        state = positions
+        for _ in range(MAX_ITERATIONS):
+            rows = [each for each, _ in self._all(state)]
+            if not any(each.excess(1.0, 1.0).any() for each in rows):
+                return state
+            excess = np.concatenate([each.excess(INNER, 1.0) for each in rows])
+            broken = excess != 0.0
+            gradients = np.concatenate([each.gradients for each in rows])[broken]
+            square = gradients @ gradients.T + DAMPING**2 * np.eye(len(gradients))
+            step = gradients.T @ np.linalg.solve(square, excess[broken])
+            state = np.clip(state - step, self._limits.lower, self._limits.upper)
+        return None
+
+    def path(self, path: Path, *, at_looks: bool = False) -> Violation | None:
+        """Return where a path breaks a constraint first; None for nowhere.
+
+        Args:
+            path: The path.
+            at_looks: Constraints need not hold between two looks, as where one is held exactly
+                by a line.
+        """
+        coarse = np.linspace(0.0, path.duration, COARSE_LOOKS)
+        turned = np.abs(np.diff(path.positions(coarse), axis=0)).sum(axis=1)
+        along = np.concatenate(((0.0,), np.cumsum(turned)))
+        count = int(np.ceil(along[-1] / STEP)) + 1
+        times = np.interp(np.linspace(0.0, along[-1], count + 1), along, coarse)
+        for time, positions in zip(times.tolist(), path.positions(times), strict=True):
+            if not self.heeds(positions) and (not at_looks or self.violated(positions)):
+                return Violation(self.reason(positions), positions, time=time)
+        return None
+
+    def lines(self, places: Array) -> Violation | None:
+        """Return where straight motions break a constraint first; None for nowhere.
+
+        Args:
+            places: Joint positions in [rad] (m, n).
+        """
+        for begin, end in pairwise(places):
+            count = int(np.ceil(np.abs(end - begin).sum() / STEP)) + 1
+            for share in np.linspace(0.0, 1.0, count + 1).tolist():
+                positions = begin + share * (end - begin)
+                if not self.heeds(positions):
+                    return Violation(self.reason(positions), positions)
+        return None
+
+    def refuse_narrow(self, positions: Array) -> None:
+        """Refuse constraints that are narrower than what happens between two looks at a path.
+
+        Args:
+            positions: Joint positions of any state in [rad] (n).
+
+        Raises:
+            PlanningError: One is; the message says how wide it must be.
+        """
+        for rows, words in self._all(positions):
+            width, least = float((rows.upper - rows.lower).min()), LEAST_ROOMS * rows.room
+            if width < 0.0:
+                raise PlanningError(
+                    PlanningCode.PLANNING_FAILED, f'bounds contradict each other: {words()}'
+                )
+            if width < least:
+                raise PlanningError(
+                    PlanningCode.PLANNING_FAILED,
+                    f'a path constraint is {width:.4f} wide ({words()}), free motion needs'
+                    f' {least:.4f}; widen it, or plan with LIN or PTP',
+                )
+
+    def reason(self, positions: Array) -> str:
+        """Return in words why a state does not heed the constraints.
+
+        Args:
+            positions: Joint positions in [rad] (n) that do not.
+        """
+        return self.violated(positions) or 'it comes too near to the bounds of a path constraint'
+
+    def _all(self, positions: Array) -> Iterator[tuple[_Rows, Callable[[], str]]]:
+        """Yield the rows of each constraint, and what is to be said where they are broken."""
+        for name, bounds in self._constraints.joints.items():
+            yield self._joint(name, bounds, positions)
+        links = {name: link.pose_and_jacobian(positions) for name, link in self._links.items()}
         for turn in self._constraints.orientations:
-            yield _turned(turn, poses[turn.link])
+            yield _turned(turn, *links[turn.link])
         for point in self._constraints.positions:
-            yield _outside(point, poses[point.link])
+            yield self._placed(point, *links[point.link])
+
+    def _joint(
+        self, name: str, bounds: tuple[float, float], positions: Array
+    ) -> tuple[_Rows, Callable[[], str]]:
+        joint = self._joints.index(name)
+        gradient = np.zeros(len(self._joints))
+        gradient[joint] = 1.0
+        (lower, upper), place = bounds, float(positions[joint])
+        rows = _rows([(place, lower, upper, gradient)], 0.5 * STEP)
+        return (
+            rows,
+            lambda: f'{name} is at {place:.4f}, its constraint is {lower:.4f}..{upper:.4f}',
+        )
+
+    def _placed(
+        self, constraint: PositionConstraint, pose: Pose, jacobian: Array
+    ) -> tuple[_Rows, Callable[[], str]]:
+        arm = pose.rotation @ constraint.offset
+        point = pose.position + arm
+        moved = jacobian[:3] - np.cross(arm, jacobian[3:], axis=0)
+        room = 0.5 * STEP * (self._reach + float(np.linalg.norm(arm)))
+        regions = (_within(region, point, moved, room) for region in constraint.regions)
+        x, y, z = point.tolist()
+        words = f'link {constraint.link} is outside of its region, at ({x:.3f}, {y:.3f}, {z:.3f})'
+        return min(regions, key=lambda rows: rows.beyond), lambda: words
 
 
-def _result(beyond: float, violation: str) -> ConstraintResult:
-    return ConstraintResult(violation, beyond) if beyond > TOLERANCE else HEEDED
-
-
-def _turned(constraint: OrientationConstraint, pose: Pose) -> ConstraintResult:
+def _turned(
+    constraint: OrientationConstraint, pose: Pose, jacobian: Array
+) -> tuple[_Rows, Callable[[], str]]:
     wanted = Pose(constraint.rotation, pose.position)
     # the rotation vector about the axes that are wanted
-    off = np.abs(constraint.rotation.T @ pose_error(wanted, pose)[3:])
-    angles = ', '.join(f'{each:.3f}' for each in off.tolist())
-    allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
-    return _result(
-        float((off - constraint.tolerance).max()),
-        f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed',
-    )
+    turned = -constraint.rotation.T @ pose_error(wanted, pose)[3:]
+
+    def words() -> str:
+        angles = ', '.join(f'{abs(each):.3f}' for each in turned.tolist())
+        allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
+        return f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed'
+
+    gradients = constraint.rotation.T @ jacobian[3:]
+    bounds = constraint.tolerance
+    return _Rows(turned, -bounds, bounds, gradients, 0.5 * STEP), words
 
 
-def _outside(constraint: PositionConstraint, pose: Pose) -> ConstraintResult:
-    point = pose.position + pose.rotation @ constraint.offset
-    x, y, z = point.tolist()
-    return _result(
-        min(_beyond(region, point) for region in constraint.regions),
-        f'link {constraint.link} is outside of its region, at ({x:.3f}, {y:.3f}, {z:.3f})',
-    )
-
-
-def _beyond(region: PlacedShape, point: Array) -> float:
-    """Return how far a point of the root link is beyond a region in [m]; 0 or less inside."""
-    in_region = combined(inverse(region.pose), Pose(ORIGIN.rotation, point)).position
-    height = float(in_region[2])
-    aside = float(np.hypot(in_region[0], in_region[1]))
+def _within(region: PlacedShape, point: Array, moved: Array, room: float) -> _Rows:
+    """Return the rows of a point of the root link in a region; moved is its Jacobian (3, n)."""
+    place = combined(inverse(region.pose), Pose(ORIGIN.rotation, point)).position
+    moved = region.pose.rotation.T @ moved
+    aside = float(np.hypot(place[0], place[1]))
+    outward = (place[:2] / aside if aside else np.zeros(2)) @ moved[:2]
     match region.shape:
         case Box(x, y, z):
-            return float((np.abs(in_region) - 0.5 * np.array([x, y, z])).max())
+            half = 0.5 * np.array([x, y, z])
+            return _Rows(place, -half, half, moved, room)
         case Sphere(radius):
-            return float(np.linalg.norm(in_region)) - radius
+            away = float(np.linalg.norm(place))
+            gradient = (place / away if away else np.zeros(3)) @ moved
+            return _rows([(away, -np.inf, radius, gradient)], room)
         case Cylinder(radius, length):
-            return max(aside - radius, abs(height) - 0.5 * length)
+            height = (place[2], -0.5 * length, 0.5 * length, moved[2])
+            return _rows([(aside, -np.inf, radius, outward), height], room)
         case Cone(radius, length):
             # its tip is above its middle
-            at_height = radius * (0.5 - height / length)
-            return max(aside - at_height, abs(height) - 0.5 * length)
+            slope = radius / length
+            height = (place[2], -0.5 * length, 0.5 * length, moved[2])
+            shell = (aside + slope * place[2], -np.inf, 0.5 * radius, outward + slope * moved[2])
+            return _rows([shell, height], room * np.hypot(1.0, slope))
     raise PlanningError(
         PlanningCode.INVALID_GOAL_CONSTRAINTS,
         f'the region of a position constraint is a {type(region.shape).__name__}; use a box,'
         ' sphere, cylinder or cone',
     )
+
+
+def _rows(rows: Sequence[tuple[float, float, float, Array]], room: float) -> _Rows:
+    values, lower, upper, gradients = (np.array(column) for column in zip(*rows, strict=True))
+    return _Rows(values, lower, upper, gradients, float(room))

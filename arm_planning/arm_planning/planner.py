@@ -13,6 +13,7 @@ import numpy as np
 
 from arm_model import Array, checked, CommandError, PlanningScene, Pose, RobotModel
 
+from .constraints import ConstraintCheck
 from .exceptions import PlanningCode, PlanningError
 from .free.free_motion import FreeMotion
 from .free.timing import scaled_limits
@@ -71,10 +72,20 @@ class Planner:
         began = self._clock()
         scene = self._model.scene if scene is None else scene
         self._refuse(request)
+        constraints = None
+        if request.constraints is not None:
+            constraints = ConstraintCheck(self._model, request.constraints)
         if request.planner_id in PLANNER_IDS:
             plan = self._industrial.plan(request, scene)
+            broken = constraints and constraints.path(plan.path, at_looks=True)
+            if broken:
+                raise PlanningError(
+                    PlanningCode.INVALID_MOTION_PLAN,
+                    f'{request.planner_id} breaks a path constraint {broken.time:.2f} s on its'
+                    f' way: {broken.reason}; plan it as a free motion, or widen the constraint',
+                )
         else:
-            plan = self._free_motion(request, scene, began + request.timeout)
+            plan = self._free_motion(request, scene, began + request.timeout, constraints)
         return replace(plan, planning_time=self._clock() - began)
 
     def plan_sequence(
@@ -157,7 +168,11 @@ class Planner:
         return self._model.kinematics.link_pose(link or self._model.tip, state)
 
     def _free_motion(
-        self, request: MotionRequest, scene: PlanningScene, deadline: float
+        self,
+        request: MotionRequest,
+        scene: PlanningScene,
+        deadline: float,
+        constraints: ConstraintCheck | None,
     ) -> MotionPlan:
         """Return the quickest of the free motions that are found in as many attempts."""
 
@@ -168,10 +183,12 @@ class Planner:
         start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
         _require(check.state(start), 'start', _START_CODES)
         goals = self._goals(request, start, check)
+        if constraints is not None:
+            goals = _heeding(constraints, start, goals)
         limits = scaled_limits(
             self._model.limits, request.velocity_scaling, request.acceleration_scaling
         )
-        free = FreeMotion(limits, check, self._draw)
+        free = FreeMotion(limits, check, self._draw, constraints)
         paths = [free.plan(start, goals, expired)]
         with suppress(PlanningError):  # no time is left for further attempts
             while len(paths) < request.attempts:
@@ -231,16 +248,29 @@ class Planner:
             )
         if not request.goals:
             raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'the request has no goal')
-        if request.constraints is not None and request.planner_id not in PLANNER_IDS:
-            raise PlanningError(
-                PlanningCode.PLANNING_FAILED, 'free motion does not heed path constraints'
-            )
         for name in ('velocity_scaling', 'acceleration_scaling'):
             value = getattr(request, name)
             if not 0.0 < value <= 1.0:
                 raise PlanningError(
                     PlanningCode.FAILURE, f'{name} is {value}; it must be above 0 and up to 1'
                 )
+
+
+def _heeding(constraints: ConstraintCheck, start: Array, goals: Sequence[Array]) -> list[Array]:
+    """Return the goals that heed path constraints, or raise why there is no motion between."""
+    constraints.refuse_narrow(start)
+    if not constraints.heeds(start):
+        raise PlanningError(
+            PlanningCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
+            f'start: {constraints.reason(start)}; begin where the constraint holds',
+        )
+    found = [goal for goal in goals if constraints.heeds(goal)]
+    if not found:
+        raise PlanningError(
+            PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
+            f'goal: {constraints.reason(goals[0])}; choose a goal where the constraint holds',
+        )
+    return found
 
 
 def _require(

@@ -11,8 +11,10 @@ import numpy as np
 from arm_model import Array, JointLimits
 from arm_trajectory import Path
 
+from ..constraints import ConstraintCheck
 from ..exceptions import PlanningCode, PlanningError
 from ..validity import ValidityCheck, Violation
+from .constrained_check import ConstrainedCheck
 from .motion_check import MotionCheck
 from .rrt_connect import rrt_connect
 from .shortcut import shortened
@@ -26,7 +28,11 @@ class FreeMotion:
     """Plans free motions of one arm in one scene; belongs to one thread."""
 
     def __init__(
-        self, limits: JointLimits, check: ValidityCheck, draw: np.random.Generator
+        self,
+        limits: JointLimits,
+        check: ValidityCheck,
+        draw: np.random.Generator,
+        constraints: ConstraintCheck | None = None,
     ) -> None:
         """Prepare.
 
@@ -34,32 +40,35 @@ class FreeMotion:
             limits: Limits of the joints, scaled by the request.
             check: Has the last word on states and paths, in the scene of the motion.
             draw: Source of the random numbers.
+            constraints: What holds everywhere on the path; None for nothing.
         """
         self._limits, self._check, self._draw = limits, check, draw
+        self._constraints = constraints
 
     def plan(self, start: Array, goals: Sequence[Array], expired: Callable[[], bool]) -> Path:
         """Return a path to one of some goals, timed and valid.
 
         Args:
-            start: Joint positions in [rad] (n), valid.
-            goals: Alternatives in [rad] (k, n), valid.
+            start: Joint positions in [rad] (n), valid; constraints hold there.
+            goals: Alternatives in [rad] (k, n), valid; constraints hold there.
             expired: Whether the time is over.
 
         Raises:
             PlanningError: No path was found in time.
         """
         margin = min(self._check.least_margin(each) for each in (start, *goals))
-        motions = MotionCheck(self._check.scene, margin)
+        motions = MotionCheck(self._check.scene, margin, self._constraints)
+        check = ConstrainedCheck(self._check, self._constraints)
         near: Violation | None = None
         while not expired():
             places = rrt_connect(start, goals, self._sampler(start), motions, expired)
             if places is None:
                 break
             places = shortened(places, self._draw, motions, expired)
-            path = timed_path(places, self._limits, self._check)
+            path = timed_path(places, self._limits, check)
             if path is not None:
                 return path
-            near = self._check.waypoints(places)
+            near = check.waypoints(places)
             motions.refine()
         hint = '' if near is None else f'; the last one was refused: {near.reason}'
         raise PlanningError(

@@ -17,10 +17,20 @@ import pinocchio as pin
 
 from arm_model import Array, PlanningScene
 
+from ..constraints import ConstraintCheck
 from ..validity import MARGIN
 
 RESOLUTION = 0.03
 """Greatest motion of a shape against another between two places in [m]."""
+
+STRIDE = 0.15
+"""Length of a motion between two states that heed constraints in [rad]."""
+
+MIN_PROGRESS = 0.01
+"""By how much such a motion comes nearer to its target at least in [rad]."""
+
+LOOK = 0.03
+"""Turn of all joints together between two looks at constraints in [rad]."""
 
 MIN_RESOLUTION = 0.002
 """Finest resolution: from there on the places are those of the validity check."""
@@ -31,16 +41,23 @@ class MotionCheck:
 
     Attributes:
         resolution: Greatest motion of a shape against another between two places in [m].
+        constraints: What holds everywhere; None for nothing.
     """
 
-    def __init__(self, scene: PlanningScene, margin: float = MARGIN) -> None:
+    def __init__(
+        self,
+        scene: PlanningScene,
+        margin: float = MARGIN,
+        constraints: ConstraintCheck | None = None,
+    ) -> None:
         """Prepare.
 
         Args:
             scene: What may collide.
             margin: Distance that every pair keeps in [m].
+            constraints: What holds everywhere; None for nothing.
         """
-        self.resolution = RESOLUTION
+        self.resolution, self.constraints = RESOLUTION, constraints
         self._kinematics = scene.kinematics
         self._model, self._data = scene.kinematics.native, scene.kinematics.native.createData()
         self._rates = scene.distance_rate_bounds
@@ -79,7 +96,25 @@ class MotionCheck:
         motion = float((self._rates @ np.abs(way)).max(initial=0.0))
         shares = _coarse_first(math.ceil(motion / self.resolution) + 1)
         places = begin + shares[:, None] * way
-        return all(map(self.free, places))
+        if not all(map(self.free, places)):
+            return False
+        return self.constraints is None or _heeded(self.constraints, begin, way)
+
+    def towards(self, begin: Array, target: Array) -> Array | None:
+        """Return the next state on a motion that heeds the constraints; None where it ends.
+
+        Args:
+            begin: Joint positions in [rad] (n), which heed the constraints.
+            target: Joint positions in [rad] (n) that are nearer with each state.
+        """
+        way = target - begin
+        length = float(np.linalg.norm(way))
+        wanted = target if length <= STRIDE else begin + way * (STRIDE / length)
+        end = wanted if self.constraints is None else self.constraints.projected(wanted)
+        if end is None or float(np.linalg.norm(end - begin)) > 2.0 * STRIDE:
+            return None
+        left = float(np.linalg.norm(target - end))
+        return end if left < length - MIN_PROGRESS or left == 0.0 else None
 
     def refine(self) -> None:
         """Look twice as densely from now on, and without the broad phase.
@@ -88,6 +123,12 @@ class MotionCheck:
         """
         self.resolution = max(0.5 * self.resolution, MIN_RESOLUTION)
         self._exact = True
+
+
+def _heeded(constraints: ConstraintCheck, begin: Array, way: Array) -> bool:
+    """Whether constraints hold on a straight motion, as far as a quick look shows."""
+    shares = _coarse_first(math.ceil(float(np.abs(way).sum()) / LOOK) + 1)
+    return all(map(constraints.heeds, begin + shares[:, None] * way))
 
 
 @lru_cache(maxsize=1024)

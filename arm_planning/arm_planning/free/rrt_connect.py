@@ -3,7 +3,9 @@
 """RRT-Connect: two trees, from start and goals, grow towards each other.
 
 Kuffner, LaValle, "RRT-Connect: An efficient approach to single-query path planning", ICRA 2000;
-with the balancing of the trees that OMPL has. One is ours because the collision check decides
+with the balancing of the trees that OMPL has. Under constraints the trees grow by short edges
+whose ends are led back to them: Berenson et al., "Manipulation planning on constraint manifolds"
+(CBiRRT), ICRA 2009. One is ours because the collision check decides
 over its speed, and that of the scene is quicker here than a library's that calls back for each
 state; the bench has the comparison.
 """
@@ -107,6 +109,8 @@ def rrt_connect(
 def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
     """Grow a tree by an edge towards a target, and return its end; None where it is blocked."""
     near = tree.nearest(target)
+    if check.constraints is not None:
+        return _crawl(tree, near, target, check)
     begin = tree.state(near)
     way = target - begin
     length = float(np.linalg.norm(way))
@@ -114,6 +118,17 @@ def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:
         return near
     end = target if length <= MAX_EXTENSION else begin + way * (MAX_EXTENSION / length)
     return tree.add(end, near) if check.clear(begin, end) else None
+
+
+def _crawl(tree: _Tree, near: int, target: Array, check: MotionCheck) -> int | None:
+    """Grow a tree by several edges that heed the constraints, as CBiRRT does."""
+    node, begin = near, tree.state(near).copy()
+    while float(np.linalg.norm(target - begin)) >= SAME:
+        end = check.towards(begin, target)
+        if end is None or not check.clear(begin, end):
+            return node if node != near else None
+        node, begin = tree.add(end, node), end
+    return node
 
 
 def _connect(tree: _Tree, target: Array, check: MotionCheck) -> int | None:

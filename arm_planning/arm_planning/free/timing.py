@@ -17,7 +17,7 @@ import numpy as np
 from arm_model import Array, JointLimits, RobotState
 from arm_trajectory import build_path, GoalError, GoalPoint, GoalRules, Path, TrajectoryGoal
 
-from ..validity import ValidityCheck
+from .constrained_check import ConstrainedCheck
 
 ROUNDING_ROOM = 1.02
 """Factor of the least times, so that rounding errors break no limit."""
@@ -54,7 +54,7 @@ def scaled_limits(limits: JointLimits, velocity: float, acceleration: float) -> 
     )
 
 
-def timed_path(places: Array, limits: JointLimits, check: ValidityCheck) -> Path | None:
+def timed_path(places: Array, limits: JointLimits, check: ConstrainedCheck) -> Path | None:
     """Return a valid path along places; None where none is found.
 
     Args:

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Motions with path constraints: they hold everywhere, or there is no motion, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+import os
+
+from model_robots import ready, robot, ROBOTS
+import numpy as np
+from planning_scenes import broken_limits, deepest_overlap, dense_times, with_random_boxes
+import pytest
+
+from arm_model import Array, Box, Cylinder, frozen, ORIGIN, PlacedShape, Pose, RobotModel
+from arm_planning import (
+    JointGoal,
+    MotionRequest,
+    OrientationConstraint,
+    PathConstraints,
+    Planner,
+    PlanningCode,
+    PlanningError,
+    PoseGoal,
+    PositionConstraint,
+)
+from arm_planning.constraints import ConstraintCheck
+
+pytestmark = pytest.mark.slow
+
+SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '3')))
+"""Of the random scenes; more of them by the environment."""
+
+TIMEOUT = 60.0
+"""Time for planning in [s]: a busy machine is no failure."""
+
+OVERLAP_TOLERANCE = 1e-6
+"""Overlap that counts as rounding in [m]."""
+
+FREE_TURN = 4.0
+"""Tolerance of an axis about which a link may turn as it likes in [rad]."""
+
+APART, AROUND = 1.0, 0.9
+"""How far start and goal are apart at least, and from the ready pose at most, in [rad]."""
+
+
+def level(model: RobotModel) -> PathConstraints:
+    """Keep a cup level: turned about its axis only, which is that of the tool at ready."""
+    upright = model.pose(ready(model.name)).rotation
+    turn = OrientationConstraint(model.tip, upright, frozen([0.1, 0.1, FREE_TURN]))
+    return PathConstraints(orientations=[turn])
+
+
+def in_a_slab(model: RobotModel) -> PathConstraints:
+    """Keep a point before the tip at a height: in a flat box, or in a cylinder beside it."""
+    pose = model.pose(ready(model.name))
+    offset = frozen([0.0, 0.0, 0.05])
+    place = Pose(ORIGIN.rotation, frozen(pose.position + pose.rotation @ offset))
+    low = Pose(ORIGIN.rotation, frozen(place.position - [0.0, 0.0, 5.0]))
+    regions = [PlacedShape(Box(4.0, 4.0, 0.08), place), PlacedShape(Cylinder(0.1, 0.1), low)]
+    return PathConstraints(positions=[PositionConstraint(model.tip, offset, regions)])
+
+
+def by_joints(model: RobotModel) -> PathConstraints:
+    """Keep two joints near ready, and the cup level besides."""
+    at = dict(zip(model.joints, ready(model.name).tolist(), strict=True))
+    first, second = model.joints[:2]
+    joints = {name: (at[name] - 0.4, at[name] + 0.3) for name in (first, second)}
+    return replace(level(model), joints=joints)
+
+
+def ends(
+    model: RobotModel, check: ConstraintCheck, planner: Planner, seed: int
+) -> tuple[Array, Array]:
+    """Return two states far apart that are valid and heed constraints."""
+    draw, found = np.random.default_rng(seed), list[Array]()
+    scene = with_random_boxes(model, 5, seed)
+    while len(found) < 2:
+        drawn = ready(model.name) + draw.uniform(-AROUND, AROUND, len(model))
+        state = check.projected(np.clip(drawn, model.limits.lower, model.limits.upper))
+        if state is None or planner.is_valid(state, scene) is not None:
+            continue
+        if not found or np.linalg.norm(state - found[0]) > APART:
+            found.append(frozen(state))
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('constraints_of', [level, in_a_slab, by_joints])
+@pytest.mark.parametrize('seed', SEEDS)
+def test_path_constraints_hold_everywhere(
+    name: str, constraints_of: Callable[[RobotModel], PathConstraints], seed: int
+) -> None:
+    """In random scenes, looked at every milliradian; limits and distances hold as ever."""
+    model = robot(name)
+    scene, constraints = with_random_boxes(model, 5, seed), constraints_of(model)
+    check, planner = ConstraintCheck(model, constraints), Planner(model, seed=seed)
+    start, goal = ends(model, check, planner, seed)
+    asked = MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT, constraints=constraints)
+    path = planner.plan(asked, scene).path
+    looks = path.positions(dense_times(path))
+    assert [words for words in map(check.violated, looks) if words] == []
+    assert deepest_overlap(path, scene) > -OVERLAP_TOLERANCE
+    assert broken_limits(path, model.limits) == []
+    assert np.allclose(path.at(0.0).position, start, atol=1e-9)
+    assert np.allclose(path.end.position, goal, atol=1e-6)
+
+
+def test_it_is_the_constraint_that_keeps_the_cup_level() -> None:
+    """Without it the same motion tilts the tool by more than is allowed."""
+    model = robot('panda')
+    constraints = level(model)
+    check, planner = ConstraintCheck(model, constraints), Planner(model)
+    start, goal = ends(model, check, planner, seed=1)
+    path = planner.plan(MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT)).path
+    assert check.path(path) is not None
+
+
+def test_a_pose_is_reached_by_a_solution_that_heeds_the_constraints() -> None:
+    """Of the solutions of inverse kinematics those that do not are no goals."""
+    model = robot('gp110')
+    start = ready('gp110')
+    pose = model.pose(start)
+    aside = PoseGoal(Pose(pose.rotation, frozen(np.add(pose.position, [0.0, 0.3, 0.1]))))
+    asked = MotionRequest(start, [aside], timeout=TIMEOUT, constraints=level(model))
+    path = Planner(model).plan(asked).path
+    assert ConstraintCheck(model, level(model)).path(path) is None
+    assert model.pose(path.end.position).position == pytest.approx(aside.pose.position, abs=1e-5)
+
+
+def refusal(asked: MotionRequest) -> PlanningError:
+    """Return why a motion of the Panda is refused."""
+    with pytest.raises(PlanningError) as caught:
+        Planner(robot('panda')).plan(asked)
+    return caught.value
+
+
+def near_ready(**joints: tuple[float, float]) -> MotionRequest:
+    """Return a motion of the Panda's first joint by 0.5 rad under constraints of joints."""
+    start = ready('panda')
+    goal = start.copy()
+    goal[0] += 0.5
+    constraints = PathConstraints({f'panda_{name}': bounds for name, bounds in joints.items()})
+    return MotionRequest(start, [JointGoal(frozen(goal))], constraints=constraints)
+
+
+@pytest.mark.parametrize(
+    ('joints', 'code', 'words'),
+    [
+        ({'joint1': (0.2, 0.9)}, PlanningCode.START_STATE_VIOLATES_PATH_CONSTRAINTS, 'start: '),
+        ({'joint1': (-0.2, 0.2)}, PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS, 'goal: panda_j'),
+        ({'joint2': (-0.785, -0.784)}, PlanningCode.PLANNING_FAILED, '0.0010 wide'),
+        ({'joint2': (0.5, -0.5)}, PlanningCode.PLANNING_FAILED, 'contradict'),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    joints: dict[str, tuple[float, float]], code: PlanningCode, words: str
+) -> None:
+    """With MoveIt's code, the joint or the link, and what to do."""
+    error = refusal(near_ready(**joints))
+    assert error.code is code
+    assert words in str(error)
+
+
+def test_a_motion_of_pilz_that_breaks_a_constraint_is_refused() -> None:
+    """PTP, LIN and CIRC go their own way, which is looked at."""
+    asked = replace(near_ready(joint1=(-0.2, 0.2)), planner_id='PTP')
+    error = refusal(asked)
+    assert error.code is PlanningCode.INVALID_MOTION_PLAN
+    assert 'panda_joint1 is at 0.2' in str(error)
+    wide = near_ready(joint1=(-1.0, 1.0)).constraints
+    assert Planner(robot('panda')).plan(replace(asked, constraints=wide)).path.duration > 0.0
+
+
+def test_a_line_holds_a_turn_exactly() -> None:
+    """A constraint that is too narrow for free motion is none for LIN."""
+    model = robot('panda')
+    pose = model.pose(ready('panda'))
+    below = PoseGoal(Pose(pose.rotation, frozen(np.add(pose.position, [0.0, 0.0, -0.1]))))
+    turn = OrientationConstraint(model.tip, pose.rotation, frozen([1e-3] * 3))
+    narrow = PathConstraints(orientations=[turn])
+    line = MotionRequest(ready('panda'), [below], 'LIN', constraints=narrow)
+    assert Planner(model).plan(line).path.duration > 0.0
+    assert '0.0020 wide' in str(refusal(replace(line, planner_id='RRTConnect')))
