@@ -100,10 +100,17 @@ class _Rows:
         """How far they are out of their bounds, in [rad] or [m]; 0 or less inside."""
         return float(np.maximum(self.lower - self.values, self.values - self.upper).max())
 
+    @property
+    def half(self) -> Array:
+        """Half the width of the bounds (k); values without a least one are lengths."""
+        two_sided = np.isfinite(self.lower)
+        width = self.upper - np.where(two_sided, self.lower, -self.upper)
+        half: Array = 0.5 * width
+        return half
+
     def excess(self, share: float, rooms: float) -> Array:
         """Return by how much each is to change (k), to be in a share of its bounds with rooms."""
-        half = 0.5 * (self.upper - self.lower)
-        inset = rooms * self.room + (1.0 - share) * np.minimum(half, WIDEST)
+        inset = rooms * self.room + (1.0 - share) * np.minimum(self.half, WIDEST)
         return self.values - np.clip(self.values, self.lower + inset, self.upper - inset)
 
 
@@ -155,18 +162,19 @@ class ConstraintCheck:
         """
         return not any(rows.excess(1.0, 1.0).any() for rows, _ in self._all(positions))
 
-    def projected(self, positions: Array) -> Array | None:
+    def projected(self, positions: Array, *, rooms: float = 1.0) -> Array | None:
         """Return a state that heeds the constraints near one that may not; None for none.
 
         Args:
             positions: Joint positions in [rad] (n).
+            rooms: 1 for states of a path, 0 for one that nothing follows.
         """
         state = positions
         for _ in range(MAX_ITERATIONS):
             rows = [each for each, _ in self._all(state)]
-            if not any(each.excess(1.0, 1.0).any() for each in rows):
+            if not any(each.excess(1.0, rooms).any() for each in rows):
                 return state
-            excess = np.concatenate([each.excess(INNER, 1.0) for each in rows])
+            excess = np.concatenate([each.excess(INNER, rooms) for each in rows])
             broken = excess != 0.0
             gradients = np.concatenate([each.gradients for each in rows])[broken]
             square = gradients @ gradients.T + DAMPING**2 * np.eye(len(gradients))
@@ -216,7 +224,7 @@ class ConstraintCheck:
             PlanningError: One is; the message says how wide it must be.
         """
         for rows, words in self._all(positions):
-            width, least = float((rows.upper - rows.lower).min()), LEAST_ROOMS * rows.room
+            width, least = 2.0 * float(rows.half.min()), LEAST_ROOMS * rows.room
             if width < 0.0:
                 raise PlanningError(
                     PlanningCode.PLANNING_FAILED, f'bounds contradict each other: {words()}'

@@ -4,14 +4,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import islice
 import time
 
 import numpy as np
 
-from arm_model import Array, checked, CommandError, PlanningScene, Pose, RobotModel
+from arm_model import (
+    Array,
+    Box,
+    checked,
+    CommandError,
+    frozen,
+    ORIGIN,
+    PlacedShape,
+    PlanningScene,
+    Pose,
+    RobotModel,
+    Sphere,
+)
 
 from .constraints import ConstraintCheck
 from .exceptions import PlanningCode, PlanningError
@@ -22,11 +35,23 @@ from .industrial.limits import CartesianLimits
 from .industrial.planner import IndustrialPlanner, PLANNER_IDS
 from .industrial.sequence import SequenceItem
 from .link_speed import speed_limited
-from .requests import Goal, JointGoal, MotionPlan, MotionRequest
+from .requests import (
+    Goal,
+    JointGoal,
+    MotionPlan,
+    MotionRequest,
+    OrientationConstraint,
+    PathConstraints,
+    PoseGoal,
+    PositionConstraint,
+)
 from .validity import ValidityCheck, Violation
 
 FREE_MOTION = ('RRTConnectkConfigDefault', 'RRTConnect', 'geometric::RRTConnect')
 """Names of MoveIt and OMPL for the planner of free motion."""
+
+GOAL_SAMPLES = 60
+"""States that are led into the tolerances of a goal which cannot be reached itself, at most."""
 
 IK_SOLUTIONS = 4
 """Solutions of inverse kinematics that are goals of a free motion at most."""
@@ -231,12 +256,47 @@ class Planner:
 
     def _states(self, goal: Goal, start: Array, check: ValidityCheck) -> list[Array]:
         """Return the states of a goal, which are valid."""
+        try:
+            states = self._exact_states(goal, start, check)
+        except PlanningError as error:
+            if error.code not in _NOT_EXACTLY:
+                raise
+            states = list(islice(self._tolerated(goal, check), IK_SOLUTIONS))
+            if not states:
+                raise
+        return states
+
+    def _exact_states(self, goal: Goal, start: Array, check: ValidityCheck) -> list[Array]:
+        """Return the states at a goal itself, which are valid."""
         if isinstance(goal, JointGoal):
             state = self._state(goal.positions, 'goal', PlanningCode.INVALID_GOAL_CONSTRAINTS)
             _require(check.state(state), 'goal', _GOAL_CODES)
             return [state]
         states = self.ik(goal.pose, start, link=goal.link, scene=check.scene, count=IK_SOLUTIONS)
-        return [state for state in states if check.state(state) is None][:IK_SOLUTIONS]
+        valid = [state for state in states if check.state(state) is None]
+        if not valid:
+            _require(check.state(states[0]), 'goal', _GOAL_CODES)
+        return valid[:IK_SOLUTIONS]
+
+    def _tolerated(self, goal: Goal, check: ValidityCheck) -> Iterator[Array]:
+        """Yield states within the tolerances of a goal, which are valid."""
+        limits = self._model.limits
+        lower = np.where(limits.continuous, -np.pi, limits.lower)
+        upper = np.where(limits.continuous, np.pi, limits.upper)
+        if isinstance(goal, JointGoal):
+            tolerance = goal.tolerance if len(goal.tolerance) else np.zeros(len(lower))
+            lower = np.maximum(limits.lower, goal.positions - tolerance)
+            upper = np.minimum(limits.upper, goal.positions + tolerance)
+            tolerances = PathConstraints()
+        else:
+            tolerances = _pose_tolerances(goal, goal.link or self._model.tip)
+        if (lower > upper).any():
+            return  # beyond a limit by more than the tolerance
+        check_goal = ConstraintCheck(self._model, tolerances)
+        for _ in range(GOAL_SAMPLES):
+            state = check_goal.projected(self._draw.uniform(lower, upper), rooms=0.0)
+            if state is not None and check.state(state) is None:
+                yield frozen(state)
 
     def _refuse(self, request: MotionRequest) -> None:
         """Raise what is wrong with a request before anything is computed."""
@@ -254,6 +314,16 @@ class Planner:
                 raise PlanningError(
                     PlanningCode.FAILURE, f'{name} is {value}; it must be above 0 and up to 1'
                 )
+
+
+def _pose_tolerances(goal: PoseGoal, link: str) -> PathConstraints:
+    """Return what holds where a link reaches a goal."""
+    off = goal.position_tolerance
+    shape = Sphere(off) if isinstance(off, float) else Box(*(2.0 * np.asarray(off)).tolist())
+    region = PlacedShape(shape, Pose(ORIGIN.rotation, goal.pose.position))
+    place = PositionConstraint(link, ORIGIN.position, [region])
+    turn = OrientationConstraint(link, goal.pose.rotation, goal.orientation_tolerance)
+    return PathConstraints(orientations=[turn], positions=[place])
 
 
 def _heeding(constraints: ConstraintCheck, start: Array, goals: Sequence[Array]) -> list[Array]:
@@ -284,3 +354,5 @@ def _require(
 
 _START_CODES = (PlanningCode.START_STATE_INVALID, PlanningCode.START_STATE_IN_COLLISION)
 _GOAL_CODES = (PlanningCode.GOAL_STATE_INVALID, PlanningCode.GOAL_IN_COLLISION)
+_NOT_EXACTLY = (*_GOAL_CODES, PlanningCode.NO_IK_SOLUTION)
+"""Of goals that may be reached within their tolerances all the same."""

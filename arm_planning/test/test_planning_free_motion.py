@@ -12,7 +12,7 @@ import numpy as np
 from planning_scenes import broken_limits, deepest_overlap, with_box, with_random_boxes
 import pytest
 
-from arm_model import Array, frozen, ORIGIN, Pose
+from arm_model import Array, frozen, ORIGIN, PlanningScene, Pose, RobotModel
 from arm_planning import (
     JointGoal,
     MotionRequest,
@@ -243,3 +243,46 @@ def test_a_speed_limit_that_is_none_is_refused(
         error = refusal(Planner(robot('panda')), asked)
         assert error.code is code
         assert words in str(error)
+
+
+def with_a_post(model: RobotModel, positions: Array) -> PlanningScene:
+    """Return a scene with a box where the tip is at some positions."""
+    at = model.pose(positions).position
+    return with_box(model.scene, 'post', (0.1, 0.1, 0.1), tuple(at.tolist()))
+
+
+def test_a_joint_goal_in_contact_is_reached_within_its_tolerance() -> None:
+    """As MoveIt samples it; without a tolerance it is refused."""
+    model = robot('gp110')
+    goal = ready('gp110').copy()
+    goal[0] += 0.8
+    scene = with_a_post(model, goal)
+    tolerance = frozen([0.5, 0.1, 0.1, 0.1, 0.1, 0.1])
+    asked = MotionRequest(ready('gp110'), [JointGoal(frozen(goal), tolerance)], timeout=TIMEOUT)
+    path = Planner(model).plan(asked, scene).path
+    assert (np.abs(path.end.position - goal) <= tolerance + 1e-6).all()
+    assert deepest_overlap(path, scene) > -OVERLAP_TOLERANCE
+    with pytest.raises(PlanningError) as caught:
+        Planner(model).plan(request(ready('gp110'), frozen(goal)), scene)
+    assert caught.value.code is PlanningCode.GOAL_IN_COLLISION
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('box', [False, True])
+def test_a_pose_out_of_reach_is_reached_within_its_tolerance(name: str, *, box: bool) -> None:
+    """The middle of the region is beyond the arm, a part of it is not."""
+    model = robot(name)
+    pose = model.pose(ready(name))
+    away = pose.position / np.linalg.norm(pose.position)
+    far = Pose(pose.rotation, frozen(away * (1.3 * model.reach + 0.05)))
+    size = 0.6 * model.reach
+    near = PoseGoal(
+        far,
+        position_tolerance=frozen([size] * 3) if box else size,
+        orientation_tolerance=frozen([1.0, 1.0, 3.2]),
+    )
+    path = Planner(model).plan(MotionRequest(ready(name), [near], timeout=TIMEOUT)).path
+    off = model.pose(path.end.position).position - far.position
+    assert (np.abs(off).max() if box else np.linalg.norm(off)) <= size + 1e-6
+    exact = MotionRequest(ready(name), [PoseGoal(far)], timeout=TIMEOUT)
+    assert refusal(Planner(model), exact).code is PlanningCode.NO_IK_SOLUTION
