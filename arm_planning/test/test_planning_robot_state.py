@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import math
 
+from hypothesis import given
+from hypothesis import strategies as st
 from moveit_msgs.msg import RobotState
 import numpy as np
 from planning_messages import panda
@@ -13,9 +15,12 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from arm_model import ModelError
+from arm_model.ros import seconds
 from arm_planning import PlanningCode, PlanningError
+from arm_planning.ros.joint_trajectory import check_trajectory
 from arm_planning.ros.robot_groups import RobotGroups
-from arm_planning.ros.robot_state import joints_of
+from arm_planning.ros.robot_state import joints_of, trajectory_message
+from arm_trajectory import Path, Segment
 
 JOINTS = panda().joints
 
@@ -43,6 +48,24 @@ def test_joints_that_are_not_given_stand_in_their_range() -> None:
     inside = np.array([positions[JOINTS.index(name)] for name in model.joints])
     assert (inside >= model.limits.lower).all()
     assert (inside <= model.limits.upper).all()
+
+
+@given(st.lists(st.one_of(st.floats(1e-12, 1e-8), st.floats(1e-4, 2.0)), min_size=1, max_size=8))
+def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> None:
+    """A phase of a motion may be shorter than a nanosecond; the ends are where they are."""
+    starts = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
+    rates = np.random.default_rng(len(durations)).uniform(-1.0, 1.0, (len(durations), 2))
+    segments, place = [], np.zeros(2)
+    for start, duration, rate in zip(starts.tolist(), durations, rates, strict=True):
+        segments.append(Segment(start, duration, np.array([place, rate, *np.zeros((4, 2))])))
+        place = place + rate * duration
+    path = Path(segments)
+    trajectory = trajectory_message(['a', 'b'], path, 'base').joint_trajectory
+    check_trajectory(trajectory)
+    first, last = trajectory.points[0], trajectory.points[-1]
+    assert first.positions == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert last.positions.tolist() == path.end.position.tolist()
+    assert seconds(last.time_from_start) == pytest.approx(path.duration, abs=1e-9)
 
 
 def test_an_unknown_group_is_refused_with_the_known_ones() -> None:

@@ -75,9 +75,10 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
         path: The path.
         root: Name of the root link.
     """
-    times = [*path.starts.tolist(), path.duration]
+    # of ends in the same nanosecond the last one: points of equal time are no trajectory
+    ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}
     trajectory = JointTrajectory(header=Header(frame_id=root), joint_names=list(joints))
-    trajectory.points = [_point(path, time) for time in times]
+    trajectory.points = [_point(path, time) for time in ends.values()]
     return RobotTrajectory(joint_trajectory=trajectory)
 
 
