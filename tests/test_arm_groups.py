@@ -145,6 +145,23 @@ def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Ro
     assert [robot.at[name] for name in ARMS['left']] == pytest.approx([0.0] * 3, abs=1e-3)
 
 
+def test_the_panda_with_its_gripper_grips(isolation: Isolation) -> None:
+    """A ninth node on its bus opens and closes it; the other finger follows."""
+    command = ['ros2', 'run', 'arm_bringup', 'bringup', 'panda_hand', '--simulate', '--enable']
+    with (
+        RunningProcess([*command, '--can', isolation.bus], isolation.env) as bringup,
+        RosClient(isolation.domain_id) as client,
+    ):
+        bringup.wait_for('all 8 drives are enabled', 90.0)
+        robot = Robot(client)
+        fingers = ('panda_finger_joint1', 'panda_finger_joint2')
+        for place in (0.035, 0.0):
+            (hand,) = robot.results([robot.grip(place)])
+            assert (hand.status, hand.result.reached_goal) == (SUCCEEDED, True)
+            assert [robot.at[name] for name in fingers] == pytest.approx([place] * 2, abs=2e-3)
+        assert bringup.stop(30.0) == 0, bringup.output
+
+
 def test_a_trajectory_of_arm_and_gripper_is_split(isolation: Isolation, tmp_path: Path) -> None:
     """move_group has the arm follow it, and the gripper close where it ends."""
     margin = 'move_group:trajectory_execution.allowed_goal_duration_margin:=60.0'  # [s]

@@ -83,7 +83,7 @@ def check_motion(
             place = f'{robot.semantic.name} with {robot.description.name}'
             findings.append(error(place, str(problem), remedy))
             continue
-        notes.update(dict.fromkeys(model.notes))
+        notes.update(dict.fromkeys(model.notes if is_arm else model.notes_beside_contact))
         models[group] = model
         if is_arm:
             notes.update(dict.fromkeys(filter(None, [model.assumption(drives)])))

@@ -46,6 +46,7 @@ class RobotModel:
         poses: Named poses of the SRDF, in the order of the joints.
         end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.
+        notes_beside_contact: Those that are not about pairs of links that touch.
         kinematics: The joints of the group, and those that follow them; for any thread.
         allowed: What may touch by the SRDF, and what cannot help it.
         moved_by_others: Pairs of links that other groups move against each other, by group;
@@ -103,10 +104,15 @@ class RobotModel:
         if self._model.frames[self._base_frame].parentJoint:
             raise ModelError(f'group {self.group}: its base link {self.base!r} is moved by it')
         self._at = b''  # positions of the kinematics that are cached
-        allowed = AllowedCollisionMatrix.of_srdf(semantic)
+        allowed, contact_notes = AllowedCollisionMatrix.of_srdf(semantic), list[str]()
         self.scene = with_default_collisions(
-            PlanningScene(self.kinematics, shapes.by_link, allowed), tree, self.limits, notes
+            PlanningScene(self.kinematics, shapes.by_link, allowed),
+            tree,
+            self.limits,
+            contact_notes,
         )
+        self.notes_beside_contact = tuple(notes)
+        notes += contact_notes
         self.allowed = self.scene.allowed
         self.moved_by_others: Mapping[str, frozenset[Pair]] = {
             other: frozenset(_moved_by(self._tree, self.scene.link_shapes, joints))

@@ -32,6 +32,13 @@ class GroupModels:
     arms: Sequence[RobotModel]
     tools: Sequence[RobotModel] = ()
 
+    @property
+    def notes(self) -> list[str]:
+        """What there is to know of them, once each; tools may touch, so no pairs of theirs."""
+        of_arms = [note for model in self.arms for note in model.notes]
+        of_tools = [note for model in self.tools for note in model.notes_beside_contact]
+        return list(dict.fromkeys((*of_arms, *of_tools)))
+
 
 @dataclass(frozen=True, slots=True)
 class Description:

@@ -144,8 +144,7 @@ class CanopenMotion:
         self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
         for node in self.nodes:
             check_names(node)
-        notes = [note for model in (*models.arms, *models.tools) for note in model.notes]
-        for note in dict.fromkeys(notes):
+        for note in models.notes:
             manager.get_logger().warning(note)
 
     def _attach_first(self) -> None:

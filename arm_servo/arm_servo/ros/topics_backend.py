@@ -148,6 +148,8 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
         return [_beside_a_controller(make_node('servo_node'))]
     manager = make_node('controller_manager')
     models = declare_groups(manager)
+    for note in models.notes:
+        manager.get_logger().warning(note)
     main = models.arms[0]
     name, _ = declare_manager(manager, main)
 
@@ -166,6 +168,8 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
 def _beside_a_controller(servo: Node) -> MotionThread:
     """Put a servo together that jogs the arm of a trajectory controller elsewhere."""
     model = declare_robot(servo)
+    for note in model.notes:
+        servo.get_logger().warning(note)
     topic = f'{model.group}_controller/joint_trajectory'
 
     def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
@@ -206,8 +210,6 @@ class TopicDrives:
             prefix: Before the names of its parameters, with its dot.
             output: Default of topic and type of the set-points.
         """
-        for note in model.notes:
-            node.get_logger().warning(note)
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)
         self.gateway = CommandGateway(MotionCore(model, settings), start_worker())
         self.period, self.topic, self.joint_topic = loop.period, wanted.topic, loop.joint_topic
