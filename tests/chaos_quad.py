@@ -147,10 +147,13 @@ class QuadVictim:
     def _reasons(self) -> str:
         """Return what the last diagnostics complain of."""
         return '; '.join(
-            status.message
-            for message in self._diagnostics[-20:]
-            for status in message.status
-            if status.level == DiagnosticStatus.ERROR
+            dict.fromkeys(
+                words
+                for message in self._diagnostics[-20:]
+                for status in message.status
+                if status.level == DiagnosticStatus.ERROR
+                for words in status.message.split('; ')
+            )
         )
 
     def _stays(self) -> None:

@@ -56,6 +56,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         'trajectories and jogging; with --simulate also the drives themselves. Ctrl-C stops and '
         'disables the drives and ends everything.',
         epilog=robots_epilog(),
+        allow_abbrev=False,
     )
     default_bus = f'{REAL_BUS}; with --simulate {SIMULATED_BUS}, which is vcan0 when it is there'
     add_arguments(parser, default_bus=default_bus)

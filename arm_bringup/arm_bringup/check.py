@@ -138,6 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         description='Report what is missing or inconsistent in a robot folder: bus.yml, joint '
         'names in it, description, SRDF and limits; a start that is singular or in collision.',
         epilog=robots_epilog(),
+        allow_abbrev=False,
     )
     add_robot(parser)
     try:

@@ -99,15 +99,34 @@ def choose_groups(
         if idle := [joint for joint in joints[name] if joint not in drives]:
             raise RobotError(f'bus.yml has no drive for {", ".join(idle)} of group {name}; {hint}')
     driven = [name for name, each in joints.items() if each and set(each) <= set(drives)]
-    arms = robot.groups or _disjoint([name for name in semantic.arms if name in driven], joints)
+    own = _arms_named_as_tools(semantic, tree, joints)
+    candidates = [name for name in driven if name in semantic.arms or name in own]
+    arms = robot.groups or _disjoint(candidates, joints)
     arms = arms or tuple(driven[:1])
     if not arms:
         raise RobotError(f'no group of {robot.semantic.name} has a drive for each joint; {hint}')
-    tools = [name for name in semantic.tools if name in driven]
+    tools = [name for name in semantic.tools if name in driven and name not in own]
     chosen = _disjoint([*arms, *tools], joints)
     if shared := [name for name in arms if name not in chosen]:
         raise RobotError(f'group {shared[0]} shares joints with {chosen[0]}; {hint}')
     return MovedGroups(arms, chosen[len(arms) :])
+
+
+def _arms_named_as_tools(
+    semantic: SemanticDescription, tree: KinematicTree, joints: Mapping[str, Sequence[str]]
+) -> set[str]:
+    """Return groups of end effectors that move the link which carries these: they are the arms.
+
+    SRDFs of other planners than MoveIt name the arm there.
+    """
+    return {
+        each.group
+        for each in semantic.end_effectors
+        if each.parent_link in tree.links
+        and not {joint.name for joint in tree.chain(tree.root, each.parent_link)}.isdisjoint(
+            joints.get(each.group, ())
+        )
+    }
 
 
 def _joints(name: str, semantic: SemanticDescription, tree: KinematicTree) -> Sequence[str]:

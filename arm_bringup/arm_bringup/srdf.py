@@ -32,6 +32,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         'pairs are sampled anew, but for those whose reason begins with User. The SRDF is '
         'printed, the report goes to stderr.',
         epilog=robots_epilog(),
+        allow_abbrev=False,
     )
     add_robot(parser)
     parser.add_argument(

@@ -17,7 +17,7 @@ from arm_bringup.bringup import parse
 from arm_bringup.demos.wave.main import waving_joints
 from arm_bringup.description import expand_xacro, read_description, read_semantic
 from arm_bringup.exceptions import DescriptionError, RobotError
-from arm_bringup.groups import choose_groups, MovedGroups
+from arm_bringup.groups import choose_groups, moved_groups, MovedGroups
 from arm_bringup.robots import find_robot, Robot
 from arm_bringup.session import locate
 
@@ -119,6 +119,15 @@ def test_the_tip_of_a_robot_yaml_without_group_is_that_of_the_default_one(tmp_pa
         file.write('tip_link: left_lift_link\n')
     for argv, tip in (([], True), (['--group', 'left'], True), (['--group', 'right'], False)):
         assert bool(locate(parse([place, *argv])[0]).tip_link) == tip
+
+
+def test_an_arm_that_is_named_as_an_end_effector_is_an_arm(tmp_path: Path) -> None:
+    """SRDFs of other planners do so; the gripper stays one."""
+    folder = write_two_arms(tmp_path / 'two_arms')
+    file = folder / 'two_arms.srdf'
+    own = '<end_effector name="tool" parent_link="left_roll_link" group="left"/></robot>'
+    file.write_text(file.read_text().replace('</robot>', own))
+    assert moved_groups(found(folder)) == MovedGroups(('left', 'right'), ('hand',))
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,10 @@ def test_late_answers_judge_no_path() -> None:
     ('measure', 'words'),
     [
         (lambda r: r.square('square', Square(0.1, 0.1, 1e-4, 4e-3)), '4.0 mm off its line'),
+        (
+            lambda r: r.square('square', Square(0.1, 0.11, 1e-4, 1e-4, limited='x')),
+            'instead of 0.100 m/s',
+        ),
         (lambda r: r.square('square', Square(0.1, 0.09, 1e-4, 1e-4)), 'instead of 0.100 m/s'),
         (lambda r: r.singularity(0.5, 0.1, 'trapped'), 'came back 0.100 m of 0.500 m; trapped'),
         (lambda r: r.singularity(0.0, 0.0, ''), 'no reason given'),
@@ -91,3 +95,12 @@ def test_each_failure_has_its_reason(measure: object, words: str) -> None:
     measure(results)
     (problem,) = results.problems
     assert words in problem
+
+
+def test_an_arm_that_may_not_be_as_quick_has_done_well() -> None:
+    """Without a file of limits its accelerations are low; the servo says so."""
+    results = Results()
+    slow = Square(0.1, 0.07, 1e-4, 1e-4, limited='joint acceleration: elbow, 0.7x')
+    results.square('square', slow)
+    assert results.problems == []
+    assert 'allow no more: joint acceleration: elbow' in results.lines()[0]

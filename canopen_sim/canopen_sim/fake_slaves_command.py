@@ -17,7 +17,7 @@ from .simulation import simulated_devices
 def run(argv: Sequence[str] | None = None) -> int:
     """Simulate until Ctrl-C or SIGTERM; return the exit code."""
     parser = argparse.ArgumentParser(
-        description='Simulate every device of a bus.yml, without ROS.'
+        description='Simulate every device of a bus.yml, without ROS.', allow_abbrev=False
     )
     parser.add_argument(
         'bus_config', metavar='BUS.yml', help='bus.yml whose devices are simulated'

@@ -217,6 +217,7 @@ def _parser() -> argparse.ArgumentParser:
         'It listens only, also beside a running master.',
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
     )
     add = parser.add_argument
     add(

@@ -44,6 +44,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         'mode is requested, by teleop_keyboard or /set_mode. Ctrl-C lets it lie down and '
         'ends everything; Ctrl-C again ends it at once, and the servos hold their last position '
         '(the bridge folds legs that were walking).',
+        allow_abbrev=False,
     )
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument(

@@ -14,7 +14,9 @@ from .presets import PRESETS, robot_urdf
 
 def run(argv: Sequence[str] | None = None) -> int:
     """Print the URDF that the arguments request; return the exit code."""
-    parser = argparse.ArgumentParser(description='Print the URDF of the quadruped.')
+    parser = argparse.ArgumentParser(
+        description='Print the URDF of the quadruped.', allow_abbrev=False
+    )
     parser.add_argument('--preset', default='lite', choices=PRESETS, help='the robot')
     parser.add_argument('--arm', action='store_true', help='with the arm on its back')
     parser.add_argument(

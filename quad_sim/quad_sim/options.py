@@ -50,6 +50,7 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog='fake_xgo',
         description='A simulated XGO on a pseudo-terminal that speaks both serial protocols.',
+        allow_abbrev=False,
     )
     add = parser.add_argument
     add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')

@@ -99,6 +99,8 @@ class Network:
         self._feedback_due = self._round_open = False
         self._watch_at = 0.0
         self._defects: dict[object, float] = {}  # when each may be reported again, by its place
+        self._pauses: list[float] = []  # hold-ups since one was reported
+        self._pause_reported = -NEVER
         self._sync_counter = SyncCounter(master.sync_overflow)
         self._heartbeat = HeartbeatProducer(master.node_id, master.heartbeat_producer, self.send)
         self._time = TimeProducer(
@@ -345,10 +347,25 @@ class Network:
         if parsed is not None:
             self._note_nmt(*parsed)
 
-    def note_pause(self, late: float) -> None:
-        """Say that a cycle came late by so many [s], before its consequences show."""
+    def note_pause(self, late: float, now: float) -> None:
+        """Say that a cycle came late, before its consequences show.
+
+        On a busy computer once in a while, with what there was since.
+
+        Args:
+            late: How late in [s].
+            now: Steady time in [s].
+        """
         watched = self.config.master.heartbeat_timeout
+        if now - self._pause_reported < DEFECT_PERIOD and not 0 < watched < late:
+            self._pauses.append(late)
+            return
         text = f'the cycle was held up for {late * 1000:.0f} ms by this computer'
+        if self._pauses:
+            longest = max(self._pauses) * 1000
+            text += f', and {len(self._pauses)} times before, for {longest:.0f} ms at most'
+        self._pause_reported = now
+        self._pauses.clear()
         if 0 < watched < late:
             text += (
                 f'; devices that wait {watched * 1000:.0f} ms for the heartbeat of the master '

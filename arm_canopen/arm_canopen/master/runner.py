@@ -134,7 +134,7 @@ class NetworkThread:
         frames = self._thread.receive(0.0)
         self._take([frame for frame in frames if frame.timestamp < now])
         if cycle.late > REPORTED_LATENESS:
-            self._log_defects(partial(self.network.note_pause, cycle.late))
+            self._log_defects(partial(self.network.note_pause, cycle.late, now))
         self._log_defects(partial(self.network.cycle, now, self.period))
         self._take([frame for frame in frames if frame.timestamp >= now])
         self._update_when_due(now)  # the deadline may have passed before anybody looks again

@@ -586,12 +586,22 @@ def test_a_pause_of_the_cycle_is_reported_with_its_consequence() -> None:
     net = VirtualNetwork(
         bus_config(drive_config('a', 2), heartbeat_producer=0.1, heartbeat_timeout=0.3)
     )
-    net.network.note_pause(0.2)
-    net.network.note_pause(0.6)
+    net.network.note_pause(0.2, 1.0)
+    net.network.note_pause(0.6, 1.5)
     short, long = net.reported(Severity.WARNING)
     assert 'held up for 200 ms' in short
     assert 'taken it for dead' not in short
     assert 'taken it for dead' in long
+
+
+def test_pauses_of_a_busy_computer_are_summed_up() -> None:
+    """A line for each would bury what matters."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2)))
+    for number in range(50):
+        net.network.note_pause(0.12 + number * 1e-3, 0.5 * number)
+    lines = net.reported(Severity.WARNING)
+    assert len(lines) == 3
+    assert 'held up for 160 ms by this computer, and 19 times before, for 159 ms' in lines[-1]
 
 
 def test_devices_do_not_miss_a_master_that_has_taken_its_leave() -> None:

@@ -46,6 +46,7 @@ def add_parser(parsers: SubParsers) -> None:
         description='Read every object of a device that bus.yml configures, and show where it '
         'differs; without bus.yml every object that has a default in the EDS. Nothing is written. '
         'Exit code: 0 when all is equal, 1, 2 wrong usage.',
+        allow_abbrev=False,
     )
     add_node_arguments(parser)
     parser.add_argument(

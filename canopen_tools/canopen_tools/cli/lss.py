@@ -42,6 +42,7 @@ def add_parser(parsers: SubParsers) -> None:
         help='find devices without node id, set node ids and bit rates',
         description='Layer setting services (CiA 305). Devices are set one at a time; at the end '
         'all are in the waiting state again.',
+        allow_abbrev=False,
     )
     verbs = parser.add_subparsers(title='verbs', metavar='VERB', required=True)
     scan = verbs.add_parser(
@@ -49,15 +50,19 @@ def add_parser(parsers: SubParsers) -> None:
         help='find devices without node id',
         description='Find every device without a node id by fast scan. Exit code: 0, 1 when '
         'there is none, 2 wrong usage.',
+        allow_abbrev=False,
     )
     scan.set_defaults(run=run_scan)
-    inquire = verbs.add_parser('inquire', help='read the address and node id of a device')
+    inquire = verbs.add_parser(
+        'inquire', help='read the address and node id of a device', allow_abbrev=False
+    )
     inquire.set_defaults(run=run_inquire)
     setting = verbs.add_parser(
         'set',
         help='give a device a node id or a bit rate',
         description='Give a device a node id or a bit rate. Without --address and --only it is '
         'the first one without node id that fast scan finds.',
+        allow_abbrev=False,
     )
     setting.set_defaults(run=run_set)
     _add_settings(setting)

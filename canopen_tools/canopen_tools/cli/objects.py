@@ -44,6 +44,7 @@ def add_parser(parsers: SubParsers) -> None:
         help='read objects of a device by name or number',
         description='Read objects of a device by SDO. OBJECT is a number (0x6041, 0x607D:02), or '
         'with --bus-config or --eds a name ("Statusword", "Software position limit/Max").',
+        allow_abbrev=False,
     )
     add_node_arguments(reader)
     reader.add_argument('objects', metavar='OBJECT', nargs='+')
@@ -54,6 +55,7 @@ def add_parser(parsers: SubParsers) -> None:
         help='write an object of a device by name or number',
         description='Write an object of a device by SDO, and read it back. VALUE is a number, '
         'true or false, a text, or bytes in hexadecimal, as the type of the object is.',
+        allow_abbrev=False,
     )
     add_node_arguments(writer)
     writer.add_argument('object', metavar='OBJECT')

@@ -83,6 +83,7 @@ def add_parser(parsers: SubParsers) -> None:
         description='List the devices on a bus. It listens first; without a master on the bus it '
         'reads the identity of every node id. Exit code: 0; 1 when there is no device, or with '
         '--bus-config when one is missing or another one; 2 wrong usage.',
+        allow_abbrev=False,
     )
     add_bus_arguments(parser)
     parser.add_argument(

@@ -104,6 +104,6 @@ def conclude(
     failures = [] if scenario.left else result.problems
     if outcome.exit_code:
         failures = [explain(outcome), *failures]
-    for line in failures:
+    for line in dict.fromkeys(failures):
         write(f'error: {line}')
     return 1 if failures else 0

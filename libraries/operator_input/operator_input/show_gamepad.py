@@ -22,7 +22,7 @@ def main() -> None:
     """Entry point: prints each change until Ctrl-C."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser = argparse.ArgumentParser(description=main.__doc__, allow_abbrev=False)
     parser.add_argument('--preset', default=AUTO, help='auto, xbox, ps or generic')
     parser.add_argument('--device', default='', help='path, or expression for the name')
     options = parser.parse_args()

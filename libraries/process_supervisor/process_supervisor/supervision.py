@@ -278,7 +278,8 @@ class Supervision:
                 continue
             late = f'{name} did not get ready within {child.spec.ready_timeout:g} s'
             if child.spec.required:
-                self._fail(name, late, now)
+                remedy = 'on a busy computer allow more with --timeout'
+                self._fail(name, f'{late}; {remedy}', now)
                 return
             child.ready = True
             self._say(f'{late}; going on without it', Severity.WARNING)

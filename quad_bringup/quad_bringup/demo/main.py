@@ -39,6 +39,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         description='Bring a simulated quadruped up, let it stand up, walk, turn, strafe, stop '
         'and lie down. In a terminal a live table shows what it does; elsewhere a line every few '
         'seconds. Ctrl-C lets it lie down and ends everything.',
+        allow_abbrev=False,
     )
     add_arguments(parser)
     parser.add_argument(

@@ -92,6 +92,7 @@ def _physics(urdf: str, servo: str) -> Backend:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description='Compare an ONNX policy with the robot, and let it walk in physics.',
+        allow_abbrev=False,
     )
     parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')

@@ -109,10 +109,14 @@ _PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry}
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     kinds = parser.add_subparsers(dest='what', required=True)
-    joints = kinds.add_parser('joints', help='signs, offsets and limits; moves joints by hand')
-    imu = kinds.add_parser('imu', help='how the IMU is mounted; tilts the robot by hand')
+    joints = kinds.add_parser(
+        'joints', help='signs, offsets and limits; moves joints by hand', allow_abbrev=False
+    )
+    imu = kinds.add_parser(
+        'imu', help='how the IMU is mounted; tilts the robot by hand', allow_abbrev=False
+    )
     for kind in (joints, imu):
         kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
@@ -133,7 +137,9 @@ def _parser() -> argparse.ArgumentParser:
     joints.add_argument('--joint', action='append', default=[], help='only this one; repeatable')
     joints.add_argument('--limits', action='store_true', help='record the ends of the travel, too')
     joints.add_argument('--zero-only', action='store_true', help='all offsets at once, in a jig')
-    odometry = kinds.add_parser('odometry', help='scale; walks while bringup runs')
+    odometry = kinds.add_parser(
+        'odometry', help='scale; walks while bringup runs', allow_abbrev=False
+    )
     odometry.add_argument('--axis', choices=('x', 'y'), default='x', help='(%(default)s)')
     odometry.add_argument('--distance', type=_positive, default=1.0, help='[m] (%(default)s)')
     odometry.add_argument('--speed', type=_positive, default=0.15, help='[m/s] (%(default)s)')

@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
     parser.add_argument(
         '--duration', type=float, default=3.0, help='of listening to topics [s] (%(default)s)'

@@ -62,6 +62,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         'frame and in its own, into the straight arm and back, a trajectory with a speed override '
         'in its middle, and one that is canceled. Ends with what was measured.',
         epilog=robots_epilog(),
+        allow_abbrev=False,
     )
     add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
     parser.add_argument(

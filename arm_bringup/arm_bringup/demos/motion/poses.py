@@ -153,6 +153,6 @@ def free_end(model: RobotModel, begin: Array) -> Array:
     for way in WAYS:
         end = beside(begin, model.limits, way)
         for target in (end, np.clip(2.0 * begin - end, model.limits.lower, model.limits.upper)):
-            if is_free(model, begin, target):
+            if (target != begin).any() and is_free(model, begin, target):
                 return target
     raise ModelError(f'group {model.group}: links are in the way of all trajectories')

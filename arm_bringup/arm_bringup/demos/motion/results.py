@@ -38,6 +38,7 @@ class Square:
         measured: The same of the measured tool in [m].
         missed: PDOs of drives that came late: joints of different times are not where the tool is.
         gap: Longest time between two jog commands in [s].
+        limited: What the servo said that limits the motion; empty for nothing.
     """
 
     asked: float
@@ -46,6 +47,7 @@ class Square:
     measured: float
     missed: int = 0
     gap: float = 0.0
+    limited: str = ''
 
 
 @dataclass(slots=True)
@@ -96,6 +98,8 @@ class Results:
                     f'; speed not judged: jog commands were up to {square.gap:.2f} s apart, this '
                     'computer is too busy'
                 )
+            elif square.limited and square.reached < square.asked:
+                figures += f'; the limits of this arm allow no more: {square.limited}'
             else:
                 problem = (
                     f'the tool moved at {square.reached:.4f} m/s instead of {square.asked:.3f} m/s'

@@ -108,6 +108,7 @@ class MotionSequence:
         self.enter(f'a square in the {name}')
         speeds, commanded, measured, gap = [], 0.0, 0.0, 0.0
         missed = self.client.figures.bus.missed_pdos
+        self.client.limited.clear()
         for way in SIDES:
             begin = self.client.last
             axes = self.model.pose(begin.position, frame).rotation
@@ -124,7 +125,8 @@ class MotionSequence:
             measured = max(measured, away_from_line(tools, begin.measured_tool, direction))
         reached = min(speeds, key=lambda speed: -abs(speed - SPEED))
         missed = self.client.figures.bus.missed_pdos - missed
-        square = Square(SPEED, reached, commanded, measured, missed, gap)
+        limited = (self.client.limited or [''])[-1]
+        square = Square(SPEED, reached, commanded, measured, missed, gap, limited)
         self.results.square(f'square, {name}', square)
 
     def singularity(self) -> None:

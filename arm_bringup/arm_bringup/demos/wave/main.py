@@ -49,6 +49,7 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
         'terminal a live table shows what it does; elsewhere a line every few seconds. Ctrl-C '
         'stops the wave, disables the drives and ends everything.',
         epilog=robots_epilog(),
+        allow_abbrev=False,
     )
     add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
     parser.add_argument(
