@@ -15,6 +15,9 @@ import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import service_manager, TIMEOUT
 
+from arm_bringup import bringup
+from arm_bringup.demos.wave import main as demo
+
 pytestmark = pytest.mark.slow
 
 PANDA = Path(__file__).parents[1] / 'robots' / 'panda'
@@ -209,3 +212,15 @@ def test_systemd_gets_readiness_and_the_stop(
             process.communicate(timeout=TIMEOUT)
             assert manager.recv(100) == b'STOPPING=1'
         assert process.returncode == 0
+
+
+@pytest.mark.parametrize(
+    'words', [['--simulat'], ['--simulate', '--enabl'], ['--can', 'x', '--e']]
+)
+def test_an_option_that_is_cut_short_moves_nothing(words: list[str]) -> None:
+    """It is not taken for the one that it begins."""
+    with pytest.raises(SystemExit) as end:
+        bringup.parse(['panda', *words])
+    assert end.value.code == 2
+    with pytest.raises(SystemExit):
+        demo.parse(['panda', '--dur', '5'])

@@ -14,6 +14,8 @@ import pytest
 from small_bringup import read_until, SmallWorkspace
 from small_processes import service_manager, TIMEOUT
 
+from quad_bringup import bringup
+
 pytestmark = pytest.mark.slow
 
 LINES = {
@@ -158,3 +160,11 @@ def test_systemd_gets_readiness_and_the_stop(
             process.communicate(timeout=TIMEOUT)
             assert manager.recv(100) == b'STOPPING=1'
         assert process.returncode == 0
+
+
+@pytest.mark.parametrize('words', [['--simulat'], ['--port', '/dev/ttyAMA0', '--hol']])
+def test_an_option_that_is_cut_short_moves_nothing(words: list[str]) -> None:
+    """It is not taken for the one that it begins."""
+    with pytest.raises(SystemExit) as end:
+        bringup.parse(words)
+    assert end.value.code == 2
