@@ -27,7 +27,7 @@ help:
 	@echo 'make test       build everything and run all tests'
 	@echo 'make check      lint, types, and the tests that take no time: between two edits'
 	@echo 'make build      build every package; then: source env.sh'
-	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling'
+	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers'
 	@echo 'make bench      print the figures'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
 	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'

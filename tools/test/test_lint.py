@@ -27,6 +27,8 @@ done
 echo "seen by $1"
 """
 
+QUIET = ('lint-imports', 'vulture', 'codespell', 'hadolint', 'check-jsonschema')
+
 
 def install(root: Path, script: str) -> Layout:
     """Make a checkout without packages, with a ruff that is a script."""
@@ -35,7 +37,7 @@ def install(root: Path, script: str) -> Layout:
     folder.mkdir(parents=True)
     programs = {
         'ruff': script,
-        **dict.fromkeys(('lint-imports', 'vulture', 'codespell'), '#!/bin/sh\n'),
+        **dict.fromkeys(QUIET, '#!/bin/sh\n'),
     }
     for name, source in programs.items():
         (folder / name).write_text(source, encoding='ascii')

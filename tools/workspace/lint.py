@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs every check that reads the code: style, types, layers, dead code, spelling."""
+"""Runs every check that reads the code: style, types, layers, dead code, spelling, containers."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ import subprocess
 from .layout import Layout
 from .packages import find_packages
 from .process import clean_environment
+
+COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose Specification
 
 
 def type_check_units(root: Path) -> dict[str, list[Path]]:
@@ -53,7 +55,7 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         for package in find_packages(layout.root).values()
         if package.build_type == 'ament_python'
     ]
-    tools, tests = layout.root / 'tools', layout.root / 'tests'
+    tools, tests, docker = (layout.root / name for name in ('tools', 'tests', 'docker'))
     commands: list[list[str | Path]] = [
         [bin_folder / 'ruff', 'check', '.'],
         [bin_folder / 'ruff', 'format', '--check', '.'],
@@ -61,6 +63,8 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         [bin_folder / 'vulture', *packages, tools, tests, layout.root / 'conftest.py'],
         [bin_folder / 'codespell'],
         [bin_folder / 'codespell', '--toml', layout.root / 'tools' / 'words.toml'],
+        [bin_folder / 'hadolint', '--config', docker / 'hadolint.yaml', docker / 'Dockerfile'],
+        [bin_folder / 'check-jsonschema', *COMPOSE_SCHEMA, layout.root / 'compose.yaml'],
     ]
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name
