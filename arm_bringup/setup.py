@@ -63,6 +63,7 @@ setup(
         sibling('libraries/urdf_reader'),
     ],
     extras_require={
+        'test': ['pytest'],
         'motion': [
             'numpy>=1.26',
             sibling('arm_model'),

@@ -52,7 +52,7 @@ setup(
         sibling('libraries/realtime_loop'),
         sibling('libraries/urdf_reader'),
     ],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

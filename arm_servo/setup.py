@@ -55,7 +55,8 @@ setup(
         sibling('libraries/urdf_reader'),
     ],
     extras_require={
-        'ros': [sibling('libraries/node_runner'), sibling('libraries/operator_input')]
+        'test': ['pytest'],
+        'ros': [sibling('libraries/node_runner'), sibling('libraries/operator_input')],
     },
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -31,6 +31,7 @@ setup(
         ('share/arm_trajectory', ['package.xml']),
     ],
     install_requires=['numpy>=1.26', 'ruckig>=0.19', sibling('arm_model')],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

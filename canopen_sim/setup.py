@@ -45,7 +45,7 @@ setup(
         ),
     ],
     install_requires=[sibling('arm_canopen')],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -44,6 +44,7 @@ setup(
         ('share/canopen_tools', ['package.xml']),
     ],
     install_requires=['python-can>=4.3', sibling('arm_canopen')],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -49,12 +49,13 @@ setup(
         sibling('quad_description'),
     ],
     extras_require={
+        'test': ['pytest'],
         'ros': [
             sibling('quad_hardware'),
             sibling('quad_sim'),
             sibling('quad_teleop'),
             sibling('robot_viewer'),
-        ]
+        ],
     },
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -44,6 +44,7 @@ setup(
     ],
     install_requires=['numpy>=1.26', 'onnxruntime>=1.19', sibling('quad_description')],
     extras_require={
+        'test': ['pytest'],
         'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')],
         'physics': [sibling('quad_sim')],
     },

@@ -54,7 +54,7 @@ setup(
         ('share/quad_description/model', model_files()),
     ],
     install_requires=['PyYAML>=6', 'xacro>=2'],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=False,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

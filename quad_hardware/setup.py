@@ -55,7 +55,8 @@ setup(
         sibling('quad_description'),
     ],
     extras_require={
-        'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')]
+        'test': ['pytest'],
+        'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')],
     },
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -38,7 +38,7 @@ setup(
         sibling('quad_description'),
         sibling('quad_hardware'),
     ],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

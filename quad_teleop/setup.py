@@ -42,7 +42,7 @@ setup(
         ('share/quad_teleop/config', ['config/twist_mux.yaml']),
     ],
     install_requires=[sibling('libraries/operator_input'), sibling('quad_description')],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -39,7 +39,7 @@ setup(
         ('share/robot_viewer', ['package.xml']),
     ],
     install_requires=[sibling('libraries/urdf_reader')],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

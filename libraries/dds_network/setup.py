@@ -14,6 +14,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/dds_network']),
         ('share/dds_network', ['package.xml']),
     ],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=False,  # Fast DDS reads the profile from its file
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -31,6 +31,7 @@ setup(
         ('share/demo_runner', ['package.xml']),
     ],
     install_requires=['rich>=13', sibling('libraries/process_supervisor')],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

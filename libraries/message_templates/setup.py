@@ -14,6 +14,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/message_templates']),
         ('share/message_templates', ['package.xml']),
     ],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -31,6 +31,7 @@ setup(
         ('share/node_runner', ['package.xml']),
     ],
     install_requires=[sibling('libraries/dds_network'), sibling('libraries/realtime_loop')],
+    extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -44,7 +44,7 @@ setup(
         ('share/operator_input', ['package.xml']),
     ],
     install_requires=['evdev>=1.6; sys_platform == "linux"'],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

@@ -31,7 +31,7 @@ setup(
         ('share/process_supervisor', ['package.xml']),
     ],
     install_requires=['PyYAML>=6', sibling('libraries/dds_network')],
-    extras_require={'ros': [sibling('libraries/node_runner')]},
+    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',

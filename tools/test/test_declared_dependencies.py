@@ -5,18 +5,21 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 import re
 import runpy
 import shutil
 import sys
 from typing import Any
+import xml.etree.ElementTree as ET
 
 import pytest
+import yaml
 
 from workspace.layout import this_checkout
 from workspace.packages import find_packages
+from workspace.rosdep import KEYS
 
 LAYOUT = this_checkout()
 PACKAGES = {
@@ -29,25 +32,31 @@ DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
 ON_PYPI |= {'rich', 'ruckig', 'xacro'}
-ROSDEP = {
-    'PyYAML': 'python3-yaml',
-    'evdev': 'python3-evdev',
-    'msgpack': 'python3-msgpack',
-    'numpy': 'python3-numpy',
-    'onnxruntime': 'python3-onnxruntime-pip',
-    'pyserial': 'python3-serial',
-    'python-can': 'python3-can',
-    'rich': 'python3-rich',
-    'xacro': 'xacro',
+ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
+"""Keys of rosdep for them."""
+OF_TESTS = {
+    'canopen': 'canopen-pip',
+    'hypothesis': 'python3-hypothesis',
+    'onnx': 'python3-onnx-pip',
+    'pytest': 'python3-pytest',
 }
-"""Keys of rosdep for those that have one."""
+"""Keys of rosdep for what only tests import."""
+PROGRAMS = {'iproute2', 'tmux'}
+"""Keys of rosdep for programs that tests start."""
 STARTED = {'arm_bringup': {'canopen_sim', 'robot_viewer'}}
 STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_viewer'}}
 """Packages whose executables a bring-up starts; it imports nothing of them."""
 OPTIONAL = {
-    'arm_bringup': {'arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'python3-numpy'}
+    'arm_bringup': {
+        *('arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'python3-numpy'),
+        *('control_msgs', 'moveit_msgs'),
+    }
 }
 """Packages that are used where they are built, and that colcon need not build for this one."""
+FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}
+"""Packages whose commands look at what a bring-up started."""
+OWN = {'quad_hardware': {'quad_hardware', 'xgo_lib2'}}
+"""Modules of a package, where there are others than the one of its name."""
 PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
 
@@ -64,7 +73,9 @@ def described(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     """Return the requirements of a package, extras included: name and versions."""
     keywords = described(PACKAGES[name].folder, monkeypatch)
-    extras = keywords.get('extras_require', {}).values()
+    extras = (
+        lines for name, lines in keywords.get('extras_require', {}).items() if name != 'test'
+    )
     lines = [*keywords.get('install_requires', []), *(line for lines in extras for line in lines)]
     split = (re.match(r'([\w-]+)\s*(.*)', line) for line in lines)
     return {match[1]: match[2] for match in split if match is not None}
@@ -73,17 +84,22 @@ def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
 def imported(folder: Path) -> Iterator[str]:
     """Yield the packages that modules import, but for those that only type checkers do."""
     for path in folder.rglob('*.py'):
-        todo: list[ast.AST] = [ast.parse(path.read_text(encoding='utf-8'))]
-        while todo:
-            node = todo.pop()
-            if isinstance(node, ast.If) and getattr(node.test, 'id', '') == 'TYPE_CHECKING':
-                todo += node.orelse
-                continue
-            if isinstance(node, ast.Import):
-                yield from (alias.name.partition('.')[0] for alias in node.names)
-            elif isinstance(node, ast.ImportFrom) and not node.level:
-                yield (node.module or '').partition('.')[0]
-            todo += ast.iter_child_nodes(node)
+        yield from modules_of(path)
+
+
+def modules_of(path: Path) -> Iterator[str]:
+    """Yield the packages that one module imports."""
+    todo: list[ast.AST] = [ast.parse(path.read_text(encoding='utf-8'))]
+    while todo:
+        node = todo.pop()
+        if isinstance(node, ast.If) and getattr(node.test, 'id', '') == 'TYPE_CHECKING':
+            todo += node.orelse
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition('.')[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            yield (node.module or '').partition('.')[0]
+        todo += ast.iter_child_nodes(node)
 
 
 @pytest.mark.slow
@@ -107,6 +123,79 @@ def test_what_pip_installs_is_declared_for_colcon_and_rosdep(
     keys = named & PACKAGES.keys() | {ROSDEP[each] for each in named & ROSDEP.keys()}
     missing = keys - PACKAGES[name].dependencies - OPTIONAL.get(name, set())
     assert not missing, f'add an exec_depend to {name}/package.xml'
+
+
+def keys(name: str, *tags: str) -> set[str]:
+    """Return what package.xml names under these tags."""
+    elements = ET.parse(PACKAGES[name].folder / 'package.xml').getroot()  # noqa: S314
+    return {(element.text or '').strip() for element in elements if element.tag in tags}
+
+
+def keys_of_imports(modules: Iterable[str]) -> set[str]:
+    """Return the keys of what is imported, but for Python's own library."""
+    names = {each for each in modules if each not in sys.stdlib_module_names}
+    distributions = {DISTRIBUTIONS.get(each, each) for each in names}
+    return {{**ROSDEP, **OF_TESTS}.get(each, each) for each in distributions}
+
+
+def helpers() -> set[str]:
+    """Return the modules beside all tests, which tests import by their name."""
+    folders = [folder for each in PACKAGES.values() for folder in each.folder.glob('t*')]
+    folders += [LAYOUT.root / 'tests']
+    return {path.stem for folder in folders for path in folder.rglob('*.py')}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', PACKAGES)
+def test_what_is_imported_has_its_key(name: str) -> None:
+    """`rosdep install` and colcon find in package.xml what the modules import, and no more."""
+    folder = PACKAGES[name].folder
+    modules = {*imported(folder / name), *imported(folder / 'launch')} - OWN.get(name, {name})
+    found = keys(name, 'exec_depend', 'depend')
+    needed = keys_of_imports(modules) | STARTED.get(name, set()) | FOR_PEOPLE.get(name, set())
+    missing = needed - found - OPTIONAL.get(name, set())
+    assert not missing, f'add an exec_depend to {name}/package.xml'
+    assert not found - needed, f'{name} imports none of these: remove them from its package.xml'
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('name', PACKAGES)
+def test_what_tests_import_has_its_key(name: str) -> None:
+    """As a test_depend, unless the modules need it, too."""
+    own, found = keys(name, 'exec_depend', 'depend'), keys(name, 'test_depend')
+    modules = {*imported(PACKAGES[name].folder / 'test')} - helpers() - OWN.get(name, {name})
+    missing = keys_of_imports(modules) - own - found - OPTIONAL.get(name, set())
+    assert not missing, f'add a test_depend to {name}/package.xml'
+    assert not found & own, f'{name}/package.xml names these twice'
+
+
+def test_every_key_is_known_to_rosdep() -> None:
+    """A key is of this checkout or of ROS, or stands in one of the lists above."""
+    ours = yaml.safe_load((LAYOUT.root / 'tools' / 'rosdep.yaml').read_text())
+    public = {*ROSDEP.values(), *OF_TESTS.values(), *PROGRAMS} - ours.keys()
+    named = {key for name in PACKAGES for key in keys(name, 'exec_depend', 'test_depend')}
+    python = {key for key in named if key.startswith('python3-') or key.endswith('-pip')}
+    assert python <= public | ours.keys()
+    assert ours.keys() <= named
+    for key, systems in ours.items():
+        assert systems['ubuntu'] == systems['debian']
+        (distribution,) = systems['ubuntu']['pip']['packages']
+        assert {**ROSDEP, **OF_TESTS}[distribution] == key
+
+
+def test_every_key_that_the_container_skips_is_used() -> None:
+    """A key that no package names would hide one that is misspelt."""
+    named = {key for name in PACKAGES for key in keys(name, 'exec_depend')}
+    assert {*KEYS.values()} <= named
+
+
+@pytest.mark.parametrize('name', PACKAGES)
+def test_colcon_test_runs_pytest(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where setup.py does not name it, colcon runs no test and reports success."""
+    extras = described(PACKAGES[name].folder, monkeypatch).get('extras_require', {})
+    assert (PACKAGES[name].folder / 'test').is_dir()
+    assert 'pytest' in extras.get('test', [])
+    assert 'python3-pytest' in keys(name, 'test_depend')
 
 
 @pytest.mark.parametrize('name', PACKAGES)
