@@ -131,6 +131,12 @@ def test_only_the_bus_is_set_up_with_rights() -> None:
     assert last_users[-1] == 'ubuntu'
 
 
+def test_the_user_is_in_groups_of_every_ubuntu() -> None:
+    """Others, such as `input`, come with packages that an image lacks, and differ in number."""
+    groups = re.findall(r'usermod --append --groups (\S+) ubuntu', DOCKERFILE)
+    assert groups == ['dialout']
+
+
 def copied() -> Iterator[str]:
     """Yield what the Dockerfile copies from the checkout."""
     for line in re.findall(r'^COPY (?!--from)(.*)$', DOCKERFILE, re.MULTILINE):
