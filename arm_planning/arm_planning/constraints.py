@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 
 from arm_model import (
     Array,
@@ -115,7 +116,11 @@ class _Rows:
 
 
 class ConstraintCheck:
-    """Looks at states and paths of one arm; belongs to one thread."""
+    """Looks at states and paths of one arm; belongs to one thread.
+
+    Attributes:
+        constraints: What must hold.
+    """
 
     def __init__(self, model: RobotModel, constraints: PathConstraints) -> None:
         """Prepare.
@@ -130,7 +135,7 @@ class ConstraintCheck:
         self._joints = tuple(model.joints)
         self._limits = model.limits
         self._reach = max(model.reach, 1.0)
-        self._constraints = constraints
+        self.constraints = constraints
         names = {each.link for each in constraints.orientations}
         names |= {each.link for each in constraints.positions}
         self._links = {name: LinkKinematics(model, name) for name in names}
@@ -246,12 +251,12 @@ class ConstraintCheck:
 
     def _all(self, positions: Array) -> Iterator[tuple[_Rows, Callable[[], str]]]:
         """Yield the rows of each constraint, and what is to be said where they are broken."""
-        for name, bounds in self._constraints.joints.items():
+        for name, bounds in self.constraints.joints.items():
             yield self._joint(name, bounds, positions)
         links = {name: link.pose_and_jacobian(positions) for name, link in self._links.items()}
-        for turn in self._constraints.orientations:
+        for turn in self.constraints.orientations:
             yield _turned(turn, *links[turn.link])
-        for point in self._constraints.positions:
+        for point in self.constraints.positions:
             yield self._placed(point, *links[point.link])
 
     def _joint(
@@ -292,9 +297,14 @@ def _turned(
         allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
         return f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed'
 
-    gradients = constraint.rotation.T @ jacobian[3:]
+    # of the rotation vector by the turn of the link, about the wanted axes
+    by_turn = pin.Jlog3(constraint.rotation.T @ pose.rotation).T
+    gradients = by_turn @ constraint.rotation.T @ jacobian[3:]
     bounds = constraint.tolerance
-    return _Rows(turned, -bounds, bounds, gradients, 0.5 * STEP), words
+    # it changes quicker than the link turns, the quickest at half a turn; of the farthest until
+    # the next look
+    half = 0.5 * min(float(np.linalg.norm(turned)) + STEP, np.pi)
+    return _Rows(turned, -bounds, bounds, gradients, 0.5 * STEP * half / np.sin(half)), words
 
 
 def _within(region: PlacedShape, point: Array, moved: Array, room: float) -> _Rows:

@@ -97,20 +97,10 @@ class Planner:
         began = self._clock()
         scene = self._model.scene if scene is None else scene
         self._refuse(request)
-        constraints = None
-        if request.constraints is not None:
-            constraints = ConstraintCheck(self._model, request.constraints)
         if request.planner_id in PLANNER_IDS:
             plan = self._industrial.plan(request, scene)
-            broken = constraints and constraints.path(plan.path, at_looks=True)
-            if broken:
-                raise PlanningError(
-                    PlanningCode.INVALID_MOTION_PLAN,
-                    f'{request.planner_id} breaks a path constraint {broken.time:.2f} s on its'
-                    f' way: {broken.reason}; plan it as a free motion, or widen the constraint',
-                )
         else:
-            plan = self._free_motion(request, scene, began + request.timeout, constraints)
+            plan = self._free_motion(request, scene, began + request.timeout)
         return replace(plan, planning_time=self._clock() - began)
 
     def plan_sequence(
@@ -193,11 +183,7 @@ class Planner:
         return self._model.kinematics.link_pose(link or self._model.tip, state)
 
     def _free_motion(
-        self,
-        request: MotionRequest,
-        scene: PlanningScene,
-        deadline: float,
-        constraints: ConstraintCheck | None,
+        self, request: MotionRequest, scene: PlanningScene, deadline: float
     ) -> MotionPlan:
         """Return the quickest of the free motions that are found in as many attempts."""
 
@@ -207,9 +193,11 @@ class Planner:
         check = self._checked_in(scene)
         start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
         _require(check.state(start), 'start', _START_CODES)
-        goals = self._goals(request, start, check)
-        if constraints is not None:
-            goals = _heeding(constraints, start, goals)
+        constraints = None
+        if request.constraints is not None:
+            constraints = ConstraintCheck(self._model, request.constraints)
+            _require_start(constraints, start)
+        goals = self._goals(request, start, check, constraints)
         limits = scaled_limits(
             self._model.limits, request.velocity_scaling, request.acceleration_scaling
         )
@@ -246,22 +234,30 @@ class Planner:
         except CommandError as error:
             raise PlanningError(code, str(error)) from error
 
-    def _goals(self, request: MotionRequest, start: Array, check: ValidityCheck) -> list[Array]:
+    def _goals(
+        self,
+        request: MotionRequest,
+        start: Array,
+        check: ValidityCheck,
+        constraints: ConstraintCheck | None,
+    ) -> list[Array]:
         """Return the states of all goals that are valid, or raise what is wrong with the first."""
         found = []
         for goal in request.goals:
             with suppress(PlanningError):
-                found += self._states(goal, start, check)
-        return found or self._states(request.goals[0], start, check)
+                found += self._states(goal, start, check, constraints)
+        return found or self._states(request.goals[0], start, check, constraints)
 
-    def _states(self, goal: Goal, start: Array, check: ValidityCheck) -> list[Array]:
-        """Return the states of a goal, which are valid."""
+    def _states(
+        self, goal: Goal, start: Array, check: ValidityCheck, constraints: ConstraintCheck | None
+    ) -> list[Array]:
+        """Return the states of a goal, which are valid and heed path constraints."""
         try:
-            states = self._exact_states(goal, start, check)
+            states = _heeding(constraints, self._exact_states(goal, start, check))
         except PlanningError as error:
             if error.code not in _NOT_EXACTLY:
                 raise
-            states = list(islice(self._tolerated(goal, check), IK_SOLUTIONS))
+            states = list(islice(self._tolerated(goal, check, constraints), IK_SOLUTIONS))
             if not states:
                 raise
         return states
@@ -278,8 +274,10 @@ class Planner:
             _require(check.state(states[0]), 'goal', _GOAL_CODES)
         return valid[:IK_SOLUTIONS]
 
-    def _tolerated(self, goal: Goal, check: ValidityCheck) -> Iterator[Array]:
-        """Yield states within the tolerances of a goal, which are valid."""
+    def _tolerated(
+        self, goal: Goal, check: ValidityCheck, constraints: ConstraintCheck | None
+    ) -> Iterator[Array]:
+        """Yield states within the tolerances of a goal, which are valid and heed constraints."""
         limits = self._model.limits
         lower = np.where(limits.continuous, -np.pi, limits.lower)
         upper = np.where(limits.continuous, np.pi, limits.upper)
@@ -287,15 +285,20 @@ class Planner:
             tolerance = goal.tolerance if len(goal.tolerance) else np.zeros(len(lower))
             lower = np.maximum(limits.lower, goal.positions - tolerance)
             upper = np.minimum(limits.upper, goal.positions + tolerance)
-            tolerances = PathConstraints()
+            ranges = zip(lower.tolist(), upper.tolist(), strict=True)
+            tolerances = PathConstraints(dict(zip(self._model.joints, ranges, strict=True)))
         else:
             tolerances = _pose_tolerances(goal, goal.link or self._model.tip)
         if (lower > upper).any():
             return  # beyond a limit by more than the tolerance
+        if constraints is not None:
+            tolerances = tolerances.together_with(constraints.constraints)
         check_goal = ConstraintCheck(self._model, tolerances)
         for _ in range(GOAL_SAMPLES):
             state = check_goal.projected(self._draw.uniform(lower, upper), rooms=0.0)
-            if state is not None and check.state(state) is None:
+            if state is None or check.state(state) is not None:
+                continue
+            if constraints is None or constraints.heeds(state):
                 yield frozen(state)
 
     def _refuse(self, request: MotionRequest) -> None:
@@ -318,22 +321,28 @@ class Planner:
 
 def _pose_tolerances(goal: PoseGoal, link: str) -> PathConstraints:
     """Return what holds where a link reaches a goal."""
-    off = goal.position_tolerance
-    shape = Sphere(off) if isinstance(off, float) else Box(*(2.0 * np.asarray(off)).tolist())
+    off = np.asarray(goal.position_tolerance, dtype=float)
+    shape = Box(*(2.0 * off).tolist()) if off.ndim else Sphere(float(off))
     region = PlacedShape(shape, Pose(ORIGIN.rotation, goal.pose.position))
     place = PositionConstraint(link, ORIGIN.position, [region])
     turn = OrientationConstraint(link, goal.pose.rotation, goal.orientation_tolerance)
     return PathConstraints(orientations=[turn], positions=[place])
 
 
-def _heeding(constraints: ConstraintCheck, start: Array, goals: Sequence[Array]) -> list[Array]:
-    """Return the goals that heed path constraints, or raise why there is no motion between."""
+def _require_start(constraints: ConstraintCheck, start: Array) -> None:
+    """Raise why free motion cannot begin under path constraints."""
     constraints.refuse_narrow(start)
     if not constraints.heeds(start):
         raise PlanningError(
             PlanningCode.START_STATE_VIOLATES_PATH_CONSTRAINTS,
             f'start: {constraints.reason(start)}; begin where the constraint holds',
         )
+
+
+def _heeding(constraints: ConstraintCheck | None, goals: list[Array]) -> list[Array]:
+    """Return the goals that heed path constraints, or raise why none does."""
+    if constraints is None:
+        return goals
     found = [goal for goal in goals if constraints.heeds(goal)]
     if not found:
         raise PlanningError(
@@ -354,5 +363,9 @@ def _require(
 
 _START_CODES = (PlanningCode.START_STATE_INVALID, PlanningCode.START_STATE_IN_COLLISION)
 _GOAL_CODES = (PlanningCode.GOAL_STATE_INVALID, PlanningCode.GOAL_IN_COLLISION)
-_NOT_EXACTLY = (*_GOAL_CODES, PlanningCode.NO_IK_SOLUTION)
+_NOT_EXACTLY = (
+    *_GOAL_CODES,
+    PlanningCode.NO_IK_SOLUTION,
+    PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS,
+)
 """Of goals that may be reached within their tolerances all the same."""

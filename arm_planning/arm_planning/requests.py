@@ -101,6 +101,22 @@ class PathConstraints:
     orientations: Sequence[OrientationConstraint] = ()
     positions: Sequence[PositionConstraint] = ()
 
+    def together_with(self, others: PathConstraints) -> PathConstraints:
+        """Return what holds where these and others do.
+
+        Args:
+            others: The others.
+        """
+        joints = dict(self.joints)
+        for name, (lower, upper) in others.joints.items():
+            least, most = joints.get(name, (lower, upper))
+            joints[name] = max(least, lower), min(most, upper)
+        return PathConstraints(
+            joints,
+            (*self.orientations, *others.orientations),
+            (*self.positions, *others.positions),
+        )
+
 
 class CircPointKind(str, Enum):
     """What the point of a circle is, in the words of Pilz' planner."""

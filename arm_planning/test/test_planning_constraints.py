@@ -4,21 +4,23 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 import numpy as np
+import pinocchio as pin
 from planning_messages import panda
 import pytest
 
 from arm_model import Array, Box, Cone, Cylinder, frozen, ORIGIN, PlacedShape, Pose, Sphere
 from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
-from arm_planning.constraints import ConstraintCheck, ConstraintResult, HEEDED
+from arm_planning.constraints import _turned, ConstraintCheck, ConstraintResult, HEEDED, STEP
 
 MODEL = panda().model('panda_arm')
 READY = frozen([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
 LINK = 'panda_link8'
 TIP = MODEL.kinematics.link_pose(LINK, READY)
 SHAPES = (Box(0.1, 0.2, 0.3), Sphere(0.1), Cylinder(0.1, 0.3), Cone(0.1, 0.3))
+AXES = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array).filter(lambda axis: axis @ axis > 0.01)
 OFFSETS = st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array)
 
 
@@ -93,3 +95,28 @@ def test_a_region_holds_what_is_inside(
         assert result == HEEDED
     if not holds(shape, -offset, 2e-6):
         assert result.distance > 0.0
+
+
+@given(AXES, st.floats(0.0, np.pi), AXES, AXES)
+def test_how_far_a_link_is_turned_changes_as_its_rows_say(
+    axis: Array, angle: float, wanted: Array, turn: Array
+) -> None:
+    """To half a turn: the gradient, and the room for what happens until the next look."""
+    constraint = OrientationConstraint(LINK, frozen(pin.exp3(wanted)), frozen(np.ones(3)))
+    turned_by = angle * axis / np.linalg.norm(axis)
+    rotation = constraint.rotation @ pin.exp3(turned_by)
+    by_turn = np.vstack((np.zeros((3, 3)), np.eye(3)))
+
+    def rows(turn: Array) -> Array:
+        pose = Pose(frozen(pin.exp3(turn) @ rotation), TIP.position)
+        return _turned(constraint, pose, by_turn)[0].values
+
+    row, _ = _turned(constraint, Pose(frozen(rotation), TIP.position), by_turn)
+    assert np.abs(row.values) == pytest.approx(np.abs(turned_by), abs=1e-6)
+    until_next = 0.5 * STEP * turn / np.linalg.norm(turn)
+    grown = np.abs(rows(until_next)) - np.abs(row.values)
+    assert grown.max() <= row.room * (1.0 + 1e-9)
+    assume(angle < np.pi - 0.1)
+    small = 1e-5 * turn / np.linalg.norm(turn)
+    change = 0.5 * (rows(small) - rows(-small))
+    assert change == pytest.approx(row.gradients @ small, abs=1e-9)

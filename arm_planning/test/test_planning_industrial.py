@@ -23,6 +23,7 @@ from arm_planning import (
     JointGoal,
     MotionPlan,
     MotionRequest,
+    PathConstraints,
     PlanningCode,
     PlanningError,
     PoseGoal,
@@ -339,6 +340,39 @@ def test_blends_stay_in_their_spheres(name: str, kinds: str) -> None:
     speeds = np.linalg.norm(np.diff(positions, axis=0), axis=1)[20:-20]
     assert speeds.min() > 0.0
     assert tip(name).pose(plan.path.end.position).position == pytest.approx(corners[-1], abs=1e-7)
+
+
+@pytest.mark.parametrize('radius', [0.0, 0.03])
+def test_a_sequence_heeds_path_constraints(radius: float) -> None:
+    """Those of one motion count for it alone, or for all that are blended with it."""
+    motions = items('prbt', 'PPP', radius)
+    ends = [motions[0].request.start]
+    for motion in motions:
+        only = replace(motion.request, start=ends[-1])
+        ends.append(planner('prbt').plan(only).path.end.position)
+    joint = int(np.abs(ends[1] - ends[0]).argmax())
+    name, (began, ended) = robot('prbt').joints[joint], (ends[0][joint], ends[1][joint])
+    middle = 0.5 * (began + ended)
+
+    def sequence(number: int, lower: float, upper: float) -> MotionPlan:
+        """Plan with a constraint of one motion."""
+        constraints = PathConstraints({name: (lower, upper)})
+        motion = motions[number]
+        limited = replace(motion, request=replace(motion.request, constraints=constraints))
+        changed = [*motions[:number], limited, *motions[number + 1 :]]
+        return planner('prbt').plan_sequence(changed)
+
+    assert sequence(0, -np.pi, np.pi).path.duration > 0.0
+    with pytest.raises(PlanningError, match=f'PTP breaks a path constraint .* {name}') as refused:
+        sequence(0, min(began, middle), max(began, middle))
+    assert refused.value.code is PlanningCode.INVALID_MOTION_PLAN
+    reached = sorted((ends[1][joint], ends[2][joint]))
+    for_second = reached[0] - 1e-3, reached[1] + 1e-3
+    if radius:
+        with pytest.raises(PlanningError, match='in all motions that are blended'):
+            sequence(1, *for_second)
+    else:
+        assert sequence(1, *for_second).path.duration > 0.0
 
 
 def test_sequences_by_the_rules_of_pilz() -> None:

@@ -10,6 +10,7 @@ import os
 
 from model_robots import ready, robot, ROBOTS
 import numpy as np
+import pinocchio as pin
 from planning_scenes import broken_limits, deepest_overlap, dense_times, with_random_boxes
 import pytest
 
@@ -41,6 +42,9 @@ OVERLAP_TOLERANCE = 1e-6
 FREE_TURN = 4.0
 """Tolerance of an axis about which a link may turn as it likes in [rad]."""
 
+EDGE = 1e-9
+"""Of a constraint, for rounding, in [m] and [rad]."""
+
 APART, AROUND = 1.0, 0.9
 """How far start and goal are apart at least, and from the ready pose at most, in [rad]."""
 
@@ -50,6 +54,13 @@ def level(model: RobotModel) -> PathConstraints:
     upright = model.pose(ready(model.name)).rotation
     turn = OrientationConstraint(model.tip, upright, frozen([0.1, 0.1, FREE_TURN]))
     return PathConstraints(orientations=[turn])
+
+
+def level_from_behind(model: RobotModel) -> PathConstraints:
+    """Keep a cup level that begins nearly half a turn about its axis away."""
+    (turn,) = level(model).orientations
+    wanted = frozen(turn.rotation @ pin.exp3(np.array([0.0, 0.0, 2.9])))
+    return PathConstraints(orientations=[replace(turn, rotation=wanted)])
 
 
 def in_a_slab(model: RobotModel) -> PathConstraints:
@@ -70,6 +81,35 @@ def by_joints(model: RobotModel) -> PathConstraints:
     return replace(level(model), joints=joints)
 
 
+def broken(model: RobotModel, constraints: PathConstraints, state: Array) -> list[str]:
+    """Return which constraints of the tip a state breaks, by their definitions."""
+    found = []
+    pose = model.pose(state)
+    at = dict(zip(model.joints, state.tolist(), strict=True))
+    for name, (lower, upper) in constraints.joints.items():
+        if not lower - EDGE <= at[name] <= upper + EDGE:
+            found.append(f'{name} at {at[name]}')
+    for turn in constraints.orientations:
+        turned = pin.AngleAxis(turn.rotation.T @ pose.rotation)
+        off = turned.angle * turned.axis
+        if (np.abs(off) > turn.tolerance + EDGE).any():
+            found.append(f'turned by {off}')
+    for place in constraints.positions:
+        point = pose.position + pose.rotation @ place.offset
+        if not any(_holds(region, point) for region in place.regions):
+            found.append(f'{point} is in no region')
+    return found
+
+
+def _holds(region: PlacedShape, point: Array) -> bool:
+    x, y, z = np.abs(region.pose.rotation.T @ (point - region.pose.position))
+    if isinstance(region.shape, Cylinder):
+        is_near = np.hypot(x, y) <= region.shape.radius + EDGE
+        return bool(is_near and z <= 0.5 * region.shape.length + EDGE)
+    sides = 0.5 * np.array([region.shape.x, region.shape.y, region.shape.z]) + EDGE
+    return bool((np.array([x, y, z]) <= sides).all())
+
+
 def ends(
     model: RobotModel, check: ConstraintCheck, planner: Planner, seed: int
 ) -> tuple[Array, Array]:
@@ -87,7 +127,7 @@ def ends(
 
 
 @pytest.mark.parametrize('name', ROBOTS)
-@pytest.mark.parametrize('constraints_of', [level, in_a_slab, by_joints])
+@pytest.mark.parametrize('constraints_of', [level, level_from_behind, in_a_slab, by_joints])
 @pytest.mark.parametrize('seed', SEEDS)
 def test_path_constraints_hold_everywhere(
     name: str, constraints_of: Callable[[RobotModel], PathConstraints], seed: int
@@ -100,7 +140,7 @@ def test_path_constraints_hold_everywhere(
     asked = MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT, constraints=constraints)
     path = planner.plan(asked, scene).path
     looks = path.positions(dense_times(path))
-    assert [words for words in map(check.violated, looks) if words] == []
+    assert [words for state in looks for words in broken(model, constraints, state)] == []
     assert deepest_overlap(path, scene) > -OVERLAP_TOLERANCE
     assert broken_limits(path, model.limits) == []
     assert np.allclose(path.at(0.0).position, start, atol=1e-9)
@@ -127,6 +167,58 @@ def test_a_pose_is_reached_by_a_solution_that_heeds_the_constraints() -> None:
     path = Planner(model).plan(asked).path
     assert ConstraintCheck(model, level(model)).path(path) is None
     assert model.pose(path.end.position).position == pytest.approx(aside.pose.position, abs=1e-5)
+
+
+@pytest.mark.parametrize('by_pose', [False, True])
+def test_a_goal_that_breaks_a_constraint_is_reached_where_its_tolerance_heeds_it(
+    *, by_pose: bool
+) -> None:
+    """A part of the tolerance is enough; without one the goal is refused."""
+    model, start = robot('gp110'), ready('gp110')
+    least = float(start[0]) - 0.3
+    constraints = PathConstraints({model.joints[0]: (least, least + 2.0)})
+    places = start.copy()
+    places[0] -= 0.4
+    goal: JointGoal | PoseGoal = JointGoal(frozen(places), frozen([0.3] * 6))
+    exact: JointGoal | PoseGoal = JointGoal(frozen(places))
+    if by_pose:
+        exact = PoseGoal(model.pose(frozen(places)))
+        goal = replace(exact, position_tolerance=1, orientation_tolerance=frozen([0.5] * 3))
+    asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
+    path = Planner(model).plan(asked).path
+    end = path.end.position
+    assert path.positions(dense_times(path))[:, 0].min() >= least - 1e-9
+    if by_pose:
+        at = model.pose(end)
+        wanted = model.pose(frozen(places))
+        assert np.linalg.norm(at.position - wanted.position) <= 1.0 + 1e-6
+        turned = pin.log3(wanted.rotation.T @ at.rotation)
+        assert np.abs(turned).max() <= 0.5 + 1e-6
+    else:
+        assert np.abs(end - places).max() <= 0.3 + 1e-6
+    with pytest.raises(PlanningError, match='goal: ') as refused:
+        Planner(model).plan(replace(asked, goals=[exact]))
+    assert refused.value.code is PlanningCode.GOAL_VIOLATES_PATH_CONSTRAINTS
+
+
+def test_a_tilted_goal_is_reached_upright_where_its_tolerance_is_wide() -> None:
+    """What is narrow in a wide tolerance is found by projection, not by chance."""
+    model, start = robot('panda'), ready('panda')
+    (turn,) = level(model).orientations
+    constraints = PathConstraints(
+        orientations=[replace(turn, tolerance=frozen([0.02, 0.02, FREE_TURN]))]
+    )
+    pose = model.pose(start)
+    tilted = pose.rotation @ pin.exp3(np.array([0.2, 0.0, 0.0]))
+    aside = Pose(frozen(tilted), frozen(pose.position + [0.0, 0.2, 0.0]))
+    goal = PoseGoal(aside, position_tolerance=0.01, orientation_tolerance=frozen([0.4] * 3))
+    asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
+    path = Planner(model).plan(asked).path
+    looks = path.positions(dense_times(path))
+    assert [words for state in looks for words in broken(model, constraints, state)] == []
+    at = model.pose(path.end.position)
+    assert np.linalg.norm(at.position - aside.position) <= 0.01 + 1e-6
+    assert np.abs(pin.log3(tilted.T @ at.rotation)).max() <= 0.4 + 1e-6
 
 
 def refusal(asked: MotionRequest) -> PlanningError:

@@ -119,6 +119,19 @@ def test_no_items_are_no_motion(thread: PlanningThread) -> None:
     assert planned(thread).trajectories == []
 
 
+def test_a_sequence_heeds_path_constraints(thread: PlanningThread) -> None:
+    """Of its messages, of which each is looked at for its own motion."""
+    limited = left(0.5)
+    bounds = JointConstraint(
+        joint_name='left_1', position=0.4, tolerance_above=0.15, tolerance_below=0.15, weight=1.0
+    )
+    limited.req.path_constraints = Constraints(joint_constraints=[bounds])
+    assert len(planned(thread, left(0.3), limited).trajectories) == 1
+    with pytest.raises(PlanningError, match=r'path constraint .* left_1 is at') as caught:
+        planned(thread, left(0.1), limited)
+    assert caught.value.code is PlanningCode.INVALID_MOTION_PLAN
+
+
 def test_what_is_refused(thread: PlanningThread) -> None:
     """With the number of the item, before anything is planned."""
     attached = right(0.1)

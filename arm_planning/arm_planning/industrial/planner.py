@@ -12,6 +12,7 @@ import numpy as np
 from arm_model import Array, checked, JointLimits, PlanningScene, Pose, RobotModel
 from arm_trajectory import farthest_beyond, Path, PathCheck
 
+from ..constraints import ConstraintCheck
 from ..curves import arc_around, arc_through, Curve, Line
 from ..exceptions import PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
@@ -108,7 +109,8 @@ class IndustrialPlanner:
     ) -> MotionPlan:
         """Return one motion through a sequence, with stops where a blend radius is 0.
 
-        In a blended group the least factors of velocity and acceleration limit all joints.
+        In a blended group the least factors of velocity and acceleration limit all joints, and
+        the path constraints of each motion hold in all of them.
 
         Args:
             items: The motions; each has one goal, and begins where the one before ends.
@@ -257,6 +259,7 @@ class IndustrialPlanner:
             notes = (*notes, *slowed)
         self._check_range(path, limits, requests[-1].planner_id)
         self._check_contact(path, scene, link, requests[-1].planner_id)
+        self._check_constraints(path, requests)
         return MotionPlan(path, requests[-1].planner_id, notes)
 
     def _check_range(self, path: Path, limits: JointLimits, name: str) -> None:
@@ -287,6 +290,24 @@ class IndustrialPlanner:
                 f' {contact.time / path.duration:.0%} of the time into it, with {link.link} at'
                 f' ({x:.3f}, {y:.3f}, {z:.3f})',
             )
+
+    def _check_constraints(self, path: Path, requests: Sequence[MotionRequest]) -> None:
+        remedy = 'plan it as a free motion, or widen the constraint'
+        if len(requests) > 1:
+            remedy = (
+                'it holds in all motions that are blended: widen it, or give a blend radius of 0'
+            )
+        for request in requests:
+            if request.constraints is None:
+                continue
+            check = ConstraintCheck(self._model, request.constraints)
+            broken = check.path(path, at_looks=True)
+            if broken is not None:
+                raise PlanningError(
+                    PlanningCode.INVALID_MOTION_PLAN,
+                    f'{request.planner_id} breaks a path constraint {broken.time:.2f} s on its'
+                    f' way: {broken.reason}; {remedy}',
+                )
 
     def _start(self, request: MotionRequest) -> Array:
         start = checked(request.start, len(self._model), 'start')
