@@ -210,7 +210,7 @@ def test_a_tilted_goal_is_reached_upright_where_its_tolerance_is_wide() -> None:
     )
     pose = model.pose(start)
     tilted = pose.rotation @ pin.exp3(np.array([0.2, 0.0, 0.0]))
-    aside = Pose(frozen(tilted), frozen(pose.position + [0.0, 0.2, 0.0]))
+    aside = Pose(frozen(tilted), frozen(np.add(pose.position, [0.0, 0.2, 0.0])))
     goal = PoseGoal(aside, position_tolerance=0.01, orientation_tolerance=frozen([0.4] * 3))
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
