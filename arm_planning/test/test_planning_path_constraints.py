@@ -106,6 +106,8 @@ def _holds(region: PlacedShape, point: Array) -> bool:
     if isinstance(region.shape, Cylinder):
         is_near = np.hypot(x, y) <= region.shape.radius + EDGE
         return bool(is_near and z <= 0.5 * region.shape.length + EDGE)
+    if not isinstance(region.shape, Box):
+        raise TypeError(region.shape)
     sides = 0.5 * np.array([region.shape.x, region.shape.y, region.shape.z]) + EDGE
     return bool((np.array([x, y, z]) <= sides).all())
 
