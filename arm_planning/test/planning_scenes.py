@@ -11,12 +11,15 @@ from arm_model import (
     Box,
     Clearances,
     CollisionObject,
+    Cone,
+    Cylinder,
     frozen,
     JointLimits,
     ORIGIN,
     PlanningScene,
     Pose,
     RobotModel,
+    Sphere,
 )
 from arm_trajectory import Path
 
@@ -46,6 +49,24 @@ def with_random_boxes(model: RobotModel, count: int, seed: int) -> PlanningScene
         x, y, z = (size * draw.uniform(0.05, 0.25, 3)).tolist()
         scene = with_box(scene, f'box_{number}', (x, y, z), at)
     return scene
+
+
+def holds(shape: Box | Sphere | Cylinder | Cone, point: Array, margin: float) -> bool:
+    """Return whether a shape holds a point, or nearly; a cone has its tip above its middle."""
+    x, y, z = point
+    aside = np.hypot(x, y)
+    match shape:
+        case Box():
+            inside = np.abs(point) <= 0.5 * np.array([shape.x, shape.y, shape.z]) + margin
+            return bool(inside.all())
+        case Sphere():
+            return bool(np.hypot(aside, z) <= shape.radius + margin)
+        case Cylinder():
+            return bool(aside <= shape.radius + margin and abs(z) <= 0.5 * shape.length + margin)
+        case Cone():
+            half = 0.5 * shape.length
+            radius = shape.radius * (half - z) / shape.length
+            return bool(aside <= radius + margin and abs(z) <= half + margin)
 
 
 def dense_times(path: Path) -> Array:

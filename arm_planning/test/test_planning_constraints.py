@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pinocchio as pin
 from planning_messages import panda
+from planning_scenes import holds
 import pytest
 
 from arm_model import Array, Box, Cone, Cylinder, frozen, ORIGIN, PlacedShape, Pose, Sphere
@@ -68,21 +69,6 @@ def test_a_link_may_be_in_any_of_its_regions() -> None:
     assert results(at_tip(near, far)) == results(at_tip(far, near)) == [HEEDED]
     (outside,) = results(at_tip(far))
     assert outside.distance == pytest.approx(0.45)
-
-
-def holds(shape: Box | Sphere | Cylinder | Cone, point: Array, margin: float) -> bool:
-    """Return whether a shape holds a point, or nearly; a cone has its tip above its middle."""
-    x, y, z = point
-    aside, is_high = np.hypot(x, y), abs(z) <= 0.15 + margin
-    match shape:
-        case Box():
-            return bool(abs(x) <= 0.05 + margin and abs(y) <= 0.1 + margin and is_high)
-        case Sphere():
-            return bool(np.hypot(aside, z) <= 0.1 + margin)
-        case Cylinder():
-            return bool(aside <= 0.1 + margin and is_high)
-        case Cone():
-            return bool(aside <= 0.1 * (0.15 - z) / 0.3 + margin and is_high)
 
 
 @given(st.sampled_from(SHAPES), OFFSETS)

@@ -11,7 +11,7 @@ import os
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pinocchio as pin
-from planning_scenes import broken_limits, deepest_overlap, dense_times, with_random_boxes
+from planning_scenes import broken_limits, deepest_overlap, dense_times, holds, with_random_boxes
 import pytest
 
 from arm_model import Array, Box, Cylinder, frozen, ORIGIN, PlacedShape, Pose, RobotModel
@@ -96,20 +96,15 @@ def broken(model: RobotModel, constraints: PathConstraints, state: Array) -> lis
             found.append(f'turned by {off}')
     for place in constraints.positions:
         point = pose.position + pose.rotation @ place.offset
-        if not any(_holds(region, point) for region in place.regions):
+        if not any(_in_region(region, point) for region in place.regions):
             found.append(f'{point} is in no region')
     return found
 
 
-def _holds(region: PlacedShape, point: Array) -> bool:
-    x, y, z = np.abs(region.pose.rotation.T @ (point - region.pose.position))
-    if isinstance(region.shape, Cylinder):
-        is_near = np.hypot(x, y) <= region.shape.radius + EDGE
-        return bool(is_near and z <= 0.5 * region.shape.length + EDGE)
-    if not isinstance(region.shape, Box):
+def _in_region(region: PlacedShape, point: Array) -> bool:
+    if not isinstance(region.shape, (Box, Cylinder)):
         raise TypeError(region.shape)
-    sides = 0.5 * np.array([region.shape.x, region.shape.y, region.shape.z]) + EDGE
-    return bool((np.array([x, y, z]) <= sides).all())
+    return holds(region.shape, region.pose.rotation.T @ (point - region.pose.position), EDGE)
 
 
 def ends(

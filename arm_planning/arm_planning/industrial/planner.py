@@ -121,20 +121,21 @@ class IndustrialPlanner:
             PlanningError: A motion is refused, or a blend; the message names the item.
         """
         check_radii([item.blend_radius for item in items])
-        start, path = self._start(items[0].request), None
-        notes: list[str] = []
+        start = self._start(items[0].request)
+        plans: list[MotionPlan] = []
         group: list[tuple[MotionRequest, FullSpeedPath, LinkKinematics, float]] = []
         for number, item in enumerate(items, first):
             full, link = self._item(number, item.request, start, scene)
             group.append((item.request, full, link, item.blend_radius))
             start = full.path.end.position
             if item.blend_radius == 0.0:
-                plan = self._group(group, number + 1 - len(group), scene)
-                path = plan.path if path is None else path.followed_by(plan.path.segments)
-                notes += plan.notes
+                plans.append(self._group(group, number + 1 - len(group), scene))
                 group = []
-        assert path is not None  # noqa: S101  the last radius is 0
-        return MotionPlan(path, items[-1].request.planner_id, tuple(notes))
+        path = plans[0].path
+        for plan in plans[1:]:
+            path = path.followed_by(plan.path.segments)
+        notes = tuple(note for plan in plans for note in plan.notes)
+        return MotionPlan(path, items[-1].request.planner_id, notes)
 
     def _item(
         self, number: int, request: MotionRequest, start: Array, scene: PlanningScene | None
