@@ -16,7 +16,7 @@ from ..standard.drive import DriveState, mode_title, OperationMode, Statusword, 
 from ..standard.emcy import error_code_text
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_control import DriveControl
-from .drive_view import DriveView, FAULTY
+from .drive_view import DriveView, FAULTY, POWERED
 from .feed_forward import FeedForward
 from .following_watch import Following, FollowingWatch, MARGIN_TIME
 from .modes import NO_BITS
@@ -205,6 +205,12 @@ class Drive:
         if output is not None and self.objects.is_controlled_by(output):
             self.stop.use_sdo()
 
+    def leave_operation(self) -> None:
+        """Lead it to Switch On Disabled, by the stop sequence where it may still move."""
+        self.control.goal = DriveState.SWITCH_ON_DISABLED
+        if self.view.state in POWERED and not self.view.stands:
+            self.stop.begin()
+
     def _take_out(self, refusal: Refusal, text: str) -> None:
         """Stop and disable it; only the first cause is reported until it is enabled again."""
         if self.control.goal is not None:
@@ -239,8 +245,10 @@ class Drive:
         if self.control.adopt():
             title = mode_title(self.control.mode.number)
             self.report(Severity.INFO, f'taken over enabled, in mode {title}; it holds')
-        else:
-            self.warn(f'is not enabled by the new master: {self.describe()}')
+            return
+        self.warn(f'is not enabled by the new master: {self.describe()}')
+        if self.view.state in POWERED:
+            self.leave_operation()
 
     def _watch_sight(self) -> None:
         """Bring a drive to rest that acts on targets and has stopped to send its state."""
@@ -335,16 +343,23 @@ class Drive:
             self.released(Refusal(RefusalCause.FAULT, view.error))
             self._scheduler.background(self._report_fault())
         elif left and control.goal is DriveState.OPERATION_ENABLED:
-            # a drive that lost its enable must not start again when the cause goes away
-            control.goal = DriveState.SWITCH_ON_DISABLED
-            self.released(Refusal(RefusalCause.NOT_ENABLED, 'it left Operation enabled by itself'))
-            self.report(
-                Severity.ERROR,
-                f'left Operation enabled by itself: {self.describe()}; is the voltage or the '
-                'safe torque off gone? Enable it again when it is safe',
-            )
+            self._left_by_itself()
         elif left:
             self.released(Refusal(RefusalCause.NOT_ENABLED, view.state.title))
+
+    def _left_by_itself(self) -> None:
+        """Keep it from starting again when the cause goes away, with power while it brakes."""
+        goal, cause = DriveState.SWITCH_ON_DISABLED, 'is the voltage or the safe torque off gone?'
+        if self.view.state is DriveState.QUICK_STOP_ACTIVE:
+            goal = DriveState.QUICK_STOP_ACTIVE
+            cause = 'is it at a limit switch, is its quick stop input on, or was a heartbeat late?'
+        self.control.goal = goal
+        self.released(Refusal(RefusalCause.NOT_ENABLED, 'it left Operation enabled by itself'))
+        self.report(
+            Severity.ERROR,
+            f'left Operation enabled by itself: {self.describe()}; {cause} Enable it again when '
+            'it is safe',
+        )
 
     def _error_of_emcy(self) -> str:
         """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""

@@ -22,6 +22,8 @@ from .units import clamp, INT16_MAX, INT32_MAX, Units
 from .velocity_estimate import VelocityEstimate
 
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+"""States in which it may move under power, and falls or coasts when that goes."""
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
 REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 

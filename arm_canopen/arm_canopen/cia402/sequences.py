@@ -78,15 +78,17 @@ class DriveSequences:
                 enabled where it does not take the value that holds it.
         """
         drive = self.drive
-        if goal is DriveState.OPERATION_ENABLED and not drive.control.stays_enabled:
+        enabling = goal is DriveState.OPERATION_ENABLED
+        if enabling and not drive.control.stays_enabled:
             await self._begin_enabling()
+        timeout = self.quirks.state_timeout
+        if not enabling:  # it may brake first (0x605B, 0x605C)
+            timeout += drive.stop.ramp_time()
         drive.control.goal = goal
         try:
-            await self.until(
-                lambda: drive.view.state is goal, self.quirks.state_timeout, goal.title
-            )
+            await self.until(lambda: drive.view.state is goal, timeout, goal.title)
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
-            drive.control.goal = DriveState.SWITCH_ON_DISABLED
+            drive.leave_operation()
             raise
 
     async def _begin_enabling(self) -> None:

@@ -97,12 +97,13 @@ class StopCommands:
     async def _stay_disabled(self) -> None:
         """Have it enabled no more, also where the command for that is on its way already."""
         drive, steps = self._drive, self._steps
-        drive.control.goal = DriveState.SWITCH_ON_DISABLED
+        drive.leave_operation()
+        await drive.stop.ended()
         await steps.settle()
         await steps.until(
             lambda: drive.view.state is not DriveState.OPERATION_ENABLED,
             steps.quirks.state_timeout,
-            drive.control.goal.title,
+            DriveState.SWITCH_ON_DISABLED.title,
         )
 
     def _is_quick_stopped(self) -> bool:

@@ -67,6 +67,12 @@ class StopSequence:
         """Whether the drive shows that its power is away, or shows nothing at all."""
         return self._view.objects.state in DISABLED
 
+    def ramp_time(self) -> float:
+        """Return how long it brakes in [s], by the slower of its ramps."""
+        parameters = self._view.parameters
+        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
+        return min(RAMP_MAX, self._view.speed / ramp)
+
     def begin(self, *, quiet: bool = False) -> None:
         """Begin, unless it runs already; what kept the RPDO from the drive before may be over.
 
@@ -109,7 +115,7 @@ class StopSequence:
         """Lead through the steps; what holds already ends a step at once."""
         objects = self._view.objects
         self._sdo_error = ''
-        deadline = self._scheduler.now + STOP_TIMEOUT + self._ramp_time()
+        deadline = self._scheduler.now + STOP_TIMEOUT + self.ramp_time()
         try:
             await self._lead(
                 DriveState.QUICK_STOP_ACTIVE,
@@ -151,12 +157,6 @@ class StopSequence:
             self._sdo_error = str(error)
             if objects.mutes_controlword and objects.can_send(int(command)):
                 objects.unmute_controlword()
-
-    def _ramp_time(self) -> float:
-        """Return how long it brakes in [s], by the slower of its ramps."""
-        parameters = self._view.parameters
-        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
-        return min(RAMP_MAX, self._view.speed / ramp)
 
     def _shown(self) -> str:
         view = self._view

@@ -5,103 +5,46 @@
 from __future__ import annotations
 
 from itertools import count
-import struct
 
 from diagnostic_msgs.msg import DiagnosticStatus
-from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
+from drive_samples import PERIOD, SCALE
+from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.exceptions import DriveError
 from arm_canopen.library.bus_master import leave_device
-from arm_canopen.master.events import Severity
 from arm_canopen.nodes.diagnostics import drive_diagnostic
-from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.drive.drive import Drive as SimulatedDrive
+from arm_canopen.standard.drive import DriveState
 
 pytestmark = pytest.mark.slow
 
-JOINT, NODE_ID = 'joint1', 2
-RAMP = 1.0  # [s] from full speed to rest
-STANDING = 0.03  # [rad/s]
 RPDOS = {0x200 + NODE_ID, 0x300 + NODE_ID, 0x400 + NODE_ID}
 OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
 
 
-class Failing:
-    """A drive at 1 rad/s with a slow quick stop ramp, of which something is going to fail.
+def inject(
+    monkeypatch: pytest.MonkeyPatch,
+    owner: object,
+    attribute: str,
+    *,
+    times: float = float('inf'),
+) -> None:
+    """Let something fail from now on, with another text each time."""
+    original, number = getattr(owner, attribute), count()
 
-    Attributes:
-        net: The network.
-        states: States of the simulated drive since it began to move, without repetitions.
-        fastest: Greatest speed at which it was without power since then in [rad/s].
-    """
+    def broken(*args: object, **settings: object) -> object:
+        failures = next(number)
+        if failures < times:
+            raise ZeroDivisionError(f'injected {failures}')
+        return original(*args, **settings)
 
-    def __init__(self, option: int, monkeypatch: pytest.MonkeyPatch) -> None:
-        """Set it in motion."""
-        slow = (sdo_write(0x6085, 0, round(SCALE / RAMP)), sdo_write(0x605A, 0, option))
-        config = drive_config(JOINT, NODE_ID, sdo_writes=(*MOTION_WRITES, *slow))
-        self.net = VirtualNetwork(bus_config(config))
-        self.net.allows_defects = True
-        self.net.boot()
-        self.net.do(JOINT, 'init')
-        self.net.select(JOINT, OperationMode.CYCLIC_POSITION)
-        self.net.commands[JOINT].set_target(50.0)
-        self.net.run(0.6)
-        assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
-        self.states = [DriveState.OPERATION_ENABLED]
-        self.fastest = 0.0
-        self._monkeypatch = monkeypatch
-        self._number = count()
-        self.began = self.net.now
-
-    @property
-    def device(self) -> SimulatedDrive:
-        """The simulated drive."""
-        drive = self.net.devices[JOINT].drive
-        assert drive is not None
-        return drive
-
-    def fail(self, owner: object, attribute: str, *, times: float = float('inf')) -> None:
-        """Let something fail from now on, with another text each time."""
-        original = getattr(owner, attribute)
-
-        def broken(*args: object, **settings: object) -> object:
-            number = next(self._number)
-            if number < times:
-                raise ZeroDivisionError(f'injected {number}')
-            return original(*args, **settings)
-
-        self._monkeypatch.setattr(owner, attribute, broken)
-
-    def run(self, duration: float) -> None:
-        """Let time pass in [s], and look at the drive in each cycle."""
-        for _ in range(round(duration / PERIOD)):
-            self.net.run(PERIOD)
-            if self.device.state is not self.states[-1]:
-                self.states.append(self.device.state)
-            if self.device.state is DriveState.SWITCH_ON_DISABLED:
-                self.fastest = max(self.fastest, abs(self.device.velocity) / SCALE)
-
-    @property
-    def errors(self) -> list[str]:
-        """What was reported as an error."""
-        return self.net.reported(Severity.ERROR)
-
-    @property
-    def controlwords_by_sdo(self) -> list[int]:
-        """Controlwords that were written by SDO since it moved."""
-        found: list[int] = []
-        for data in self.net.frames(0x600 + NODE_ID, since=self.began):
-            if data[:4] == b'\x2b\x40\x60\x00':
-                found += struct.unpack_from('<H', data, 4)
-        return found
+    monkeypatch.setattr(owner, attribute, broken)
 
 
-def owner_of(failing: Failing, place: str) -> tuple[object, str]:
+def owner_of(failing: MovingDrive, place: str) -> tuple[object, str]:
     """Return the object and its attribute that a failure is injected into."""
     drive = failing.net.drives[JOINT]
     rpdo = failing.net.network.nodes[JOINT].image.rpdos[-1]
@@ -114,7 +57,7 @@ def owner_of(failing: Failing, place: str) -> tuple[object, str]:
     }[place]
 
 
-def assert_stopped_once(failing: Failing) -> None:
+def assert_stopped_once(failing: MovingDrive) -> None:
     """Quick stop, rest, disable; never without power at speed, and reported once."""
     assert failing.states == [
         DriveState.OPERATION_ENABLED,
@@ -132,8 +75,8 @@ def test_the_power_goes_when_the_axis_stands(
     place: str, times: float, option: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whatever 0x605A says: it is never without power at speed, nor powered for good."""
-    failing = Failing(option, monkeypatch)
-    failing.fail(*owner_of(failing, place), times=times)
+    failing = MovingDrive(option)
+    inject(monkeypatch, *owner_of(failing, place), times=times)
     failing.run(RAMP + 2.0)
     assert_stopped_once(failing)
     unreachable = place == 'RPDO' or (place == 'controlword' and times > 1)
@@ -144,8 +87,8 @@ def test_a_drive_that_cannot_be_seen_loses_its_power_at_the_deadline(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It is not waited for for ever that it stands."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'read'))
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'read'))
     failing.run(RAMP + 3.0)
     assert failing.states[-1] is DriveState.SWITCH_ON_DISABLED
     assert failing.fastest < STANDING
@@ -157,9 +100,9 @@ def test_a_deaf_drive_is_stopped_by_sdo_and_not_enabled_by_what_comes_later(
     option: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its RPDOs are kept back before the SDO leaves: none that gets through ends the stop."""
-    failing = Failing(option, monkeypatch)
+    failing = MovingDrive(option)
     failing.net.wire.loses = lambda sender, frame: frame.can_id in RPDOS
-    failing.fail(*owner_of(failing, 'mode'), times=1)
+    inject(monkeypatch, *owner_of(failing, 'mode'), times=1)
     failing.run(0.4)
     assert not failing.controlwords_by_sdo
     failing.run(0.4)
@@ -176,7 +119,7 @@ def test_an_axis_is_stopped_whose_rpdo_is_kept_back_with_another_axis(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It would go on with the last controlword that it got; enabling it frees no RPDO."""
-    failing = Failing(6, monkeypatch)
+    failing = MovingDrive(6)
     other = DriveObjects(failing.net.network.nodes[JOINT])
     other.mute_controlword()
     failing.run(RAMP + 1.0)
@@ -195,8 +138,8 @@ def test_a_drive_that_could_not_be_stopped_is_stopped_by_the_next_request(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Neither RPDO nor SDO reaches it at first, which is reported with the remedy."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'controlword'))
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'))
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
     failing.run(RAMP + 6.0)
     assert failing.states == [DriveState.OPERATION_ENABLED]
@@ -212,12 +155,12 @@ def test_a_drive_that_could_not_be_stopped_is_stopped_by_the_next_request(
 
 def test_a_stop_by_sdo_waits_for_no_other_sdo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither for those in the queue nor for answers that get lost."""
-    failing = Failing(6, monkeypatch)
+    failing = MovingDrive(6)
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x580 + NODE_ID
     node = failing.net.network.nodes[JOINT]
     for _ in range(30):
         node.sdo.read(0x1018, 1, 0.2)
-    failing.fail(*owner_of(failing, 'RPDO'))
+    inject(monkeypatch, *owner_of(failing, 'RPDO'))
     failing.run(2 * PERIOD)
     assert failing.device.state is DriveState.QUICK_STOP_ACTIVE
     failing.run(RAMP + 0.5)
@@ -230,8 +173,8 @@ def test_a_stop_whose_sdo_is_not_answered_goes_by_rpdo_again(
     verb: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What kept its RPDO back was over at once; a shutdown ends the stop as well."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'controlword'), times=2)
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
     if verb:
         failing.net.begin(JOINT, verb, preempt=True)
@@ -243,9 +186,9 @@ def test_a_shutdown_begins_by_rpdo_and_says_when_the_drive_keeps_its_power(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The stop before has ended with the RPDO kept back, and no SDO is answered."""
-    failing = Failing(6, monkeypatch)
+    failing = MovingDrive(6)
     failing.net.wire.loses = lambda sender, frame: frame.can_id in {*RPDOS, 0x600 + NODE_ID}
-    failing.fail(*owner_of(failing, 'controlword'), times=2)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=2)
     failing.run(10.0)
     with pytest.raises(DriveError, match='joint1 is not disabled; cut its power'):
         failing.net.do(JOINT, 'shutdown', preempt=True)
@@ -260,7 +203,7 @@ def test_a_device_whose_drive_keeps_its_power_goes_on_to_watch_the_master(
     lost: set[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """When the master ends, its heartbeat is the last that can stop the drive."""
-    failing = Failing(6, monkeypatch)
+    failing = MovingDrive(6)
     failing.net.wire.loses = lambda sender, frame: frame.can_id in lost
     node, scheduler = failing.net.network.nodes[JOINT], failing.net.network.scheduler
     node.watch_slot = 1
@@ -275,8 +218,8 @@ def test_a_drive_that_could_not_be_stopped_is_not_said_to_be_enabled(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It is still in Operation Enabled; and the next failure stops it as the first one would."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'controlword'), times=3)
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'), times=3)
     failing.net.wire.loses = lambda sender, frame: frame.can_id in {*RPDOS, 0x600 + NODE_ID}
     failing.run(10.0)
     with pytest.raises(DriveError, match='could not be stopped; cut its power'):
@@ -299,8 +242,8 @@ def test_a_drive_that_keeps_its_power_is_stopped_again_and_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """As soon as an SDO reaches it the stop works; that it failed is reported once."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'controlword'))
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'controlword'))
     failing.net.wire.loses = lambda sender, frame: frame.can_id == 0x600 + NODE_ID
     failing.run(20.0)
     assert failing.states == [DriveState.OPERATION_ENABLED]
@@ -317,7 +260,7 @@ def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
     cycles: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the drive comes to Operation Enabled by a command that was on its way."""
-    failing = Failing(6, monkeypatch)
+    failing = MovingDrive(6)
     failing.net.do(JOINT, 'shutdown', preempt=True)
     enabling = failing.net.begin(JOINT, 'enable')
     drive = failing.net.drives[JOINT]
@@ -334,8 +277,8 @@ def test_a_failure_while_it_is_enabled_stays_named_until_the_next_enabling(
 
 def test_nothing_enables_a_drive_while_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command is refused, a stop waits for the end; then a command does."""
-    failing = Failing(6, monkeypatch)
-    failing.fail(*owner_of(failing, 'mode'), times=1)
+    failing = MovingDrive(6)
+    inject(monkeypatch, *owner_of(failing, 'mode'), times=1)
     failing.run(0.2)
     for verb in ('init', 'enable', 'recover', 'home'):
         with pytest.raises(DriveError, match='being stopped'):
@@ -355,22 +298,22 @@ def test_what_goes_wrong_after_it_was_enabled_again_is_named_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Each enabling may fail once in the log."""
-    failing = Failing(2, monkeypatch)
+    failing = MovingDrive(2)
     for number in (1, 2):
-        failing.fail(*owner_of(failing, 'mode'))
+        inject(monkeypatch, *owner_of(failing, 'mode'))
         failing.run(RAMP + 1.0)
         assert len(failing.errors) == number
-        failing._monkeypatch.undo()
+        monkeypatch.undo()
         failing.net.do(JOINT, 'enable')
         failing.run(0.5)
 
 
 def test_texts_with_values_do_not_flood_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither those of devices without a drive nor those of the cycle."""
-    failing = Failing(2, monkeypatch)
+    failing = MovingDrive(2)
     node = failing.net.network.nodes[JOINT]
     node.on_failed.clear()
-    failing.fail(node, 'expect_answers')
-    failing.fail(failing.net.network._heartbeat, 'advance')
+    inject(monkeypatch, node, 'expect_answers')
+    inject(monkeypatch, failing.net.network._heartbeat, 'advance')
     failing.run(1.0)
     assert len(failing.errors) == 2, failing.errors

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A drive of a simulated network in motion, watched for losing its power before it stands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import struct
+
+from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
+import pytest
+from virtual_network import VirtualNetwork
+
+from arm_canopen.master.events import Severity
+from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.drive.drive import Drive as SimulatedDrive
+
+JOINT, NODE_ID = 'joint1', 2
+RAMP = 1.0  # [s] of a quick stop from full speed to rest
+STANDING = 0.03  # [rad/s]
+
+
+class MovingDrive:
+    """A drive at 1 rad/s with a slow quick stop ramp.
+
+    Attributes:
+        net: The network.
+        states: States of the simulated drive since it began to move, without repetitions.
+        fastest: Greatest speed at which it was without power since then in [rad/s].
+        began: Steady time at which that began in [s].
+    """
+
+    def __init__(
+        self, option: int = 2, *writes: tuple[int, int, int], kept_alive: bool = False
+    ) -> None:
+        """Set it in motion.
+
+        Args:
+            option: Quick stop option code (0x605A).
+            writes: Index, sub-index and value of objects that differ.
+            kept_alive: It passes from one master to the next.
+        """
+        slow = [(0x6085, 0, round(SCALE / RAMP)), (0x605A, 0, option), *writes]
+        changed = [sdo_write(*write) for write in slow]
+        config = drive_config(JOINT, NODE_ID, sdo_writes=(*MOTION_WRITES, *changed))
+        if kept_alive:
+            config = replace(config, reset_communication=False)
+        self.net = VirtualNetwork(bus_config(config))
+        self.net.allows_defects = True
+        self.net.boot()
+        self.net.do(JOINT, 'init')
+        self.net.select(JOINT, OperationMode.CYCLIC_POSITION)
+        self.net.commands[JOINT].set_target(50.0)
+        self.net.run(0.6)
+        assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
+        self.states = [DriveState.OPERATION_ENABLED]
+        self.fastest = 0.0
+        self.began = self.net.now
+
+    @property
+    def device(self) -> SimulatedDrive:
+        """The simulated drive."""
+        drive = self.net.devices[JOINT].drive
+        assert drive is not None
+        return drive
+
+    def run(self, duration: float) -> None:
+        """Let time pass in [s], and look at the drive in each cycle."""
+        for _ in range(round(duration / PERIOD)):
+            self.net.run(PERIOD)
+            if self.device.state is not self.states[-1]:
+                self.states.append(self.device.state)
+            if self.device.state not in {DriveState.OPERATION_ENABLED, *STOPPING}:
+                self.fastest = max(self.fastest, abs(self.device.velocity) / SCALE)
+
+    @property
+    def errors(self) -> list[str]:
+        """What was reported as an error."""
+        return self.net.reported(Severity.ERROR)
+
+    @property
+    def controlwords_by_sdo(self) -> list[int]:
+        """Controlwords that were written by SDO since it moved."""
+        found: list[int] = []
+        for data in self.net.frames(0x600 + NODE_ID, since=self.began):
+            if data[:4] == b'\x2b\x40\x60\x00':
+                found += struct.unpack_from('<H', data, 4)
+        return found
+
+
+STOPPING = (DriveState.QUICK_STOP_ACTIVE, DriveState.FAULT_REACTION_ACTIVE)
