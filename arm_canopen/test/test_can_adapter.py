@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
+import os
 from time import monotonic, time
+import tty
 
 import can
 from can_addresses import free_virtual
 import pytest
 
-from arm_canopen.can import Frame, open_bus
+from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.adapter import AdapterBus
 from arm_canopen.exceptions import BusError
 
@@ -123,6 +126,72 @@ def test_a_refused_frame_is_counted_and_reported(opened_with: dict[str, object])
         with pytest.raises(BusError, match='bus off'):
             bus.send(Frame(1))
         assert (bus.counters.sent, bus.counters.send_errors) == (0, 1)
+
+
+class SerialAdapter:
+    """The far end of the serial line of an slcan adapter."""
+
+    def __init__(self) -> None:
+        """Open the line."""
+        self._ours, theirs = os.openpty()
+        tty.setraw(theirs)
+        self.name = f'slcan:{os.ttyname(theirs)}'
+        self._theirs = theirs
+
+    def write(self, *lines: bytes) -> None:
+        """Send lines to the computer."""
+        os.write(self._ours, b''.join(line + b'\r' for line in lines))
+
+    def close(self) -> None:
+        """Close both ends."""
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+@pytest.fixture
+def serial_adapter() -> Iterator[SerialAdapter]:
+    """Open a serial line."""
+    adapter = SerialAdapter()
+    yield adapter
+    adapter.close()
+
+
+DAMAGED = [b't18', b't1x11AA', b't1811ZZ', b't\xff811AA', b'T0000', b't1814AABB']
+
+
+def receive(bus: Bus, count: int, deadline: float) -> list[tuple[int, bytes]]:
+    """Return identifiers and data of as many frames."""
+    frames: list[Frame] = []
+    while len(frames) < count and monotonic() < deadline:
+        frames += bus.receive(0.1)
+    return [(frame.can_id, frame.data) for frame in frames]
+
+
+def test_a_damaged_line_costs_no_other_frame(serial_adapter: SerialAdapter) -> None:
+    """Truncated, or with bytes that are no digits: each is counted, and the bus stays open."""
+    with open_bus(serial_adapter.name) as bus:
+        for damaged in DAMAGED:
+            serial_adapter.write(b't1811AA', damaged, b't1821BB')
+        frames = receive(bus, 2 * len(DAMAGED), monotonic() + 10.0)
+        assert frames == [(0x181, b'\xaa'), (0x182, b'\xbb')] * len(DAMAGED)
+        assert bus.counters.malformed == len(DAMAGED)
+
+
+def test_an_adapter_that_delivers_nothing_but_damage_is_reported(
+    serial_adapter: SerialAdapter,
+) -> None:
+    """A wrong rate of the line is no silent bus; the first good frame ends it."""
+    with open_bus(serial_adapter.name) as bus:
+        serial_adapter.write(*[b't18'] * 150)
+        deadline = monotonic() + 10.0
+        with pytest.raises(BusError, match=r'damaged messages only, 100 in a row \(IndexError'):
+            receive(bus, 1, deadline)
+        serial_adapter.write(b't1811AA')
+        frames: list[tuple[int, bytes]] = []
+        while not frames and monotonic() < deadline:
+            with suppress(BusError):
+                frames = receive(bus, 1, deadline)
+        assert frames == [(0x181, b'\xaa')]
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import threading
 import pytest
 
 from arm_canopen.can.bus_thread import BusThread
+from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.exceptions import BusError
 
@@ -52,3 +53,36 @@ def test_all_that_is_handed_over_around_the_end_is_answered(
         assert future.exception(TIMEOUT) is None or isinstance(future.exception(), BusError)
     with pytest.raises(BusError, match='the owner has ended'):
         running.result(TIMEOUT)
+
+
+class DefectiveBus(VirtualBus):
+    """A bus whose receiving fails twice."""
+
+    failures = 2
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Fail, then read."""
+        if self.failures:
+            self.failures -= 1
+            raise ZeroDivisionError
+        return super().receive(timeout)
+
+
+def test_a_defect_in_reading_the_bus_does_not_end_the_thread(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """What its owner does each cycle goes on; it is reported once."""
+    wire = VirtualWire()
+    bus, other = DefectiveBus('here', wire), VirtualBus('there', wire)
+    seen: list[Frame] = []
+
+    def serve() -> None:
+        while not seen:
+            seen.extend(thread.receive(TIMEOUT))
+
+    thread = BusThread(bus, 'owner', serve, 'the owner')
+    other.send(Frame(0x181, b''))
+    thread.start()
+    thread._thread.join(TIMEOUT)
+    assert [frame.can_id for frame in seen] == [0x181]
+    assert [record.message for record in caplog.records] == ['a defect in reading here']

@@ -455,6 +455,34 @@ def test_a_motion_source_leads_in_the_cycle(master: CanopenMaster) -> None:
     assert drive.position == pytest.approx(0.1, abs=0.002)
 
 
+def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
+    drives: object, bus_yml: Path, bus: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody leads the drive any more; it does not fault, as at the loss of the heartbeat."""
+    master = CanopenMaster.from_bus_yml(bus_yml, bus)
+    master.boot(TIMEOUT)
+    drive, thread = master.drive('joint1'), master._master.thread
+    thread.network.nodes['joint1'].watch_slot = 0
+    drive.enable()
+    drive.select_mode(OperationMode.PROFILE_POSITION)
+    drive.set_target(1000.0)
+    wait_until_in_motion(drive)
+    ended = threading.Event()
+    thread.on_failure = ended.set
+    thread.call(lambda: monkeypatch.setattr(thread, '_statistics', None))
+    assert ended.wait(TIMEOUT)
+    assert 'quick stop sent to joint1; nothing else stops joint1' in str(thread.failure)
+    with pytest.raises(DriveError, match='could not be stopped'):
+        master.close()
+    with independent_client(bus, monkeypatch) as network:
+        word = statusword(network, 2)
+        deadline = time.monotonic() + TIMEOUT
+        while word & 0x4F == 0x07:  # it brakes
+            assert time.monotonic() < deadline
+            word = int(network[2].sdo[0x6041].raw)
+    assert word & 0x4F == 0x40  # Switch on disabled
+
+
 def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(
     drives: subprocess.Popen[str], bus_yml: Path, bus: str
 ) -> None:

@@ -17,6 +17,7 @@ from .frame import checked, Frame, PAYLOAD_MAX
 
 _POLL = 0.02  # [s] longest time until wake() is noticed; python-can has no way to end a recv
 _BATCH_MAX = 1000  # frames; a flooded bus must not keep the caller inside receive
+_DAMAGED_MAX = 100  # messages in a row, after which the adapter counts as gone
 _WALL_CLOCK_SPAN = 1.0  # [s] stamps further from now count from something else than 1970
 
 
@@ -50,6 +51,7 @@ class AdapterBus(Bus):
         self._send_lock = Lock()
         self._closed = False
         self._last = 0.0
+        self._damaged = 0
 
     def send(self, frame: Frame) -> None:
         """Hand the frame to the adapter.
@@ -74,13 +76,13 @@ class AdapterBus(Bus):
         if self._closed:
             raise BusError(f'{self.name} is closed')
         try:
-            message = self._wait(monotonic() + timeout) if timeout > 0.0 else self._bus.recv(0)
+            message = self._wait(monotonic() + timeout) if timeout > 0.0 else self._next(0.0)
             frames = []
             while message is not None:
                 frame = self._accept(message)
                 if frame is not None:
                     frames.append(frame)
-                message = self._bus.recv(0) if len(frames) < _BATCH_MAX else None
+                message = self._next(0.0) if len(frames) < _BATCH_MAX else None
         except (can.CanError, OSError) as error:
             raise BusError(f'{self.name} went away: {error}') from error
         self.counters.received += len(frames)
@@ -92,14 +94,53 @@ class AdapterBus(Bus):
             left = deadline - monotonic()
             if left <= 0.0:
                 break
-            message = self._bus.recv(min(left, _POLL))
+            message = self._next(min(left, _POLL))
         self._woken.clear()
         return message
+
+    def _next(self, timeout: float) -> can.Message | None:
+        """Return the next message; one that its driver cannot decode is dropped.
+
+        Drivers of serial adapters raise whatever a line with a damaged byte leads to.
+
+        Raises:
+            can.CanError, OSError: The adapter went away.
+            BusError: It delivers damaged messages only.
+        """
+        try:
+            message = self._bus.recv(timeout)
+        except Exception as error:
+            gone = isinstance(error, (can.CanError, OSError))
+            if gone and not isinstance(error.__cause__, UnicodeDecodeError):
+                raise
+            self._forget_line()
+            self.counters.malformed += 1
+            self._damaged += 1
+            if self._damaged < _DAMAGED_MAX:
+                return None
+            raise BusError(
+                f'{self.name} delivers damaged messages only, {self._damaged} in a row '
+                f'({type(error).__name__}: {error}); do bit rate and protocol of the adapter fit?'
+            ) from error
+        if message is not None:
+            self._damaged = 0
+        return message
+
+    def _forget_line(self) -> None:
+        """Drop a line that is no text; python-can's slcan keeps it, and fails for ever."""
+        line = getattr(self._bus, '_buffer', None)
+        if isinstance(line, bytearray):
+            line.clear()
 
     def _accept(self, message: can.Message) -> Frame | None:
         if not message.is_rx:
             return None
-        if message.is_fd or len(message.data) > PAYLOAD_MAX:
+        size = len(message.data)
+        if (
+            message.is_fd
+            or size > PAYLOAD_MAX
+            or not (message.is_remote_frame or size == message.dlc)
+        ):
             self.counters.malformed += 1
             return None
         self._last = max(self._last, _steady_stamp(message.timestamp))

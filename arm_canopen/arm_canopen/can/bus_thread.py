@@ -113,21 +113,25 @@ class BusThread:
         return future
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; a bus that went away is waited for."""
+        """Wait for frames; a bus that went away, or fails by a defect, is waited for."""
         try:
             frames = self._bus.receive(timeout)
-        except BusError as error:
+        except Exception as error:  # noqa: BLE001  # the cycle of the owner goes on
             self.note_failure(error)
             time.sleep(min(REOPEN_PAUSE, timeout))
             return []
         self._failed = self._failed and not frames
         return frames
 
-    def note_failure(self, error: BusError) -> None:
+    def note_failure(self, error: Exception) -> None:
         """Log the first failure of the bus; the next one after frames have arrived again."""
-        if not self._failed and not self.stopping:
-            self._failed = True
+        if self._failed or self.stopping:
+            return
+        self._failed = True
+        if isinstance(error, BusError):
             logger.error('%s', error)
+        else:
+            logger.error('a defect in reading %s', self._bus.name, exc_info=error)
 
     def do_work(self) -> None:
         """Run what was handed over; for the owner, in the thread."""

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from contextlib import suppress
+import struct
 import time
 
 from ..can.bus import Bus
@@ -16,6 +18,7 @@ from ..cia402.drive import Drive
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.motion import MotionSource
 from ..cia402.motion_group import MotionGroup
+from ..cia402.state_machine import Command
 from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config.model import BusConfig
 from ..exceptions import BusError, CanopenError, DriveError
@@ -25,8 +28,12 @@ from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread, OWNER
 from ..master.scheduler import Scheduler
+from ..standard.cob_id import CobId
+from ..standard.objects import Index
+from ..standard.sdo import DownloadRequest
 
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
+QUICK_STOP = struct.pack('<H', Command.QUICK_STOP)
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
 
 
@@ -90,6 +97,7 @@ class BusMaster:
         self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
         self._group = MotionGroup(drives, self._report)
         self.network.on_cycle = self._group.cycle
+        self.thread.on_defect = self._stop_without_cycle
         self.started = False
         self._leaving = False
         self.on_operational: Callable[[], None] = lambda: None
@@ -173,6 +181,30 @@ class BusMaster:
             Done before the next cycle.
         """
         return self.thread.call(lambda: self._group.detach(source))
+
+    def _stop_without_cycle(self) -> str:
+        """Send a quick stop once to each drive that may have power; nobody waits for an answer.
+
+        Returns:
+            What was sent, and to which drives it is all that stops them.
+        """
+        powered = [axis.drive for axis in self.commands.values() if not axis.drive.stop.disabled]
+        for drive in powered:
+            index = drive.objects.at(Index.CONTROLWORD)
+            request = DownloadRequest(index, 0, QUICK_STOP)
+            cob_id = CobId.SDO_REQUEST + drive.node.config.node_id
+            with suppress(BusError):
+                self.can.send(Frame(cob_id, request.encode()))
+        if not powered:
+            return ''
+        text = f'; quick stop sent to {", ".join(drive.name for drive in powered)}'
+        unwatching = [drive.name for drive in powered if not drive.node.watch_slot]
+        if unwatching:
+            text += (
+                f'; nothing else stops {", ".join(unwatching)}, without a watch of the heartbeat '
+                'of the master (0x1016): cut the power of what goes on'
+            )
+        return text
 
     def _send(self, frame: Frame) -> None:
         self.can.send(frame)

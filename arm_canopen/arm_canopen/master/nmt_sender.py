@@ -56,13 +56,15 @@ class NmtSender:
 
     async def _empty(self) -> None:
         self._busy = True
-        while self._waiting:
-            command, node_id, sent = self._waiting.popleft()
-            if sent.done:
-                continue  # withdrawn
-            self._on_sent(command, node_id)
-            self._send(Frame(CobId.NMT, nmt_frame(command, node_id)))
-            sent.resolve(None)
-            if self._inhibit_time > 0.0:
-                await self._scheduler.timer(self._inhibit_time)
-        self._busy = False
+        try:
+            while self._waiting:
+                command, node_id, sent = self._waiting.popleft()
+                if sent.done:
+                    continue  # withdrawn
+                self._on_sent(command, node_id)
+                self._send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+                sent.resolve(None)
+                if self._inhibit_time > 0.0:
+                    await self._scheduler.timer(self._inhibit_time)
+        finally:
+            self._busy = False

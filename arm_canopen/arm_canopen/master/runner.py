@@ -40,6 +40,7 @@ class NetworkThread:
         network: The network that it runs.
         period: Length of the cycle in [s].
         failure: Defect that has ended it; None while it runs, and after a wanted end.
+        on_defect: Called in the thread, for what can still be done; returns what was, in words.
         on_failure: Called in the thread when there is one.
     """
 
@@ -53,6 +54,7 @@ class NetworkThread:
         self.network = network
         self.period = network.config.master.cycle_period
         self.failure: BusError | None = None
+        self.on_defect: Callable[[], str] = lambda: ''
         self.on_failure: Callable[[], None] = lambda: None
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
@@ -109,6 +111,10 @@ class NetworkThread:
 
     def _fail(self, error: Exception) -> None:
         text = f'{OWNER} has ended by a defect: {type(error).__name__}: {error}'
+        try:
+            text += self.on_defect()
+        except Exception:
+            logger.exception('a second defect, after the end of the CANopen cycle')
         self.failure = BusError(text)
         self.on_failure()
 

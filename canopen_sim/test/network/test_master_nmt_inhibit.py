@@ -121,3 +121,21 @@ def test_a_reset_that_waits_is_a_commanded_one_when_it_has_left() -> None:
     restarts = [event for event in net.events if 'RESET_COMMUNICATION' in event.text]
     assert [event.node for event in restarts] == list(net.devices)
     assert all(event.severity is Severity.INFO for event in restarts)
+
+
+@pytest.mark.parametrize('inhibit_time', [0.0, 0.05])
+def test_a_defect_at_one_command_keeps_back_no_other(
+    inhibit_time: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop by NMT must leave, whatever went wrong before."""
+    net = seven_drives(inhibit_time)
+    net.allows_defects = True
+    net.boot()
+    with monkeypatch.context() as patch:
+        patch.setattr(net.network._nmt, '_on_sent', None)
+        net.network.send_nmt(NmtCommand.STOP, 2)
+        net.run(0.2)
+    assert sent_at(net, NmtCommand.STOP, 2) == []
+    net.network.send_nmt(NmtCommand.STOP, 3)
+    net.run(0.2)
+    assert len(sent_at(net, NmtCommand.STOP, 3)) == 1
