@@ -157,6 +157,7 @@ def serial_adapter() -> Iterator[SerialAdapter]:
 
 
 DAMAGED = [b't18', b't1x11AA', b't1811ZZ', b't\xff811AA', b'T0000', b't1814AABB']
+LINES = 20 * DAMAGED  # more than may be damaged in a row
 
 
 def receive(bus: Bus, count: int, deadline: float) -> list[tuple[int, bytes]]:
@@ -170,11 +171,11 @@ def receive(bus: Bus, count: int, deadline: float) -> list[tuple[int, bytes]]:
 def test_a_damaged_line_costs_no_other_frame(serial_adapter: SerialAdapter) -> None:
     """Truncated, or with bytes that are no digits: each is counted, and the bus stays open."""
     with open_bus(serial_adapter.name) as bus:
-        for damaged in DAMAGED:
+        for damaged in LINES:
             serial_adapter.write(b't1811AA', damaged, b't1821BB')
-        frames = receive(bus, 2 * len(DAMAGED), monotonic() + 10.0)
-        assert frames == [(0x181, b'\xaa'), (0x182, b'\xbb')] * len(DAMAGED)
-        assert bus.counters.malformed == len(DAMAGED)
+        frames = receive(bus, 2 * len(LINES), monotonic() + 10.0)
+        assert frames == [(0x181, b'\xaa'), (0x182, b'\xbb')] * len(LINES)
+        assert bus.counters.malformed == len(LINES)
 
 
 def test_an_adapter_that_delivers_nothing_but_damage_is_reported(
