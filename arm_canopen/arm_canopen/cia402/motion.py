@@ -93,6 +93,9 @@ class MotionSource(Protocol):
     def released(self, axis: str, refusal: Refusal) -> None:
         """Learn that an axis was taken away; until attached again its set-points are ignored.
 
+        It is called for an axis that was away before, too, where a client stops or moves it:
+        what the source was about to begin when it gets the axis back is older than that.
+
         Args:
             axis: Name of the drive.
             refusal: Why: a single target, another mode, a fault, a loss.

@@ -19,16 +19,21 @@ from .refusal import Refusal, RefusalCause
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
 DEFAULT_SPEED_MARGIN = 10.0  # the same of the profile velocity, for drives without one
+BY_CLIENTS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED, RefusalCause.SINGLE_TARGET)
 
 
 @dataclass(slots=True)
 class Attachment:
-    """A source, its drives in its order, and which of them it has taken over."""
+    """A source, its drives in its order, and which of them it has taken over.
+
+    One that has failed is asked no more, and still learns what its drives are taken away for.
+    """
 
     source: MotionSource
     drives: list[Drive]
     owned: list[Drive] = field(default_factory=list)
     streaming: set[str] = field(default_factory=set)
+    failed: bool = False
 
 
 class MotionGroup:
@@ -69,10 +74,10 @@ class MotionGroup:
         drives = [self.drives[name] for name in source.axes]
         before = [entry for entry in self._attachments if entry.source is source]
         kept = [drive for entry in before for drive in entry.owned]
+        self.detach(source)
         for drive in drives:
             if drive not in kept:
                 self._release(drive, Refusal(RefusalCause.OTHER_SOURCE))
-        self.detach(source)
         streaming = {name for entry in before for name in entry.streaming}
         self._attachments.append(Attachment(source, drives, list(drives), streaming))
 
@@ -94,7 +99,8 @@ class MotionGroup:
             except Exception as error:  # noqa: BLE001, PERF203
                 drive.fail(error)
         for attachment in list(self._attachments):
-            self._run(attachment, now, period)
+            if not attachment.failed:
+                self._run(attachment, now, period)
         for drive in self.drives.values():
             try:
                 drive.write(now, period)
@@ -145,11 +151,14 @@ class MotionGroup:
         drive.stream(setpoint)
 
     def _release(self, drive: Drive, refusal: Refusal) -> None:
+        """Take a drive away; a source that has not got it back yet must not do so any more."""
         for attachment in self._attachments:
             if drive in attachment.owned:
                 attachment.owned.remove(drive)
                 attachment.streaming.discard(drive.name)
-                self._notify(attachment.source, drive.name, refusal)
+            elif drive not in attachment.drives or refusal.cause not in BY_CLIENTS:
+                continue
+            self._notify(attachment.source, drive.name, refusal)
 
     def _notify(self, source: MotionSource, axis: str, refusal: Refusal) -> None:
         try:
@@ -162,7 +171,8 @@ class MotionGroup:
             self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))
 
     def _fail(self, attachment: Attachment, reason: str) -> None:
-        self.detach(attachment.source)
+        attachment.failed = True
+        attachment.owned.clear()
         name = type(attachment.source).__name__
         text = f'motion source {name} {reason}; it is detached and its drives are braked'
         self._report(Event(EventKind.DRIVE, Severity.ERROR, '', text))

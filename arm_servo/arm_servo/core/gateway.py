@@ -211,6 +211,14 @@ class CommandGateway:
         )
         return set_point
 
+    def refuse_earlier(self, reason: str) -> None:
+        """Refuse what was requested so far and has not begun; for any thread.
+
+        Args:
+            reason: What has happened since, with the remedy.
+        """
+        self._order.void(MOTIONS, reason)
+
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Bring the arm to rest, a trajectory on its path; the motion ends with the reason.
 

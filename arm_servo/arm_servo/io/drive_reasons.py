@@ -85,6 +85,16 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
     return _sentence(causes) or why_not(feedback, released), code
 
 
+def taken_away(axis: str, refusal: Refusal) -> str:
+    """Return why a drive was taken away.
+
+    Args:
+        axis: Name of the drive.
+        refusal: What happened.
+    """
+    return _sentence([(axis, refusal)])
+
+
 def _is_silent(axis: AxisFeedback) -> bool:
     return axis.refusal is not None and axis.refusal.cause is RefusalCause.SILENT
 

@@ -14,7 +14,7 @@ from arm_model import frozen, RobotState
 
 from ..core.gateway import CommandGateway
 from ..core.set_point import Source
-from .drive_reasons import COMMAND, what_happened, why_not
+from .drive_reasons import COMMAND, taken_away, what_happened, why_not
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
@@ -76,11 +76,14 @@ class DriveSource:
     def released(self, axis: str, refusal: Refusal) -> None:
         """Come to rest, and leave the drives alone until attached again.
 
+        What was requested before is refused, also where it would get the drive back.
+
         Args:
             axis: Name of the drive.
             refusal: Why it was taken away.
         """
-        self._released = {**self._released, axis: refusal}
+        self._released = {axis: refusal, **self._released}
+        self._gateway.refuse_earlier(taken_away(axis, refusal))
 
     def update(
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
