@@ -12,6 +12,7 @@ import time
 from isolation import reserve
 import pytest
 from simulated_quad import SimulatedQuad
+from std_srvs.srv import SetBool
 
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
 from quad_description.rotations import tilt_of
@@ -138,6 +139,36 @@ def test_a_killed_bridge_is_reported_and_its_successor_goes_on_smoothly(
     quad.set_mode('walk')
     quad.walk(1.0)
     check_upright(quad)
+
+
+def test_a_robot_that_was_let_go_does_not_rise_when_its_servos_hold_again(
+    quad: SimulatedQuad,
+) -> None:
+    """It stood, and its controller streams that; `relax`, then `stand` brings it up."""
+
+    def give(on: bool) -> None:
+        request = SetBool.Request(data=on)
+        assert quad.client.call(SetBool, '/hardware_node/torque', request).success
+
+    give(False)
+    quad.spin(1.0)
+    sunk = quad.truth[-1].pose.pose.position.z
+    give(True)
+    quad.spin(0.1)
+    held, given = quad.joints[-1].position, time.monotonic()
+    quad.spin(2.0)
+    assert quad.state == 'stand'
+    assert list(quad.joints[-1].position) == pytest.approx(list(held), abs=0.05)
+    assert quad.truth[-1].pose.pose.position.z == pytest.approx(sunk, abs=0.005)
+    quad.processes['hardware'].wait_for('the servos were let go, and ')
+    quad.set_mode('relax')
+    quad.client.spin_until(lambda: quad.state == 'relax', 20.0, 'relax')
+    quad.spin(0.5)
+    quad.stand()
+    quad.spin(0.5)
+    assert tilt(quad) < math.radians(15.0)
+    assert quad.truth[-1].pose.pose.position.z > sunk + 0.02
+    assert quad.tap.largest_step(since=given) < LARGEST_STEP
 
 
 def test_nonsense_on_joint_command_reaches_no_servo(quad: SimulatedQuad) -> None:

@@ -23,6 +23,8 @@ ON_THE_WAY = 'to '
 """In front of a state that is not reached yet."""
 TO_STAND = ON_THE_WAY + STANDING
 """It stands up, or ends its gait."""
+TO_LIE = ON_THE_WAY + LYING
+"""It lies down already; left now, it would stay half-way."""
 
 
 class Client(Protocol):
@@ -111,7 +113,7 @@ def _stand_still(client: Client, report: Callable[[str], None]) -> None:
 
 
 def _lie_down(client: Client, report: Callable[[str], None]) -> None:
-    if client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
+    if client.state != TO_LIE and client.state.removeprefix(ON_THE_WAY) not in ON_ITS_FEET:
         return
     report('lying down first; Ctrl-C again stops at once')
     # what fails on the way down stops it; asked once more, the robot lies down without it

@@ -170,13 +170,16 @@ class SerialRobot:
         return self._commander.goes_down
 
     def set_torque(self, *, on: bool) -> bool:
-        """Let the servos go, or have them hold where they are; return whether that is sent."""
+        """Let the servos go, or have them hold where they are; return whether that is sent.
+
+        A stream of commands that was there before does not go on where the legs have moved.
+        """
         positions = self._place(time.monotonic())
         if on and positions:  # a servo that wakes goes to its last target
             self._driver.command(self._joints.angles_at(positions))
         sent = self._driver.torque(on=on)
         if sent:
-            self._commander.forget()
+            self._commander.let_go()
         return sent
 
     # -- in the thread of the driver

@@ -257,6 +257,34 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
     assert rig.peer.commands[-1][11] == pytest.approx(20.0, abs=0.01)
 
 
+def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) -> None:
+    """Its targets are those of a robot that stood; a stream that begins anew is a new request."""
+    rig.stream(HOME, 0.5)
+
+    def give(on: bool) -> SetBool.Response:
+        return rig.client.call(SetBool, '/hardware_node/torque', SetBool.Request(data=on))
+
+    timer = rig.client.node.create_timer(0.02, lambda: rig.command(HOME))
+    assert give(False).success
+    rig.client.spin_until(lambda: not rig.peer.torque, TIMEOUT, 'torque off')
+    rig.peer.angles.update(dict.fromkeys(rig.peer.angles, 20.0))
+    rig.receive('/joint_states', 5)
+    before = len(rig.peer.commands)
+    assert give(True).success
+    rig.client.spin_until(lambda: rig.peer.torque, TIMEOUT, 'torque on')
+    rig.wait_for_status('joint commands', DiagnosticStatus.WARN, 'set the mode relax, then stand')
+    rig.receive('/joint_states', 30)
+    rig.client.node.destroy_timer(timer)
+    targets = [angle for angles in rig.peer.commands[before:] for angle in angles.values()]
+    assert targets
+    assert targets == pytest.approx([20.0] * len(targets), abs=0.01)
+    count = len(rig.peer.commands)
+    rig.receive('/joint_states', 80)  # longer than the pause that ends a stream
+    rig.stream(HOME, 1.0)
+    assert len(rig.peer.commands) > count
+    assert rig.peer.angles[11] != pytest.approx(20.0, abs=1.0)
+
+
 @pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
 def test_torque_comes_back_where_the_arm_is(
     isolation: Isolation, tmp_path: Path, protocol: Protocol

@@ -231,6 +231,30 @@ def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
     assert not line.commander.counters.loss
 
 
+@given(st.lists(st.sampled_from(['same', 'away', 'near']), min_size=1, max_size=30))
+def test_a_stream_of_before_does_not_raise_a_robot_that_was_let_go(steps: list[str]) -> None:
+    """Whatever its targets do, nothing is sent before they were near the legs once."""
+    line = Line()
+    now = line.walk(0.5)
+    line.commander.let_go()
+    before, sunk, offset, is_back = (
+        len(line.sent),
+        dict(zip(NAMES, LYING, strict=True)),
+        0.4,
+        False,
+    )
+    for step in steps:
+        now += PERIOD
+        offset = {'same': offset, 'away': offset + 0.4, 'near': 0.2}[step]
+        is_back = is_back or offset < 0.3
+        targets = [LYING[0] + offset, *LYING[1:]]
+        assert (line.commander.take(targets, sunk, now) is not None) is is_back
+    assert (len(line.sent) > before) is is_back
+    if not is_back:
+        assert f'{NAMES[0]} is {offset:.2f} rad from its target' in line.warned[-1]
+        assert line.commander.take(targets, sunk, now + 0.6) is not None, 'a stream that begins'
+
+
 @pytest.mark.parametrize('share', [0.1, 0.5, 0.9, 0.99])
 def test_a_pause_on_the_way_down_makes_it_later_and_not_quicker(share: float) -> None:
     """A busy machine: all of the way is sent, and no step is larger for it."""

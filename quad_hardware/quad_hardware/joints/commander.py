@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 
 from ..exceptions import CommandError
 from .command import Command, CommandLimiter, LimiterSettings
 from .command_loss import CommandLoss, LossReaction
 from .mapping import JointMap
+
+LET_GO_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
 
 
 @dataclass(slots=True)
@@ -76,6 +79,9 @@ class JointCommander:
         self._loss = CommandLoss(joints, raised, reaction, limiter.stream_timeout)
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
+        self._let_go = False
+        self._stream_timeout = limiter.stream_timeout
+        self._received_at = -math.inf
         self.timeout = self._loss.timeout
 
     @property
@@ -93,11 +99,13 @@ class JointCommander:
         self._commanded.reset()
         self._descent.reset()
 
-    def forget(self) -> None:
-        """Begin anew with the next command, and do not miss it: servos were let go, or not."""
-        self.lose()
-        self._loss.forget()
-        self._last_targets = ()
+    def let_go(self) -> None:
+        """Let no stream go on that began before the servos were let go, or hold again.
+
+        Its targets are where the legs were then: the robot would rise unasked.
+        """
+        self._forget()
+        self._let_go = True
 
     def refuse(self, error: CommandError) -> None:
         """Count a command that is none."""
@@ -114,6 +122,10 @@ class JointCommander:
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
             now: Time [s].
         """
+        is_new = now - self._received_at > self._stream_timeout
+        self._received_at = now
+        if self._let_go and (is_new or self._farthest(positions, place)[0] <= LET_GO_BAND):
+            self._let_go = False
         command = self._send(self._commanded, positions, place, now)
         if command is not None:
             self._loss.commanded(command.targets, now)
@@ -158,22 +170,52 @@ class JointCommander:
         try:
             stream.check(positions)
             if not place:
-                self._drop()
+                self._drop(self._obstacle())
                 return None
             measured = [place.get(name) for name in self._joints.names]
             command = stream.step(positions, measured, now)
         except CommandError as error:
             self.refuse(error)
             return None
+        if self._let_go and stream is self._commanded:
+            distance, joint = self._farthest(positions, place)
+            self._drop(
+                f'the servos were let go, and {joint} is {distance:.2f} rad from its target; set '
+                f'the mode relax, then stand, or pause the commands for {self._stream_timeout:g} s'
+            )
+            return None
         if not self._send_angles(self._joints.angles(command.targets)):
-            self._drop()
+            self._drop(self._obstacle())
             return None
         self._count(command)
         return command
 
-    def _drop(self) -> None:
-        self.forget()
-        self._trouble(f'joint command not sent: {self._obstacle()}')
+    def _farthest(
+        self, positions: Sequence[float], place: Mapping[str, float]
+    ) -> tuple[float, str]:
+        """Return how far the targets of the legs are from where these are [rad], and where most.
+
+        A target that is no number, and a leg that is not measured, are infinitely far.
+        """
+        legs = self._joints.names[: self._joints.leg_count]
+        distances = (
+            (abs(target - place.get(name, math.nan)), name)
+            for target, name in zip(positions, legs, strict=False)
+        )
+        return max(
+            ((math.inf if math.isnan(far) else far, name) for far, name in distances),
+            default=(math.inf, ''),
+        )
+
+    def _forget(self) -> None:
+        """Begin anew with the next command, and do not miss it: the robot does not get it."""
+        self.lose()
+        self._loss.forget()
+        self._last_targets = ()
+
+    def _drop(self, reason: str) -> None:
+        self._forget()
+        self._trouble(f'joint command not sent: {reason}')
 
     def _count(self, command: Command) -> None:
         counters, legs = self.counters, self._joints.leg_count

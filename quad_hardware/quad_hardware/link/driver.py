@@ -38,8 +38,7 @@ class Driver:
     quick; when one of them fails, the conversation begins anew, and the link says so. Nothing is
     sent to servos while no report is taken: they hold their last target.
 
-    Attributes:
-        limp: Whether the last change of torque that was sent let the servos go.
+    ``command`` and ``torque`` are for one other thread.
     """
 
     def __init__(
@@ -58,7 +57,8 @@ class Driver:
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         self._mailbox = Mailbox()
         self._torque_unsent: bool | None = None  # taken from the mailbox, and not written yet
-        self.limp = False
+        self._released = False  # by the last change of torque that was accepted
+        self._limp = False  # by the last one that was sent
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
         self._session: Session | None = None
@@ -116,8 +116,14 @@ class Driver:
         able = session is not None and session.dialect.can_release
         accepted = able and self._mailbox.put_torque(on=on)
         if accepted:
+            self._released = not on
             self._wake()
         return accepted
+
+    @property
+    def limp(self) -> bool:
+        """Whether the servos were let go: from that order on, until they are known to hold."""
+        return self._released or self._limp
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
@@ -147,7 +153,7 @@ class Driver:
             self._mailbox.open()
         elif self._mailbox.close().torque is not None or self._torque_unsent is not None:
             self._torque_unsent = None
-            detail += '; a change of torque was not sent'
+            detail += '; a change of torque may not have been sent'
         if (state, detail) != (self._state, self._detail):
             self._state, self._detail = state, detail
             self._on_change(state, detail)
@@ -212,7 +218,7 @@ class Driver:
             if step.send:
                 session.port.write(step.send)
             if self._torque_unsent is not None and not dialect.torque_pending:
-                self.limp, self._torque_unsent = not self._torque_unsent, None
+                self._limp, self._torque_unsent = not self._torque_unsent, None
             timeout = min(step.wake, self._deadline(now)) - now
             if session.parser.pending:
                 timeout = min(timeout, QUIET_TIME)
