@@ -475,11 +475,9 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
     with pytest.raises(DriveError, match='could not be stopped'):
         master.close()
     with independent_client(bus, monkeypatch) as network:
-        word = statusword(network, 2)
         deadline = time.monotonic() + TIMEOUT
-        while word & 0x4F == 0x07:  # it brakes
+        while (word := statusword(network, 2)) & 0x4F == 0x07:  # it brakes
             assert time.monotonic() < deadline
-            word = int(network[2].sdo[0x6041].raw)
     assert word & 0x4F == 0x40  # Switch on disabled
 
 

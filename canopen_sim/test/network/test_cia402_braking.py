@@ -81,7 +81,7 @@ def test_a_disable_lasts_as_long_as_its_ramp() -> None:
 def test_a_disable_whose_ramp_does_not_end_becomes_a_quick_stop() -> None:
     """The drive brakes slower than its objects say; the power goes when it stands."""
     moving = MovingDrive(2, SLOW_DISABLE)
-    moving.net.devices[JOINT].store.find(0x6084).put(500)
+    moving.net.devices[JOINT].store.find(0x6084).value = 500
     disabling = moving.net.begin(JOINT, 'disable', preempt=True)
     moving.run(12.0)
     with pytest.raises(DriveError, match='did not reach Switched on within 6'):
