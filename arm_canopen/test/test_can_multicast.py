@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import os
 import socket
+from threading import current_thread, Thread
 from time import monotonic, time_ns
 
 import can
@@ -181,3 +183,25 @@ def test_wrong_groups_and_ports_are_refused_with_the_reason(wrong: str, reason: 
     """Each mistake in the name is reported, with what would be right."""
     with pytest.raises(BusError, match=reason):
         open_bus(wrong)
+
+
+def test_a_wake_writes_to_no_descriptor_that_was_closed(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may be a file of somebody else by then: a thread hands work over while the bus ends."""
+    opened, write, states = open_bus(name), os.eventfd_write, []
+    closing = Thread(target=opened.close)
+
+    def write_late(descriptor: int, value: int) -> None:
+        if current_thread() is not closing:
+            closing.start()
+            closing.join(0.2)  # it must not get further while this thread has the descriptor
+            states.append(os.fstat(descriptor))
+        write(descriptor, value)
+
+    monkeypatch.setattr(os, 'eventfd_write', write_late)
+    opened.wake()
+    monkeypatch.undo()
+    closing.join(10.0)
+    assert not closing.is_alive()
+    assert len(states) == 1

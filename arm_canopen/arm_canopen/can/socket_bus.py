@@ -12,6 +12,7 @@ import os
 import select
 import socket
 import struct
+from threading import Lock
 from time import monotonic, monotonic_ns, time_ns
 
 from ..exceptions import BusError
@@ -113,6 +114,7 @@ class SocketBus(Bus):
         self._receiver = receiver
         self._stamps = TimestampReader()
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
+        self._wake_lock = Lock()  # a closed descriptor may be somebody else's by the next moment
         self._closed = False
 
     @abstractmethod
@@ -183,17 +185,19 @@ class SocketBus(Bus):
 
     def wake(self) -> None:
         """Let a waiting :meth:`receive` return at once."""
-        if not self._closed:
-            os.eventfd_write(self._wake_fd, 1)
+        with self._wake_lock:
+            if not self._closed:
+                os.eventfd_write(self._wake_fd, 1)
 
     def close(self) -> None:
         """Close the sockets; end a thread that waits in :meth:`receive` first."""
         if self._closed:
             return
         self.wake()
-        self._closed = True
-        self._receiver.close()
-        os.close(self._wake_fd)
+        with self._wake_lock:
+            self._closed = True
+            self._receiver.close()
+            os.close(self._wake_fd)
 
 
 def _poll(descriptors: tuple[int, ...], timeout: float) -> list[int]:

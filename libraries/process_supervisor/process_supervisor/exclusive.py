@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import contextlib
 import errno
+import hashlib
 import socket
 import struct
 
@@ -32,7 +33,7 @@ def exclusive(thing: str, remedy: str) -> Iterator[None]:
     Raises:
         StartError: Another process holds it; the message names it.
     """
-    name = f'\0bringup {thing}'.encode()[:_LONGEST]
+    name = _abstract_name(thing)
     with socket.socket(socket.AF_UNIX) as holder:
         try:
             holder.bind(name)
@@ -44,6 +45,14 @@ def exclusive(thing: str, remedy: str) -> Iterator[None]:
             ) from error
         holder.listen()
         yield
+
+
+def _abstract_name(thing: str) -> bytes:
+    name = f'\0bringup {thing}'.encode()
+    if len(name) <= _LONGEST:
+        return name
+    digest = hashlib.blake2b(name, digest_size=16).hexdigest().encode()
+    return name[: _LONGEST - len(digest)] + digest
 
 
 def _process_of(name: bytes) -> str:

@@ -52,6 +52,16 @@ def another_process(bus: str, user: int) -> Iterator[tuple[subprocess.Popen[str]
             process.kill()
 
 
+def test_long_names_differ_to_their_end(bus: str) -> None:
+    """A name of a socket has room for 107 bytes; namespaces and ports may be longer."""
+    long = f'{bus} {"/left" * 40}'
+    with exclusive(f'{long}/a', REMEDY):
+        with exclusive(f'{long}/b', REMEDY):
+            pass
+        with pytest.raises(StartError, match='left/a'), exclusive(f'{long}/a', REMEDY):
+            pass
+
+
 def test_the_second_on_a_bus_is_refused_with_the_first_ones_process(bus: str) -> None:
     """With the remedy; another bus is free; after the first has left, so is this one."""
     with exclusive(bus, REMEDY):
