@@ -15,13 +15,13 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
 from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import BusError, CanopenError, DriveError
 from arm_canopen.library.canopen_master import CanopenMaster
 from arm_canopen.master.events import Event, EventKind, Severity
+from arm_canopen.master.runner import NetworkThread
 from arm_canopen.nodes import master
 from arm_canopen.nodes.master_process import MasterProcess
 
@@ -29,16 +29,13 @@ DEADLINE = 10.0  # [s] for what takes milliseconds
 CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())
 
 
-class BreakingBus(VirtualBus):
-    """A bus whose driver fails in a way that nobody expects, from a moment on."""
+def end_by_defect(thread: NetworkThread) -> None:
+    """Have the cycle fail in a way that nobody expects."""
 
-    broken = False
+    def record(late: float, skipped: int) -> None:
+        raise ZeroDivisionError('injected')
 
-    def receive(self, timeout: float) -> list[Frame]:
-        """Fail from that moment on."""
-        if self.broken:
-            raise ZeroDivisionError('injected')
-        return super().receive(timeout)
+    thread._statistics.record = record  # type: ignore[method-assign]
 
 
 @pytest.fixture
@@ -53,13 +50,13 @@ def node(isolation: Isolation) -> Iterator[Node]:
 
 def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
     """It says that the drives could not be stopped, and raises nothing."""
-    bus = BreakingBus('here', VirtualWire())
+    bus = VirtualBus('here', VirtualWire())
     process = MasterProcess(node, CONFIG, bus, diagnostics_period=60.0)
     before = set(threading.enumerate())
     process.start()
     started = set(threading.enumerate()) - before
     assert {thread.name for thread in started} == {'canopen', 'ros output'}
-    bus.broken = True
+    end_by_defect(process._thread)
     (cycle,) = [thread for thread in started if thread.name == 'canopen']
     cycle.join(DEADLINE)
     assert not cycle.is_alive()
@@ -72,11 +69,11 @@ def test_stop_ends_both_threads_after_the_cycle_has_died(node: Node) -> None:
 
 def test_a_defect_that_ends_the_cycle_ends_the_program_with_its_reason(node: Node) -> None:
     """No process is left that answers and leads no drive."""
-    bus = BreakingBus('here', VirtualWire())
+    bus = VirtualBus('here', VirtualWire())
     process = MasterProcess(node, CONFIG, bus, diagnostics_period=60.0)
 
     def extend(_: object) -> list[Node]:
-        node.create_timer(0.01, lambda: setattr(bus, 'broken', True))  # when it runs
+        node.create_timer(0.01, lambda: end_by_defect(process._thread))  # when it runs
         return []
 
     with pytest.raises(CanopenError, match='has ended by a defect: ZeroDivisionError: injected'):
@@ -86,10 +83,9 @@ def test_a_defect_that_ends_the_cycle_ends_the_program_with_its_reason(node: Nod
 
 def test_a_defect_that_ends_the_cycle_ends_a_boot(tmp_path: Path) -> None:
     """Its caller is given the reason, and waits no longer; the drives could not be stopped."""
-    bus = BreakingBus('here', VirtualWire())
+    bus = VirtualBus('here', VirtualWire())
     made = CanopenMaster(load_text(tmp_path, added('joint1', '')), bus)
-
-    made._master.network.on_cycle = lambda now, period: setattr(bus, 'broken', True)
+    end_by_defect(made._master.thread)
     with pytest.raises(BusError, match='has ended by a defect: ZeroDivisionError: injected'):
         made.boot(DEADLINE)
     with pytest.raises(DriveError, match='could not be stopped'):

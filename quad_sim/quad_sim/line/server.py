@@ -74,7 +74,7 @@ class Server:
         """
         self._start = time.monotonic()
         while not self._stop.is_set():
-            self._turn(self.now)
+            self._turn()
             wait = min(max(self._line.next_event - self.now, 0.0), IDLE_PERIOD)
             watched: list[int | PseudoTerminal] = [self._wake_read]
             if self._terminal.plugged:
@@ -108,11 +108,12 @@ class Server:
     def _wake(self) -> None:
         os.write(self._wake_write, b'.')
 
-    def _turn(self, now: float) -> None:
+    def _turn(self) -> None:
         self._act()
         terminal, line = self._terminal, self._line
+        data = terminal.read() if terminal.plugged else b''
+        now = self.now  # bytes that came in a pause of this process did not come before it
         if terminal.plugged:
-            data = terminal.read()
             line.set_baud(terminal.baud)
             if data:
                 line.receive(data, now)
