@@ -4,15 +4,16 @@
 
 A quadratic program finds the joint speeds x that come nearest to the asked twist V::
 
-    min  |W (J x - V)|^2 + sum_i d_i^2 (v_i' x)^2 + w (n' x - e)^2
+    min  |W (J x - V)|^2 + sum_i d_i^2 (v_i' x)^2 + w (n' x - e)^2 + s |N x|^2
     with  -b(q - lower) <= x <= b(upper - q)          brakes in front of a joint's limit
           x0 - c <= x <= x0 + c                       what accelerations can bring about soon
           (dd/dq) x >= -k (d - margin)                brakes in front of each near pair of links
 
 Held axes weigh more in W than commanded ones, so that what a limit takes away is taken from the
 command and not paid for by a drift. d_i damps the directions that are nearly lost, and only those;
-n is the way out of a singular pose. Whatever the arm is in, standing still or leaving is feasible.
-The answer is then slowed as a whole to the joints' greatest speeds, which keeps its direction.
+n is the way out of a singular pose; N x moves the joints but not the tool. Whatever the arm is in,
+standing still or leaving is feasible. The answer is then slowed as a whole to the joints' greatest
+speeds, which keeps its direction.
 """
 
 from __future__ import annotations
@@ -34,6 +35,13 @@ AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
 
 REGULARIZATION = 1e-5
 """Weight of the joint speeds that keeps the program definite."""
+
+SELF_MOTION_WEIGHT = 2e-3
+"""Weight of joint speeds that do not move the tool.
+
+What a bound takes from one joint for a moment could be had by a swing of the elbow; it is not
+worth that. In front of a lasting limit the swing is small against what it gains.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +123,8 @@ class VelocityIk:
         self._scale = np.array([1.0 / length] * 3 + [1.0] * 3)
         self._weighed = b''
         self._axis_weights = self._scale
-        self._regularization = REGULARIZATION * np.eye(len(model))
+        self._identity = np.eye(len(model))
+        self._regularization = REGULARIZATION * self._identity
         settings = self._settings
         self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
 
@@ -145,6 +154,9 @@ class VelocityIk:
         hessian = asked.jacobian.T @ asked.jacobian
         if found.damped:
             hessian += (found.joints.T * found.damping) @ found.joints
+        if len(found.joints) < len(hessian):
+            still = self._identity - found.joints.T @ found.joints
+            hessian += SELF_MOTION_WEIGHT * still
         gradient = -((asked.command + asked.correction) @ asked.jacobian)
         way = self._reach_limit.way_out(jacobian_at, position, found, asked.command)
         if way is not None:
