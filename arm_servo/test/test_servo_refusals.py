@@ -25,6 +25,7 @@ from arm_servo.teleop.servo_keyboard_input import ServoKeyboardInput
 from node_runner import ParameterError
 from operator_input import OperatorInputError
 
+SPACE = '/refused'  # nodes of tests of before may still be known in the domain
 TWO_ARMS = {
     'robot_description': two_arms_texts()[0],
     'robot_description_semantic': two_arms_texts()[1],
@@ -85,12 +86,14 @@ def test_a_refused_node_leaves_nothing_in_the_graph(
     reason: str,
 ) -> None:
     """Neither the node whose parameter is wrong nor those before it are left in the process."""
-    rclpy.init(args=parameters(tmp_path, **values), domain_id=isolation.domain_id)
+    args = [*parameters(tmp_path, **values), '-r', f'__ns:={SPACE}']
+    rclpy.init(args=args, domain_id=isolation.domain_id)
     try:
         watcher = Node('watcher')
         with pytest.raises((ParameterError, ArmError, OperatorInputError), match=reason):
             make()
-        assert watcher.get_node_names() == ['watcher']
+        nodes = watcher.get_node_names_and_namespaces()
+        assert [name for name, space in nodes if space == SPACE] == ['watcher']
         watcher.destroy_node()
     finally:
         rclpy.shutdown()
