@@ -135,31 +135,6 @@ def test_a_hull_of_a_finely_rounded_part_is_around_it(length: float) -> None:
     assert np.linalg.norm(np.array(hull.points())[:, :2], axis=1).max() < 0.1 * 1.02
 
 
-def test_meshes_are_found_as_ros_finds_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By package, installed or as a source, beside the description, as a file, by its path."""
-    folder = tmp_path / 'robots' / 'my_arm' / 'urdf'
-    folder.mkdir(parents=True)
-    for place in ('prefix/share/installed', 'src/source', 'robots/beside', 'robots/my_arm'):
-        (tmp_path / place / 'meshes').mkdir(parents=True)
-        (tmp_path / place / 'meshes' / 'a b.stl').write_text('', encoding='utf-8')
-        (tmp_path / place / 'package.xml').write_text('', encoding='utf-8')
-    monkeypatch.setenv('ROS_PACKAGE_PATH', str(tmp_path / 'src'))
-    wanted = {
-        'package://installed/meshes/a%20b.stl': 'prefix/share/installed',
-        'package://source/meshes/a b.stl': 'src/source',
-        'package://beside/meshes/a b.stl': 'robots/beside',
-        'package://my_arm/meshes/a b.stl': 'robots/my_arm',
-        '../meshes/a b.stl': 'robots/my_arm',
-        f'file://{tmp_path}/src/source/meshes/a%20b.stl': 'src/source',
-        f'{tmp_path}/src/source/meshes/a b.stl': 'src/source',
-    }
-    for name, place in wanted.items():
-        found = meshes.find_mesh(name, folder)
-        assert found.resolve() == (tmp_path / place / 'meshes' / 'a b.stl').resolve()
-
-
 def test_a_hull_is_made_once(tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another start, another name and another folder find it in the cache; a new content not."""
     path, copy = tmp_path / 'cube.obj', tmp_path / 'copy.obj'

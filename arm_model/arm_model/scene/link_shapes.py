@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from urdf_reader import Collision, DescriptionError, KinematicTree
+from urdf_reader import DescriptionError, find_mesh, KinematicTree, MeshFileError, UrdfShape
 
 from ..arrays import Array
 from ..exceptions import SceneError
 from ..pose import Pose
-from .meshes import find_mesh, load_hull, MeshError
+from .meshes import load_hull, MeshError
 from .shapes import Box, Capsule, Cylinder, Mesh, native, PlacedShape, Shape, Sphere
 
 CAPSULE_TOLERANCE = 1e-6
@@ -61,7 +61,7 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
     for collision in tree.collisions():
         try:
             shape, fullness = _shape(collision, folder)
-        except MeshError as error:
+        except (MeshError, MeshFileError) as error:
             links = unusable.setdefault(str(error), [])
             links += [collision.link] if collision.link not in links else []
             continue
@@ -93,7 +93,7 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
     return (note,)
 
 
-def _shape(collision: Collision, folder: Path | None) -> tuple[Shape, float]:
+def _shape(collision: UrdfShape, folder: Path | None) -> tuple[Shape, float]:
     """Return a shape, and how full it is."""
     if collision.shape == 'mesh':
         name = collision.attributes.get('filename', '')
@@ -116,7 +116,7 @@ def _shape(collision: Collision, folder: Path | None) -> tuple[Shape, float]:
     return shape, 1.0
 
 
-def _pose(collision: Collision) -> Pose:
+def _pose(collision: UrdfShape) -> Pose:
     rotation = pin.Quaternion(np.array(collision.origin.rotation)).toRotationMatrix()
     return Pose(rotation, np.array(collision.origin.translation))
 

@@ -6,15 +6,15 @@ The standard library is enough for it, so that every package can read a descript
 model of an arm, publishers of joint states and of /tf, bring-ups.
 """
 
-from .exceptions import DescriptionError
+from .exceptions import DescriptionError, MeshFileError
 from .groups import find_group, JointGroup
+from .mesh_files import find_mesh
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
-from .urdf import Collision, Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf
+from .urdf import Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf, UrdfShape
 
 __all__ = [
     'MOVABLE',
-    'Collision',
     'DescriptionError',
     'EndEffector',
     'Group',
@@ -23,14 +23,17 @@ __all__ = [
     'JointKind',
     'JointRange',
     'KinematicTree',
+    'MeshFileError',
     'Mimic',
     'Pair',
     'Quaternion',
     'SemanticDescription',
     'Transform',
+    'UrdfShape',
     'Vector',
     'about',
     'find_group',
+    'find_mesh',
     'from_rpy',
     'multiply',
     'parse_srdf',

@@ -11,3 +11,7 @@ class DescriptionError(ValueError):
     Scenarios: it is empty or no XML, a joint names a link that does not exist, two links have the
     same name, the joints make a loop, a number is no number, a group is unknown.
     """
+
+
+class MeshFileError(DescriptionError):
+    """The file of a mesh cannot be found; the message says what to do."""

@@ -13,6 +13,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
+from typing import TypeAlias
 from xml.etree import ElementTree as ET
 
 from .exceptions import DescriptionError
@@ -125,21 +126,26 @@ class Joint:
         return JointRange(self.name, lower, upper, velocity, unit)
 
 
+Color: TypeAlias = tuple[float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True)
-class Collision:
-    """A collision shape of a link.
+class UrdfShape:
+    """A shape of a link: what it looks like, or what may not touch anything.
 
     Attributes:
         link: Name of the link.
         shape: What it is: box, cylinder, sphere, mesh, or empty where there is none.
         attributes: Its attributes as they are written.
         origin: Where it is in the link's frame.
+        color: Red, green, blue and opacity from 0 to 1; None where the URDF gives none.
     """
 
     link: str
     shape: str
     attributes: Mapping[str, str]
     origin: Transform
+    color: Color | None = None
 
     def lengths(self, *names: str) -> tuple[float, ...]:
         """Return the numbers of some of its attributes in [m].
@@ -212,21 +218,35 @@ class KinematicTree:
             link = above[link].parent
         return joints[::-1]
 
-    def collisions(self) -> Iterator[Collision]:
+    def collisions(self) -> Iterator[UrdfShape]:
         """Go through the collision shapes of all links.
 
         Raises:
             DescriptionError: The origin of one is not usable.
         """
+        return self._shapes('collision')
+
+    def visuals(self) -> Iterator[UrdfShape]:
+        """Go through what the links look like.
+
+        Raises:
+            DescriptionError: The origin or the color of one is not usable.
+        """
+        return self._shapes('visual')
+
+    def _shapes(self, tag: str) -> Iterator[UrdfShape]:
+        materials = {each.get('name'): each for each in self._robot.findall('material')}
         for link in self._robot.findall('link'):
             name = _name(link, 'link')
-            for element in link.findall('collision'):
+            for element in link.findall(tag):
                 shape = next(iter(element.find('geometry') or ()), None)
-                yield Collision(
+                place = f'link {name}, <{tag}>'
+                yield UrdfShape(
                     name,
                     '' if shape is None else shape.tag,
                     {} if shape is None else dict(shape.attrib),
-                    _origin(element, f'link {name}, <collision>'),
+                    _origin(element, place),
+                    _color(element.find('material'), materials, place),
                 )
 
     def bare_urdf(self, bound: float) -> str:
@@ -325,6 +345,23 @@ def _origin(element: ET.Element, what: str) -> Transform:
     place = f'{what}: <origin>'
     translation = _vector(origin.get('xyz', '0 0 0'), place)
     return Transform(translation, from_rpy(*_vector(origin.get('rpy', '0 0 0'), place)))
+
+
+def _color(
+    material: ET.Element | None, materials: Mapping[str | None, ET.Element], place: str
+) -> Color | None:
+    """Return the color of a material, or of the one of the robot with its name."""
+    if material is None:
+        return None
+    known = (material, materials.get(material.get('name')))
+    color = next((c for m in known if m is not None and (c := m.find('color')) is not None), None)
+    if color is None:
+        return None
+    numbers = [_number(word, f'{place}, <color>') for word in color.get('rgba', '').split()]
+    if len(numbers) != 4:
+        raise DescriptionError(f'{place}: <color> needs rgba with four numbers from 0 to 1')
+    red, green, blue, opacity = numbers
+    return red, green, blue, opacity
 
 
 def _axis(element: ET.Element, joint: str) -> Vector:
