@@ -12,6 +12,7 @@ FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
     'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
+    'web_viewer = robot_viewer.nodes.web_viewer:main',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -39,11 +40,15 @@ setup(
         ('share/robot_viewer', ['package.xml']),
     ],
     install_requires=[sibling('libraries/urdf_reader')],
-    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
+    extras_require={
+        'test': ['pytest'],
+        'page': ['numpy', 'trimesh', 'viser', 'websockets'],
+        'ros': [sibling('libraries/node_runner')],
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
-    description='What a viewer needs of a robot: robot_state_publisher',
+    description='A robot in the browser, and robot_state_publisher',
     license='Apache-2.0',
     entry_points={
         'console_scripts': EXECUTABLES if FOR_ROS else [],

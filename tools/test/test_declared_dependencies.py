@@ -31,7 +31,7 @@ DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 
 DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
-ON_PYPI |= {'rich', 'ruckig', 'xacro'}
+ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
 ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
 """Keys of rosdep for them."""
 OF_TESTS = {

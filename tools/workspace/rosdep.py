@@ -21,6 +21,9 @@ KEYS: dict[str, str] = {
     'python-can': 'python3-can',
     'rich': 'python3-rich',
     'ruckig': 'python3-ruckig-pip',
+    'trimesh': 'python3-trimesh-pip',
+    'viser': 'python3-viser-pip',
+    'websockets': 'python3-websockets',
     'xacro': 'xacro',
 }
 """The key of each distribution on PyPI; numpy is not among them, it is that of the ROS below."""

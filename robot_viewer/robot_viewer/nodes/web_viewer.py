@@ -1,0 +1,313 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run robot_viewer web_viewer``: a page on which the robot is seen and moved."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+import threading
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist as TwistMessage
+from geometry_msgs.msg import TwistStamped
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+from urdf_reader import DescriptionError, read_urdf, Transform
+
+from node_runner import (
+    destroyed_when_refused,
+    LATCHED,
+    log_as,
+    notify_ready,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+    spin,
+)
+
+from ..page.robot_page import RobotPage, Status, Twist, Velocity
+
+NAME = 'web_viewer'
+PORT = 8080
+DRAW_PERIOD = 1.0 / 30.0
+"""Time between two pictures, and between two looks at what was done on the page, in [s]."""
+LIST_PERIOD = 0.2
+"""Time between two looks at numbers in [s]."""
+GRAPH_PERIOD = 1.0
+"""Time between two looks at what the robot offers in [s]."""
+DRIVE_SERVICES = (
+    'init',
+    'enable',
+    'disable',
+    'halt',
+    'quick_stop',
+    'recover',
+    'home',
+    'position_mode',
+    'velocity_mode',
+    'interpolated_position_mode',
+    'cyclic_position_mode',
+)
+"""Services of a drive that the page offers; a node with halt and quick_stop is one."""
+WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax')
+STEPPING = ('walk', 'turn', 'policy')
+SET_MODE_TYPE = 'quad_msgs/srv/SetMode'
+TRIGGER = 'std_srvs/srv/Trigger'
+
+
+class WebViewer(Node):
+    """Shows what the topics say, and asks for what people do on the page.
+
+    Callbacks of the page come in its threads. What they ask for is left for the node's thread, but
+    for the heartbeats of held buttons, which are published at once.
+    """
+
+    @destroyed_when_refused
+    def __init__(self) -> None:
+        """Serve the page, and subscribe.
+
+        Raises:
+            ParameterError: A parameter is wrong.
+        """
+        super().__init__(NAME)
+        read = ParameterReader(self)
+        host = read.text(
+            'host', '127.0.0.1', 'the page is bound to it; not loopback: with a token'
+        )
+        port = read.whole('port', PORT, (1, 65535), 'of the page; else the next free one')
+        refuse_misspelt(self)
+        self._orders: deque[Callable[[], None]] = deque()
+        self._trigger_clients: dict[str, Client] = {}
+        self._drives: dict[str, list[str]] = {}
+        self._positions: dict[str, float] = {}
+        self._drawn: dict[str, float] = {}
+        self._received_at: float | None = None
+        self._own = False
+        self._statuses: dict[str, Status] = {}
+        self._state = ''
+        self._set_mode: Client | None = None
+        self._root = ''
+        self._base = self._shown_base = Transform()
+        self._jogs: Publisher | None = None
+        self._walks: Publisher | None = None
+        self._joint_states: Publisher | None = None
+        self.page = RobotPage(host, port, self)
+        self.create_subscription(String, 'robot_description', self._describe, LATCHED)
+        sensor = qos_profile_sensor_data
+        self.create_subscription(JointState, 'joint_states', self._take_joints, sensor)
+        self.create_subscription(TFMessage, '/tf', self._take_transforms, sensor)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._take_statuses, 10)
+        self.create_subscription(String, 'controller_node/state', self._take_state, LATCHED)
+        self.create_timer(DRAW_PERIOD, self._serve_page)
+        self.create_timer(LIST_PERIOD, self._list)
+        self.create_timer(GRAPH_PERIOD, self._look_around)
+        self.get_logger().info(f'the robot is seen at {self.page.url}')
+
+    # -- what is shown
+
+    def _describe(self, message: String) -> None:
+        try:
+            tree = read_urdf(message.data)
+        except DescriptionError as error:
+            self.get_logger().error(f'robot_description cannot be shown: {error}')
+            self.page.say(f'robot_description: {error}', failed=True)
+            return
+        self._root, self._drawn = tree.root, {}
+        for note in self.page.show_robot(tree):
+            self.get_logger().warning(f'not shown: {note}')
+
+    def _take_joints(self, message: JointState) -> None:
+        if not self._own:
+            self._received_at = time.monotonic()
+        self._positions.update(zip(message.name, message.position, strict=False))
+
+    def _take_transforms(self, message: TFMessage) -> None:
+        for transform in message.transforms:
+            if transform.child_frame_id == self._root:
+                place, turn = transform.transform.translation, transform.transform.rotation
+                self._base = Transform(
+                    (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
+                )
+
+    def _take_statuses(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            level = int.from_bytes(status.level, 'little')
+            self._statuses[status.name] = Status(status.name, level, status.message)
+
+    def _take_state(self, message: String) -> None:
+        self._state = str(message.data)
+
+    def _serve_page(self) -> None:
+        while self._orders:
+            self._orders.popleft()()
+        if self.page.watched:
+            self._draw()
+
+    def _draw(self) -> None:
+        moved = {n: p for n, p in self._positions.items() if self._drawn.get(n) != p}
+        if moved:
+            self._drawn.update(moved)
+            self.page.show_joints(moved)
+        if self._base != self._shown_base:
+            self._shown_base = self._base
+            self.page.show_base(self._base)
+
+    def _list(self) -> None:
+        if not self.page.watched:
+            return
+        age = None if self._received_at is None else time.monotonic() - self._received_at
+        self.page.list_joints(self._positions, 0.0 if self._own else age)
+        if self._statuses:
+            self.page.show_statuses(list(self._statuses.values()))
+
+    # -- what the robot offers
+
+    def _look_around(self) -> None:
+        services = dict(self.get_service_names_and_types())
+        self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
+        self._find_jogging()
+        self._find_walking(services)
+        others = self.count_publishers('joint_states') - (self._joint_states is not None)
+        self._own = not others and bool(self._root)
+        if others and self._joint_states is not None:
+            self.destroy_publisher(self._joint_states)
+            self._joint_states = None
+        self.page.offer_sliders(offered=self._own)
+
+    def _find_drives(self, triggers: Collection[str]) -> None:
+        nodes = {name.rpartition('/')[0] for name in triggers if name.endswith('/quick_stop')}
+        drives = {
+            node: [verb for verb in DRIVE_SERVICES if f'{node}/{verb}' in triggers]
+            for node in sorted(nodes)
+            if f'{node}/halt' in triggers
+        }
+        self._drives.update(drives)
+        self.page.offer_drives(self._drives)
+
+    def _find_jogging(self) -> None:
+        topic = 'servo_node/delta_twist_cmds'
+        if self._jogs is None and self.count_subscribers(topic):
+            self._jogs = self.create_publisher(TwistStamped, topic, QoSProfile(depth=1))
+            self.page.offer_jog()
+
+    def _find_walking(self, services: Mapping[str, Sequence[str]]) -> None:
+        name = self.resolve_service_name('set_mode')
+        if self._set_mode is None and SET_MODE_TYPE in services.get(name, ()):
+            kind = import_module('quad_msgs.srv').SetMode
+            self._set_mode = self.create_client(kind, 'set_mode')
+            self._walks = self.create_publisher(TwistMessage, 'cmd_vel', QoSProfile(depth=1))
+            self.page.offer_walk(WALKING_MODES)
+
+    # -- what people do on the page, in its threads
+
+    def stop(self) -> None:
+        """Halt every drive, and end the gait of a robot that walks."""
+        self._order(self._stop)
+
+    def call(self, service: str) -> None:
+        """Call a Trigger service."""
+        self._order(partial(self._call, service))
+
+    def jog(self, twist: Twist) -> None:
+        """Publish a jog once, at once; the robot's time-out ends it."""
+        if self._jogs is None:
+            return
+        message = TwistStamped()
+        message.header.stamp = self.get_clock().now().to_msg()
+        linear, angular = message.twist.linear, message.twist.angular
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = twist
+        self._jogs.publish(message)
+
+    def walk(self, velocity: Velocity) -> None:
+        """Publish a velocity once, at once; the robot's time-out ends it."""
+        if self._walks is None:
+            return
+        message = TwistMessage()
+        message.linear.x, message.linear.y, message.angular.z = velocity
+        self._walks.publish(message)
+
+    def set_mode(self, mode: str) -> None:
+        """Request a mode of a walking robot."""
+        self._order(partial(self._request_mode, mode))
+
+    def publish_joints(self, positions: Mapping[str, float]) -> None:
+        """Publish joint states, where nobody else does."""
+        self._order(partial(self._publish_joints, positions))
+
+    def _order(self, order: Callable[[], None]) -> None:
+        self._orders.append(order)
+
+    def _stop(self) -> None:
+        for drive in self._drives:
+            self._call(f'{drive}/halt')
+        if self._state.removeprefix('to ') in STEPPING:
+            self._request_mode('stand')
+        if not self._drives and self._set_mode is None:
+            self.page.say('STOP: nothing here offers to be stopped', failed=True)
+
+    def _call(self, service: str) -> None:
+        client = self._trigger_clients.get(service)
+        if client is None:
+            client = self._trigger_clients[service] = self.create_client(Trigger, service)
+        if not client.service_is_ready():
+            self._report(service, 'is not there', failed=True)
+            return
+        client.call_async(Trigger.Request()).add_done_callback(partial(self._answered, service))
+
+    def _request_mode(self, mode: str) -> None:
+        if self._set_mode is not None:
+            kind: Any = self._set_mode.srv_type
+            future = self._set_mode.call_async(kind.Request(mode=mode))
+            future.add_done_callback(partial(self._answered, f'mode {mode}'))
+
+    def _answered(self, what: str, future: Future) -> None:
+        if future.exception() is not None:
+            self._report(what, f'no answer: {future.exception()}', failed=True)
+            return
+        response = future.result()
+        self._report(what, response.message, failed=not response.success)
+
+    def _report(self, what: str, text: str, *, failed: bool) -> None:
+        self.page.say(f'{what}: {text}', failed=failed)
+        (self.get_logger().warning if failed else self.get_logger().info)(f'{what}: {text}')
+
+    def _publish_joints(self, positions: Mapping[str, float]) -> None:
+        if not self._own:
+            return
+        if self._joint_states is None:
+            self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
+        message = JointState(name=list(positions), position=list(positions.values()))
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._joint_states.publish(message)
+
+
+def main() -> int:
+    """Run until Ctrl-C.
+
+    Returns:
+        0, or 1 when it could not begin.
+    """
+    return run_program(NAME, _serve)
+
+
+def _serve(stop: threading.Event) -> None:
+    node = WebViewer()
+    log_as(node)
+    notify_ready()
+    try:
+        spin([node], stop)
+    finally:
+        node.page.close()
+        node.destroy_node()

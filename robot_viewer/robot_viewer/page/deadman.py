@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A held button of a page counts as long as its heartbeats come steadily, from one page."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+import math
+
+HEARTBEAT = 1.0 / 30.0
+"""Time between two heartbeats of a held button in [s]."""
+LEAST_GAP = 0.4 * HEARTBEAT
+"""Heartbeats that are nearer to each other in [s] were held up: they may be of a button let go."""
+RELEASED_AFTER = 0.3
+"""Silence in [s] after which another page may hold a button."""
+
+
+class Deadman:
+    """Distinguishes a heartbeat that counts from one that does not.
+
+    Whoever moves something by it sends one command for each heartbeat that counts, and nothing
+    else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
+    slow connection has held up and delivers at once, one counts.
+    """
+
+    def __init__(self) -> None:
+        """Begin with no button held."""
+        self._holder: Hashable = None
+        self._last = -math.inf
+
+    def beat(self, page: Hashable, now: float) -> bool:
+        """Take a heartbeat; return whether it counts.
+
+        Args:
+            page: Which page it is of.
+            now: Steady time of its arrival in [s].
+        """
+        gap = now - self._last
+        if page != self._holder and gap < RELEASED_AFTER:
+            return False
+        self._holder, self._last = page, now
+        return gap >= LEAST_GAP

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Who may open the page: this host's own pages, and from elsewhere who has the token.
+
+viser serves whoever reaches its port, and any page that a browser of this host has open may
+connect to a loopback port. So each request is looked at before viser sees it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+import hmac
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+from inspect import isawaitable
+import ipaddress
+import secrets
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server as websocket_server
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+COOKIE = 'robot_viewer_token'
+LOOPBACK_NAMES = frozenset({'localhost', '127.0.0.1', '::1'})
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host is reached from this computer only.
+
+    Args:
+        host: A name or an address, as the page is to be bound to.
+    """
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host in LOOPBACK_NAMES
+
+
+class Gate:
+    """Looks at each request before viser does.
+
+    On loopback the Host and Origin headers have to name this host: no page of elsewhere, also
+    under a name that was pointed here (DNS rebinding), moves the robot. Beyond it a token is
+    needed, once in the URL and then as a cookie, and Origin has to be the page's own host.
+
+    Attributes:
+        token: What a page from elsewhere needs; empty on loopback.
+    """
+
+    def __init__(self, host: str) -> None:
+        """Make a token where one is needed.
+
+        Args:
+            host: What the page is bound to.
+        """
+        self.token = '' if is_loopback(host) else secrets.token_urlsafe(24)
+        self._serving = False
+
+    def answer(self, path: str, headers: Headers) -> Response | None:
+        """Return why a request is refused, or what it needs first; None lets it through.
+
+        Args:
+            path: Path and query of the request.
+            headers: Its headers.
+        """
+        hosts = headers.get_all('Host')
+        host = urlsplit(f'//{hosts[0]}').hostname if len(hosts) == 1 else None
+        if host is None or (not self.token and host not in LOOPBACK_NAMES):
+            return _refusal('the page is for this host only; open it as http://localhost')
+        origins = headers.get_all('Origin')
+        if origins and [urlsplit(origin).netloc for origin in origins] != hosts:
+            return _refusal('another page may not use this one')
+        if not self.token or self._is_known(headers.get_all('Cookie')):
+            return None
+        given = parse_qs(urlsplit(path).query).get('token', [''])
+        if not hmac.compare_digest(given[0].encode(), self.token.encode()):
+            return _refusal('open the page by the URL that was printed at its start')
+        cookie = f'{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/'
+        return _response(HTTPStatus.SEE_OTHER, '', Location='/', Set_Cookie=cookie)
+
+    def _is_known(self, cookies: list[str]) -> bool:
+        jar = SimpleCookie()
+        try:
+            for cookie in cookies:
+                jar.load(cookie)
+        except CookieError:
+            return False
+        given = jar[COOKIE].value if COOKIE in jar else ''
+        return hmac.compare_digest(given.encode(), self.token.encode())
+
+    @contextmanager
+    def before(self) -> Iterator[None]:
+        """Stand before the server that is started in the block.
+
+        Raises:
+            RuntimeError: None was, or not by websockets: the page would be open to everybody.
+        """
+        serve = websocket_server.serve
+
+        def guarded(*args: Any, **options: Any) -> Any:  # noqa: ANN401  # as they are
+            self._serving = True
+            options['process_request'] = partial(self._process, options.get('process_request'))
+            return serve(*args, **options)
+
+        websocket_server.serve = guarded  # type: ignore[assignment, misc]
+        try:
+            yield
+        finally:
+            websocket_server.serve = serve  # type: ignore[misc]
+        if not self._serving:
+            raise RuntimeError('the server of the page asks nobody who may open it')
+
+    async def _process(
+        self,
+        next_one: Callable[..., Any] | None,
+        connection: Any,  # noqa: ANN401
+        request: Request,
+    ) -> Response | None:
+        refused = self.answer(request.path, request.headers)
+        if refused is not None or next_one is None:
+            return refused
+        result = next_one(connection, request)
+        if isawaitable(result):
+            result = await result
+        answer: Response | None = result
+        return answer
+
+
+def _refusal(reason: str) -> Response:
+    return _response(HTTPStatus.FORBIDDEN, reason)
+
+
+def _response(status: HTTPStatus, text: str, **headers: str) -> Response:
+    body = f'{text}\n'.encode()
+    named = {name.replace('_', '-'): value for name, value in headers.items()}
+    named |= {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
+    return Response(status, status.phrase, Headers(named), body)

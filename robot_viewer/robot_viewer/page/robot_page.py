@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a page shows of a robot and lets people do: STOP, joints, drives, jogging, walking."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from html import escape
+import time
+from typing import Protocol, TypeAlias
+
+from urdf_reader import JointKind, KinematicTree, Transform
+from viser import (
+    CommandHandle,
+    GuiButtonHandle,
+    GuiDropdownHandle,
+    GuiEvent,
+    GuiFolderHandle,
+    GuiHtmlHandle,
+    GuiSliderHandle,
+    GuiTabGroupHandle,
+    GuiTabHandle,
+    Icon,
+    ViserServer,
+)
+
+from .deadman import Deadman, HEARTBEAT
+from .gate import Gate
+from .robot_scene import RobotScene, start_position, travel
+
+Twist: TypeAlias = tuple[float, float, float, float, float, float]
+Velocity: TypeAlias = tuple[float, float, float]
+
+TWISTS: Mapping[str, Twist] = {
+    '+ x': (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    '− x': (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    '+ y': (0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
+    '− y': (0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
+    '+ z': (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+    '− z': (0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
+    '+ about x': (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    '− about x': (0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
+    '+ about y': (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+    '− about y': (0.0, 0.0, 0.0, 0.0, -1.0, 0.0),
+    '+ about z': (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+    '− about z': (0.0, 0.0, 0.0, 0.0, 0.0, -1.0),
+}
+"""Shares of the speed of jogging, along and about the axes of the base."""
+
+WALKS: Mapping[str, Velocity] = {
+    'forward': (0.3, 0.0, 0.0),
+    'back': (-0.3, 0.0, 0.0),
+    'left': (0.0, 0.15, 0.0),
+    'right': (0.0, -0.15, 0.0),
+    'turn left': (0.0, 0.0, 1.5),
+    'turn right': (0.0, 0.0, -1.5),
+}
+"""Velocities at full speed: forwards and to the left in [m/s], of a turn in [rad/s]."""
+
+COLORS = ('#2f9e44', '#e8a400', '#e03131', '#868e96')
+"""Of the levels of a status: good, warning, error, stale."""
+WORST = (2, 3, 1, 0)
+"""Levels of a status, the worst first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """How something is.
+
+    Attributes:
+        name: What.
+        level: 0 good, 1 warning, 2 error, 3 stale, as in diagnostic_msgs.
+        message: In words.
+    """
+
+    name: str
+    level: int
+    message: str
+
+
+class Actions(Protocol):
+    """What a page may have done; any thread may call it, and none of it waits."""
+
+    def stop(self) -> None:
+        """Stop whatever moves."""
+
+    def call(self, service: str) -> None:
+        """Call a Trigger service."""
+
+    def jog(self, twist: Twist) -> None:
+        """Command a share of the speed of jogging once, -1 to 1."""
+
+    def walk(self, velocity: Velocity) -> None:
+        """Command a velocity in [m/s] and [rad/s] once."""
+
+    def set_mode(self, mode: str) -> None:
+        """Request a mode of a walking robot."""
+
+    def publish_joints(self, positions: Mapping[str, float]) -> None:
+        """Publish joint states."""
+
+
+class RobotPage:
+    """A page in a browser; shows come from one thread, actions leave in any.
+
+    Attributes:
+        url: Where it is, with the token where it needs one.
+    """
+
+    def __init__(self, host: str, port: int, actions: Actions) -> None:
+        """Serve it.
+
+        Args:
+            host: Name or address that it is bound to.
+            port: Port; the next free one is taken where it is in use.
+            actions: What people do on it.
+        """
+        self._actions = actions
+        gate = Gate(host)
+        with gate.before():
+            self._server = ViserServer(host, port, label='robot', verbose=False)
+        shown = 'localhost' if not gate.token else host
+        self.url = f'http://{shown}:{self._server.get_port()}'
+        if gate.token:
+            self.url += f'/?token={gate.token}'
+        self._scene: RobotScene | None = None
+        self._deadman = Deadman()
+        gui = self._server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
+        self._server.scene.set_up_direction('+z')
+        self._server.scene.add_grid('/ground', cell_size=0.1, section_size=0.5, width=4, height=4)
+        self._stop = gui.add_button('STOP  (space)', color='red', icon=Icon.HAND_STOP)
+        self._stop.on_click(lambda _: actions.stop())
+        self._key: CommandHandle = gui.add_command('Stop', hotkey='space')
+        self._key.on_trigger(lambda _: actions.stop())
+        self._answer = gui.add_html(_line('no robot description yet', COLORS[3]))
+        self._tabs: GuiTabGroupHandle = gui.add_tab_group()
+        self._pages: dict[str, GuiTabHandle] = {}
+        self._units: dict[str, str] = {}
+        self._joints: GuiHtmlHandle | None = None
+        self._sliders: dict[str, GuiSliderHandle[float]] = {}
+        self._statuses: GuiHtmlHandle | None = None
+        self._offered: set[str] = set()
+        self._drives: dict[str, tuple[str, ...]] = {}
+        self._drive_panel: GuiFolderHandle | None = None
+        self._tree: KinematicTree | None = None
+
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._server.get_clients())
+
+    def close(self) -> None:
+        """Serve it no more."""
+        self._server.stop()
+
+    def show_robot(self, tree: KinematicTree) -> list[str]:
+        """Show another robot; return what of it cannot be shown, in words."""
+        if self._scene is not None:
+            self._scene.remove()
+        self.offer_sliders(offered=False)
+        self._tree = tree
+        slides = {joint.name for joint in tree.movable() if joint.kind is JointKind.PRISMATIC}
+        self._units = {j.name: 'm' if j.name in slides else 'rad' for j in tree.movable()}
+        self._scene = RobotScene(self._server.scene, tree)
+        far = 0.9 * self._scene.size + 0.3  # [m]
+        self._server.initial_camera.position = (far, -far, 0.9 * far)
+        self._server.initial_camera.look_at = (0.0, 0.0, 0.3 * self._scene.size)
+        for client in self._server.get_clients().values():
+            client.camera.position = self._server.initial_camera.position
+            client.camera.look_at = self._server.initial_camera.look_at
+        self.say(f'robot {tree.name}')
+        return self._scene.notes
+
+    def show_joints(self, positions: Mapping[str, float]) -> None:
+        """Show where the joints are in [rad] and [m]."""
+        if self._scene is not None:
+            self._scene.place(positions)
+
+    def list_joints(self, positions: Mapping[str, float], age: float | None) -> None:
+        """Show the numbers of the joints, and how old they are in [s]; None for never."""
+        if self._joints is None:
+            with self._tab('Joints'):
+                self._joints = self._server.gui.add_html('')
+        old = 'no joint states' if age is None else f'{age:.1f} s old' if age > 1.0 else ''
+        rows = [
+            (name, f'{positions[name]:+.3f} {unit}')
+            for name, unit in self._units.items()
+            if name in positions
+        ]
+        self._joints.content = _table(rows) + (_line(old, COLORS[1]) if old else '')
+
+    def show_base(self, pose: Transform) -> None:
+        """Show where the root link is in the world."""
+        if self._scene is not None:
+            self._scene.place_base(pose)
+
+    def show_statuses(self, statuses: Sequence[Status]) -> None:
+        """Show how everything is, what is worst first."""
+        if self._statuses is None:
+            with self._tab('Status'):
+                self._statuses = self._server.gui.add_html('')
+        ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
+        self._statuses.content = ''.join(
+            f'{_line(status.name, COLORS[min(status.level, 3)], strong=True)}'
+            f'<div style="margin:0 0 0.5em 1em">{escape(status.message)}</div>'
+            for status in ordered
+        )
+
+    def offer_sliders(self, *, offered: bool) -> None:
+        """Let people move the joints, where nobody else says where they are."""
+        tree = self._tree
+        if tree is None or offered is bool(self._sliders):
+            return
+        if not offered:
+            for slider in self._sliders.values():
+                slider.remove()
+            self._sliders = {}
+            return
+        with self._tab('Joints'):
+            for joint in tree.movable():
+                if joint.mimic is None:
+                    low, high = travel(joint)
+                    slider = self._server.gui.add_slider(
+                        joint.name, low, high, (high - low) / 1000.0, start_position(joint)
+                    )
+                    slider.on_update(lambda _: self._publish_sliders())
+                    self._sliders[joint.name] = slider
+        self._publish_sliders()
+
+    def offer_drives(self, services: Mapping[str, Sequence[str]]) -> None:
+        """Offer the services of drives: their names by the drive."""
+        found = {name: tuple(verbs) for name, verbs in services.items()}
+        if found == self._drives:
+            return
+        if self._drive_panel is not None:
+            self._drive_panel.remove()
+        self._drives, gui = found, self._server.gui
+        with self._tab('Drives'):
+            self._drive_panel = gui.add_folder(None)
+        with self._drive_panel:
+            drive = gui.add_dropdown('Drive', ('all', *services))
+            verbs = dict.fromkeys(verb for each in services.values() for verb in each)
+            for verb in verbs:
+                button = gui.add_button(verb.replace('_', ' '))
+                button.on_click(partial(self._call, found, drive, verb))
+
+    def offer_jog(self) -> None:
+        """Offer to jog the tool as long as a button is held."""
+        if not self._offer('Jog'):
+            return
+        with self._tab('Jog'):
+            speed = self._speed()
+            for title, twist in TWISTS.items():
+                self._held(title, partial(self._jog, speed, twist))
+
+    def offer_walk(self, modes: Collection[str]) -> None:
+        """Offer to walk as long as a button is held, and the modes of the robot."""
+        if not self._offer('Walk'):
+            return
+        with self._tab('Walk'):
+            for mode in modes:
+                button = self._server.gui.add_button(mode)
+                button.on_click(partial(self._request, mode))
+            speed = self._speed()
+            for title, velocity in WALKS.items():
+                self._held(title, partial(self._walk, speed, velocity))
+
+    def say(self, text: str, *, failed: bool = False) -> None:
+        """Show what became of the last request."""
+        self._answer.content = _line(text, COLORS[2] if failed else COLORS[0])
+
+    def _offer(self, what: str) -> bool:
+        """Whether something is offered for the first time; it stays as it was then."""
+        new = what not in self._offered
+        self._offered.add(what)
+        return new
+
+    def _tab(self, label: str) -> GuiTabHandle:
+        if label not in self._pages:
+            self._pages[label] = self._tabs.add_tab(label)
+        return self._pages[label]
+
+    def _speed(self) -> GuiSliderHandle[float]:
+        return self._server.gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
+
+    def _held(self, label: str, act: Callable[[], None]) -> None:
+        """Add a button that acts as long as it is held."""
+
+        def beat(event: GuiEvent[GuiButtonHandle]) -> None:
+            if self._deadman.beat(event.client_id, time.monotonic()):
+                act()
+
+        self._server.gui.add_button(label, hint='hold it').on_hold(beat, 1.0 / HEARTBEAT)
+
+    def _jog(self, speed: GuiSliderHandle[float], twist: Twist) -> None:
+        x, y, z, a, b, c = (speed.value / 100.0 * part for part in twist)
+        self._actions.jog((x, y, z, a, b, c))
+
+    def _walk(self, speed: GuiSliderHandle[float], velocity: Velocity) -> None:
+        x, y, turn = (speed.value / 100.0 * part for part in velocity)
+        self._actions.walk((x, y, turn))
+
+    def _call(
+        self,
+        services: Mapping[str, Sequence[str]],
+        drive: GuiDropdownHandle[str],
+        verb: str,
+        _: object,
+    ) -> None:
+        chosen = services if drive.value == 'all' else [drive.value]
+        for name in chosen:
+            if verb in services[name]:
+                self._actions.call(f'{name}/{verb}')
+
+    def _request(self, mode: str, _: object) -> None:
+        self._actions.set_mode(mode)
+
+    def _publish_sliders(self) -> None:
+        self._actions.publish_joints({n: slider.value for n, slider in self._sliders.items()})
+
+
+def _line(text: str, color: str, *, strong: bool = False) -> str:
+    weight = 'bold' if strong else 'normal'
+    return (
+        f'<div style="font-weight:{weight};margin:0.2em 1em"><span style="color:{color}">&#9679;'
+        f'</span> {escape(text)}</div>'
+    )
+
+
+def _table(rows: Sequence[tuple[str, str]]) -> str:
+    cells = ''.join(
+        f'<tr><td>{escape(name)}</td><td style="text-align:right">{escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f'<table style="margin:0 1em;font-variant-numeric:tabular-nums">{cells}</table>'

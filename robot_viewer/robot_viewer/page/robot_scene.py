@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot in the 3D scene of a page: its links with what they look like, moved by its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from urdf_reader import (
+    DescriptionError,
+    find_mesh,
+    Joint,
+    KinematicTree,
+    MeshFileError,
+    Transform,
+    UrdfShape,
+)
+from viser import FrameHandle, SceneApi, SceneNodeHandle
+
+from ..state_publisher import joint_transform
+
+PLAIN = (0.7, 0.72, 0.75, 1.0)
+"""Color of what the description gives none."""
+ROOT = '/robot'
+
+
+class RobotScene:
+    """The links of a robot below one another in a scene, so that a joint moves one frame.
+
+    Attributes:
+        notes: What cannot be shown, in words.
+        size: How far its links reach from the root in [m].
+    """
+
+    def __init__(self, scene: SceneApi, tree: KinematicTree, folder: Path | None = None) -> None:
+        """Show the robot, each joint at zero or the limit next to it.
+
+        Args:
+            scene: Where to.
+            tree: The robot.
+            folder: That of the description, where names of mesh files are relative.
+        """
+        self.notes: list[str] = []
+        self._scene, self._tree, self._folder = scene, tree, folder
+        self._movable = {joint.name: joint for joint in tree.movable()}
+        self._base = scene.add_frame(ROOT, show_axes=False)
+        self._frames: dict[str, FrameHandle] = {}
+        self._paths = {tree.root: f'{ROOT}/{tree.root}'}
+        scene.add_frame(self._paths[tree.root], show_axes=False)
+        self._add_joints()
+        self._add_shapes()
+        self.place({name: start_position(joint) for name, joint in self._movable.items()})
+        self.size = self._reach(tree.root)
+
+    def place(self, positions: Mapping[str, float]) -> None:
+        """Move joints; those that follow one of them move along.
+
+        Args:
+            positions: In [rad] or [m] by name; names of other robots do not matter.
+        """
+        for name, joint in self._movable.items():
+            mimic = joint.mimic
+            if mimic is not None and mimic.source in positions:
+                position = mimic.multiplier * positions[mimic.source] + mimic.offset
+            elif name in positions:
+                position = positions[name]
+            else:
+                continue
+            if math.isfinite(position):
+                _put(self._frames[name], joint_transform(joint, position))
+
+    def place_base(self, pose: Transform) -> None:
+        """Move the whole robot.
+
+        Args:
+            pose: Of its root link in the world.
+        """
+        _put(self._base, pose)
+
+    def remove(self) -> None:
+        """Take the robot out of the scene."""
+        self._base.remove()
+
+    def _add_joints(self) -> None:
+        waiting = list(self._tree.joints)
+        while waiting:  # a joint may stand before the one that its parent hangs on
+            later: list[Joint] = []
+            for joint in waiting:
+                if joint.parent not in self._paths:
+                    later.append(joint)
+                    continue
+                path = self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
+                frame = self._frames[joint.name] = self._scene.add_frame(path, show_axes=False)
+                _put(frame, joint.origin)
+            waiting = later
+
+    def _reach(self, link: str) -> float:
+        below = (joint for joint in self._tree.joints if joint.parent == link)
+        return max(
+            (math.hypot(*j.origin.translation) + self._reach(j.child) for j in below), default=0.1
+        )
+
+    def _add_shapes(self) -> None:
+        missing: dict[str, list[str]] = {}
+        shown = {each.link for each in self._tree.visuals()}
+        shapes = [*self._tree.visuals()]
+        shapes += [each for each in self._tree.collisions() if each.link not in shown]
+        for number, shape in enumerate(shapes):
+            try:
+                self._add_shape(f'{self._paths[shape.link]}/shape{number}', shape)
+            except (OSError, ValueError) as error:  # noqa: PERF203  # the others are shown
+                missing.setdefault(str(error), []).append(shape.link)
+        self.notes += [f'{", ".join(links)}: {reason}' for reason, links in missing.items()]
+
+    def _add_shape(self, name: str, shape: UrdfShape) -> None:
+        color = shape.color or PLAIN
+        rgb = (round(255 * color[0]), round(255 * color[1]), round(255 * color[2]))
+        opacity = None if color[3] >= 1.0 else color[3]
+        node: SceneNodeHandle
+        match shape.shape:
+            case 'box':
+                (x, y, z) = shape.lengths('size')
+                node = self._scene.add_box(name, rgb, (x, y, z), opacity=opacity)
+            case 'cylinder':
+                radius, length = shape.lengths('radius', 'length')
+                node = self._scene.add_cylinder(name, radius, length, rgb, opacity=opacity)
+            case 'sphere':
+                (radius,) = shape.lengths('radius')
+                node = self._scene.add_icosphere(name, radius, rgb, opacity=opacity)
+            case 'mesh':
+                node = self._add_mesh(name, shape, rgb, opacity)
+            case _:
+                raise MeshFileError(f'<{shape.shape}> is no box, cylinder, sphere or mesh')
+        _put(node, shape.origin)
+
+    def _add_mesh(
+        self, name: str, shape: UrdfShape, rgb: tuple[int, int, int], opacity: float | None
+    ) -> SceneNodeHandle:
+        path = find_mesh(shape.attributes.get('filename', ''), self._folder)
+        mesh = trimesh.load(path, force='mesh')
+        scale = shape.lengths('scale') if 'scale' in shape.attributes else (1.0, 1.0, 1.0)
+        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+            raise MeshFileError(f'{path}: no triangles')
+        (x, y, z) = scale
+        whole = (x, y, z)
+        if shape.color is None and mesh.visual is not None and mesh.visual.defined:
+            return self._scene.add_mesh_trimesh(name, mesh, scale=whole)
+        vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+        return self._scene.add_mesh_simple(
+            name, vertices, faces, color=rgb, opacity=opacity, scale=whole
+        )
+
+
+def travel(joint: Joint) -> tuple[float, float]:
+    """Return how far a joint goes in [rad] or [m]; a turn where nothing ends it.
+
+    Args:
+        joint: A movable joint.
+    """
+    try:
+        lower, upper = joint.range.lower, joint.range.upper
+    except DescriptionError:
+        return -math.pi, math.pi
+    ends = math.isfinite(lower) and math.isfinite(upper) and lower < upper
+    return (lower, upper) if ends else (-math.pi, math.pi)
+
+
+def start_position(joint: Joint) -> float:
+    """Return the position of a joint in [rad] or [m] before anybody says it.
+
+    Args:
+        joint: A movable joint.
+    """
+    lower, upper = travel(joint)
+    return min(max(0.0, lower), upper)
+
+
+def _put(node: SceneNodeHandle, pose: Transform) -> None:
+    x, y, z, w = pose.rotation
+    node.position, node.wxyz = pose.translation, (w, x, y, z)

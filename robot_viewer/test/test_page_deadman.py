@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A held button of a page."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robot_viewer.page.deadman import Deadman, HEARTBEAT, RELEASED_AFTER
+
+
+def test_a_held_button_counts_from_the_first_heartbeat_on() -> None:
+    """Each one, as the browser's timer makes them."""
+    deadman = Deadman()
+    assert all(deadman.beat(1, 10.0 + number * HEARTBEAT) for number in range(50))
+
+
+@given(st.integers(2, 200), st.floats(0.0, 60.0))
+def test_what_was_held_up_counts_once(count: int, delay: float) -> None:
+    """A slow connection delivers it at once, when the button may be up already."""
+    deadman = Deadman()
+    assert deadman.beat(1, 10.0)
+    arrivals = [10.0 + HEARTBEAT + delay + number * 1e-4 for number in range(count)]
+    assert sum(deadman.beat(1, arrival) for arrival in arrivals) == 1
+
+
+@given(st.lists(st.tuples(st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0)), max_size=60))
+def test_one_page_at_a_time(beats: list[tuple[int, float]]) -> None:
+    """Another one counts when the first has been silent for long enough."""
+    deadman, now, holder, last = Deadman(), 10.0, 0, -1.0
+    for page, gap in beats:
+        now += gap
+        if deadman.beat(page, now):
+            assert page == holder or now - last >= RELEASED_AFTER
+            holder, last = page, now

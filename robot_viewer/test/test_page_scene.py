@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in the scene of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+from pathlib import Path
+
+import pytest
+import trimesh
+from urdf_reader import read_urdf, Transform
+from viser import ViserServer
+
+from robot_viewer.page.robot_scene import RobotScene, start_position, travel
+
+URDF = """
+<robot name="small">
+  <material name="red"><color rgba="1 0 0 0.5"/></material>
+  <link name="base">
+    <visual><geometry><box size="1 2 3"/></geometry><material name="red"/></visual>
+  </link>
+  <link name="arm">
+    <visual>
+      <origin xyz="0 0 0.5"/><geometry><cylinder radius="0.1" length="1"/></geometry>
+    </visual>
+  </link>
+  <link name="hand"><collision><geometry><sphere radius="0.2"/></geometry></collision></link>
+  <link name="finger">
+    <visual><geometry><mesh filename="{mesh}" scale="2 2 2"/></geometry></visual>
+  </link>
+  <joint name="slide" type="prismatic">
+    <parent link="hand"/><child link="finger"/><axis xyz="1 0 0"/>
+    <limit lower="0.1" upper="0.2" velocity="1" effort="1"/>
+  </joint>
+  <joint name="turn" type="revolute">
+    <parent link="base"/><child link="arm"/><origin xyz="0 0 1"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" velocity="1" effort="1"/>
+  </joint>
+  <joint name="follow" type="continuous">
+    <parent link="arm"/><child link="hand"/><axis xyz="0 1 0"/>
+    <mimic joint="turn" multiplier="-2" offset="0.1"/>
+  </joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def server() -> Iterator[ViserServer]:
+    """Serve a scene."""
+    made = ViserServer('127.0.0.1', 8400, verbose=False)
+    yield made
+    made.stop()
+
+
+def test_joints_move_what_hangs_on_them(server: ViserServer, tmp_path: Path) -> None:
+    """A joint may stand before the one that it hangs on; one that follows moves along."""
+    trimesh.creation.box().export(tmp_path / 'cube.stl')
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh='cube.stl')), tmp_path)
+    assert scene.notes == []
+    frames = scene._frames
+    assert frames['slide'].name == '/robot/base/arm/hand/finger'
+    assert frames['slide'].position.tolist() == pytest.approx([0.1, 0.0, 0.0]), 'next to zero'
+    scene.place({'turn': 0.4, 'slide': 0.15, 'another': 3.0, 'follow': 9.0})
+    assert frames['turn'].position.tolist() == [0.0, 0.0, 1.0]
+    turn = [math.cos(0.2), 0.0, 0.0, math.sin(0.2)]
+    assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
+    follow = [math.cos(-0.35), 0.0, math.sin(-0.35), 0.0]
+    assert frames['follow'].wxyz.tolist() == pytest.approx(follow)
+    assert frames['slide'].position.tolist() == pytest.approx([0.15, 0.0, 0.0])
+    scene.place({'turn': math.nan})
+    assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
+    scene.place_base(Transform((1.0, 2.0, 3.0)))
+    assert scene._base.position.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_what_cannot_be_shown_is_named_and_the_rest_is_there(server: ViserServer) -> None:
+    """A mesh of a package that is not here."""
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh='package://nobody/cube.stl')))
+    (note,) = scene.notes
+    assert note.startswith('finger: package nobody is not installed')
+    assert set(scene._frames) == {'turn', 'follow', 'slide'}
+
+
+@pytest.mark.parametrize(
+    ('kind', 'limit', 'ends'),
+    [
+        ('revolute', '<limit lower="0.1" upper="2" velocity="1" effort="1"/>', (0.1, 2.0)),
+        ('continuous', '', (-math.pi, math.pi)),
+        ('revolute', '', (-math.pi, math.pi)),
+        ('revolute', '<limit lower="0" upper="0" velocity="1" effort="1"/>', (-math.pi, math.pi)),
+    ],
+)
+def test_a_slider_has_two_ends(kind: str, limit: str, ends: tuple[float, float]) -> None:
+    """Also that of a joint which a description gives none, or two that are equal."""
+    links = '<link name="a"/><link name="b"/>'
+    joint = f'<joint name="j" type="{kind}"><parent link="a"/><child link="b"/>{limit}</joint>'
+    (found,) = read_urdf(f'<robot name="r">{links}{joint}</robot>').movable()
+    assert travel(found) == ends
+    assert ends[0] <= start_position(found) <= ends[1]

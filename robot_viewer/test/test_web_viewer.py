@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The node of the page, over DDS; what a browser does is called as the page calls it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from geometry_msgs.msg import TwistStamped
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+from urdf_robots import ARM
+
+from node_runner import make_executor
+from robot_viewer.nodes.web_viewer import WebViewer
+
+pytestmark = pytest.mark.scenario
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+TIMEOUT = 20.0  # [s]
+TWIST = (0.0, 0.0, 0.3, 0.0, 0.0, 0.0)
+
+
+class Robot:
+    """What the page meets: services of drives, a servo, and a viewer beside it."""
+
+    def __init__(self) -> None:
+        """Offer them."""
+        self.node = Node('robot')
+        self.calls: list[str] = []
+        self.jogs: list[TwistStamped] = []
+        self.states: list[JointState] = []
+        for drive in ('joint1', 'joint2'):
+            for verb in ('halt', 'quick_stop', 'enable'):
+                self.node.create_service(
+                    Trigger, f'{drive}/{verb}', self._answer(f'{drive}/{verb}')
+                )
+        self.node.create_service(Trigger, 'other/halt', self._answer('other/halt'))
+        self.node.create_subscription(
+            TwistStamped, 'servo_node/delta_twist_cmds', self.jogs.append, 10
+        )
+        self.node.create_subscription(JointState, 'joint_states', self.states.append, 10)
+        self.description = self.node.create_publisher(String, 'robot_description', LATCHED)
+        self.viewer = WebViewer()
+        self._executor = make_executor()
+        self._executor.add_node(self.node)
+        self._executor.add_node(self.viewer)
+
+    def _answer(
+        self, name: str
+    ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            self.calls.append(name)
+            response.success, response.message = True, 'done'
+            return response
+
+        return answer
+
+    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Serve both nodes until something is true."""
+        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
+        while not condition():
+            assert self.node.get_clock().now().nanoseconds < deadline, what
+            self._executor.spin_once(0.05)
+
+    def close(self) -> None:
+        """End both."""
+        self.viewer.page.close()
+        self.viewer.destroy_node()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def robot(isolation: Isolation) -> Iterator[Robot]:
+    """Start the page beside a robot."""
+    rclpy.init(args=['--ros-args', '-p', 'port:=8500'], domain_id=isolation.domain_id)
+    made = Robot()
+    yield made
+    made.close()
+    rclpy.shutdown()
+
+
+def test_stop_halts_every_drive(robot: Robot) -> None:
+    """And nothing that merely has a service of that name."""
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    robot.viewer.stop()
+    robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
+    assert sorted(robot.calls) == ['joint1/halt', 'joint2/halt']
+    robot.viewer.call('/joint1/enable')
+    robot.spin_until(lambda: len(robot.calls) == 3, 'enable')
+    assert robot.calls[-1] == 'joint1/enable'
+
+
+def test_each_heartbeat_is_one_command(robot: Robot) -> None:
+    """Nothing goes on by itself: a page that is gone moves nothing."""
+    robot.spin_until(lambda: robot.viewer._jogs is not None, 'the servo')
+    publisher = robot.viewer._jogs
+    assert publisher is not None
+    robot.spin_until(lambda: publisher.get_subscription_count() > 0, 'a subscription')
+    for _ in range(3):
+        robot.viewer.jog(TWIST)
+    robot.spin_until(lambda: len(robot.jogs) == 3, 'jogs')
+    assert robot.jogs[0].twist.linear.z == pytest.approx(0.3)
+    assert robot.jogs[0].header.stamp.sec > 0
+    for _ in range(20):
+        robot._executor.spin_once(0.02)
+    assert len(robot.jogs) == 3
+
+
+def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
+    """As joint_state_publisher_gui; when somebody else comes, they end."""
+    robot.description.publish(String(data=ARM))
+    robot.spin_until(lambda: bool(robot.states), 'joint states of the sliders')
+    names = set(robot.states[-1].name)
+    assert names
+    other = robot.node.create_publisher(JointState, 'joint_states', 10)
+    robot.spin_until(lambda: robot.viewer._joint_states is None, 'the end of the sliders')
+    count = len(robot.states)
+    robot.viewer.publish_joints(dict.fromkeys(names, 0.0))
+    for _ in range(20):
+        robot._executor.spin_once(0.02)
+    assert len(robot.states) == count
+    robot.node.destroy_publisher(other)
