@@ -11,10 +11,12 @@ from setuptools import find_packages, setup
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
+    'attach_contract = quad_controller.attach_contract:main',
     'check_policy = quad_controller.policy_check.main:main',
     'controller_node = quad_controller.nodes.controller_node:main',
 ]
 COMMANDS = [
+    'quad-attach-contract = quad_controller.attach_contract:main',
     'quad-check-policy = quad_controller.policy_check.main:main',
 ]
 
@@ -42,7 +44,12 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/quad_controller']),
         ('share/quad_controller', ['package.xml']),
     ],
-    install_requires=['numpy>=1.26', 'onnxruntime>=1.19', sibling('quad_description')],
+    install_requires=[
+        'numpy>=1.26',
+        'onnxruntime>=1.19',
+        'PyYAML>=6.0',
+        sibling('quad_description'),
+    ],
     extras_require={
         'test': ['pytest'],
         'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')],

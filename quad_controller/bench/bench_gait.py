@@ -19,6 +19,7 @@ from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
+from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.load import load_policy
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.states.controller import Controller
@@ -58,7 +59,8 @@ def main() -> None:
     joints = JointSample(stand, (0.0,) * len(stand))
     policy = load_policy(POLICY, robot, stand, PolicyOptions(), PERIOD).runner
     policy.reset(stand)
-    report('policy, 47-128-64-12', lambda: policy.step(joints, IMU, VELOCITY, PERIOD))
+    seen = PolicyInputs(joints, IMU, VELOCITY)
+    report('policy, 47-128-64-12', lambda: policy.step(seen, PERIOD))
     controller = Controller(robot, GaitParameters(), StateParameters())
     measurement = RobotState(joints, IMU, 0.8)
     controller.step(measurement, PERIOD)

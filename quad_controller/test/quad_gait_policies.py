@@ -13,6 +13,7 @@ from policy_mlp import Mlp
 
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
+from quad_controller.policy.contract.model import RecurrentState
 from quad_controller.policy.network import FLOAT, Floats, Port
 from quad_gait_rig import ROBOT
 
@@ -45,6 +46,12 @@ class FakeNetwork:
         self.digest = 'abc'
         self.action: Floats = np.zeros((1, joints), np.float32)
         self.asked: list[Floats] = []
+
+    def recur(self, _states: tuple[RecurrentState, ...]) -> None:
+        """Have no states."""
+
+    def reset(self) -> None:
+        """Have nothing to forget."""
 
     def run(self, observation: Floats) -> Floats:
         """Answer."""

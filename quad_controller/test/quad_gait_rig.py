@@ -10,7 +10,7 @@ import math
 from quad_builds import Build, urdf
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.policy.interface import PolicyStep
+from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.states.controller import Controller
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
@@ -32,6 +32,13 @@ class StillPolicy:
     """A policy that stands, and answers wrongly on request."""
 
     name = 'still'
+    needs_linear_velocity = False
+
+    def missing(self, inputs: PolicyInputs) -> str:
+        """Return what it has to see: what every policy sees."""
+        if inputs.joints.velocities is None:
+            return 'a policy needs the velocities of the joints'
+        return '' if inputs.imu.angular_velocity else 'a policy needs what /imu does not have'
 
     def __init__(self, targets: Targets) -> None:
         """Answer always the same targets."""
@@ -43,11 +50,9 @@ class StillPolicy:
         """Count."""
         self.resets += 1
 
-    def step(
-        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
-    ) -> PolicyStep:
+    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
         """Answer."""
-        self.velocities.append(velocity)
+        self.velocities.append(inputs.velocity)
         return PolicyStep(self.targets, '' if self.targets is not None else 'broken on purpose')
 
 

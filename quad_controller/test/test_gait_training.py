@@ -15,11 +15,12 @@ from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.check import check_contract
-from quad_controller.policy.interface import PolicyStep
-from quad_controller.policy.metadata import read_metadata
+from quad_controller.policy.contract.build import build_contract
+from quad_controller.policy.contract.declared import read_declared
+from quad_controller.policy.contract.mjlab import read_metadata
+from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.options import PolicyOptions
-from quad_description import ImuSample, JointSample, Targets
+from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
 
 pytestmark = pytest.mark.slow
@@ -29,6 +30,11 @@ class Lesson:
     """The teacher as a policy: what is imitated has to walk."""
 
     name = 'teacher'
+    needs_linear_velocity = False
+
+    def missing(self, inputs: PolicyInputs) -> str:
+        """Need nothing more."""
+        return ''
 
     def __init__(self, teacher: GaitTeacher) -> None:
         """Begin at the start of a cycle."""
@@ -39,10 +45,9 @@ class Lesson:
         """Begin at the start of a cycle."""
         self._phase = 0.0
 
-    def step(
-        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
-    ) -> PolicyStep:
+    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
         """Answer for what was measured, and go on in the cycle while there is a velocity."""
+        velocity, imu = inputs.velocity, inputs.imu
         self._phase = (self._phase + dt / self._teacher.schedule.period) % 1.0
         phase = 0.0 if velocity.at_rest else self._phase
         return PolicyStep(self._teacher.targets(velocity, phase, imu.roll_pitch_yaw[:2]), '')
@@ -70,9 +75,14 @@ def test_a_short_training_gives_a_policy_of_the_right_form(tmp_path: Path) -> No
     trainer.collect(1, share=0.0)
     trainer.export(tmp_path / 'short.onnx')
     network = OnnxNetwork(tmp_path / 'short.onnx')
-    metadata = read_metadata(network.metadata)
+    document = read_metadata(network.metadata)
+    contract = build_contract(document)
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    options, period = PolicyOptions(), 0.02
-    for row in check_contract(network, metadata, MODEL, stand, options=options, period=period):
+    declared = read_declared(network.metadata)
+    for row in check_contract(
+        network, contract, MODEL, stand,
+        document=document, declared=declared, hold_missing=False, period=0.02,
+    ):  # fmt: skip
         assert row.verdict.value == 'ok', row
-    assert math.isclose(metadata.phase_period or 0.0, 0.28)
+    phase = next(term for term in contract.terms if term.name == 'phase')
+    assert math.isclose(phase.phase_period, 0.28)

@@ -23,7 +23,9 @@ from policy_mlp import fit, Floats, Mlp
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
-from quad_controller.policy.observation import ObservationBuilder, TERMS, width
+from quad_controller.policy.contract.build import build_contract
+from quad_controller.policy.contract.mjlab import read_metadata, VENDOR_TERMS
+from quad_controller.policy.observation import ObservationBuilder, Observed
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, quadruped, robot_urdf, RobotState
 from quad_description.rotations import multiply, normalized
@@ -56,8 +58,10 @@ class Trainer:
         self._model = quadruped(self._urdf)
         self._teacher = GaitTeacher(self._model, GaitParameters())
         self._defaults: Floats = (np.round(self._teacher.stand, 3) + 0.0).astype(np.float32)
+        self._metadata = self._describe()
+        self._contract = build_contract(read_metadata(self._metadata))
         count = len(self._model.names)
-        self.network = Mlp((width(count), *HIDDEN, count), self._random)
+        self.network = Mlp((self._contract.width, *HIDDEN, count), self._random)
         self._inputs: list[Floats] = []
         self._wanted: list[Floats] = []
 
@@ -88,26 +92,26 @@ class Trainer:
 
     def export(self, path: Path) -> None:
         """Write the network with what a controller has to know of it."""
+        export(self.network, path, self._metadata)
+
+    def _describe(self) -> dict[str, str]:
         servo = ServoModel.FIRM.parameters
         count = len(self._model.names)
-        export(
-            self.network,
-            path,
-            {
-                'run_path': 'quad_controller/training/train_imitation.py',
-                'kind': 'imitation of the geometric trot (DAgger in MuJoCo, firm servos)',
-                'joint_names': joined(self._model.names),
-                'joint_stiffness': joined([servo.stiffness] * count),
-                'joint_damping': joined([servo.velocity_gain] * count),
-                'default_joint_pos': joined(self._defaults.tolist()),
-                'command_names': 'twist',
-                'observation_names': joined(TERMS),
-                'action_scale': joined([SCALE] * count),
-                'phase_period': f'{self._teacher.schedule.period:.3f}',
-                'phase_command_threshold': joined(PHASE_THRESHOLD),
-                'imu_frame': 'base',
-            },
-        )
+        return {
+            'run_path': 'quad_controller/training/train_imitation.py',
+            'kind': 'imitation of the geometric trot (DAgger in MuJoCo, firm servos)',
+            'joint_names': joined(self._model.names),
+            'joint_stiffness': joined([servo.stiffness] * count),
+            'joint_damping': joined([servo.velocity_gain] * count),
+            'default_joint_pos': joined(self._defaults.tolist()),
+            'command_names': 'twist',
+            'observation_names': joined(VENDOR_TERMS),
+            'action_scale': joined([SCALE] * count),
+            'step_dt': joined(PERIOD),
+            'phase_period': f'{self._teacher.schedule.period:.3f}',
+            'phase_command_threshold': joined(PHASE_THRESHOLD),
+            'imu_frame': 'base',
+        }
 
     def _episode(self, taught: bool) -> float:
         random = self._random
@@ -119,9 +123,7 @@ class Trainer:
         backend = PhysicsBackend(robot, PERIOD)
         state = backend.observe()
         period = round(self._teacher.schedule.period, 3)
-        builder = ObservationBuilder(
-            self._defaults, period, PHASE_THRESHOLD, yawed=False, source=GravitySource.EULER
-        )
+        builder = ObservationBuilder(self._contract, GravitySource.EULER)
         phase = float(random.uniform())
         builder.advance(phase * period)
         previous: Floats = np.zeros_like(self._defaults)
@@ -136,7 +138,7 @@ class Trainer:
             builder.advance(PERIOD)
             phase = (phase + PERIOD / period) % 1.0
             joints, imu = self._sense(state)
-            row = builder.build(*joints, imu, velocity, previous)
+            row = builder.build(Observed(*joints, imu, velocity, previous))
             moves = np.linalg.norm(row[0, 6:9]) >= PHASE_THRESHOLD
             right = self._teacher.targets(velocity if moves else Velocity(), phase, _tilt(state))
             wanted: Floats = ((np.array(right) - self._defaults) / SCALE).astype(np.float32)

@@ -122,6 +122,7 @@ class RobotState:
         imu: The newest attitude, None when there was none or the IMU is of no use.
         battery: Charge 0 to 1, None while it is unknown.
         position: Of base_link in the world in [m]; None where the back end does not know it.
+        linear_velocity: Of base_link in its own frame in [m/s]; None where nobody estimates it.
         time: When it was measured, on the clock of the back end in [s]; the joints may have been
             measured before.
     """
@@ -130,4 +131,5 @@ class RobotState:
     imu: ImuSample | None = None
     battery: float | None = None
     position: Vector | None = None
+    linear_velocity: Vector | None = None
     time: float = 0.0

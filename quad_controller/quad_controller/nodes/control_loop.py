@@ -9,6 +9,7 @@ import threading
 import time
 
 from quad_description import ImuSample, JointSample, RobotState
+from quad_description.rotations import Vector
 
 from ..states.controller import Controller
 from ..states.status import Output
@@ -49,6 +50,7 @@ class ControlLoop:
         self._joints: JointSample | None = None
         self._imu: ImuSample | None = None
         self._battery: float | None = None
+        self._linear_velocity: Vector | None = None
         self._arrival: float | None = None
         self._stopping = False
         self._begin: Callable[[], None] = lambda: None
@@ -91,6 +93,11 @@ class ControlLoop:
         with self._arrived:
             self._battery = battery
 
+    def offer_linear_velocity(self, velocity: Vector) -> None:
+        """Hand in a velocity of the body in its own frame [m/s] for the next step."""
+        with self._arrived:
+            self._linear_velocity = velocity
+
     def figures(self) -> LoopFigures:
         """Return how well the time is kept."""
         with self._arrived:
@@ -113,8 +120,14 @@ class ControlLoop:
                     return
                 now = time.monotonic()
                 arrival = self._arrival
-                measurement = RobotState(self._joints, self._imu, self._battery)
+                measurement = RobotState(
+                    self._joints,
+                    self._imu,
+                    self._battery,
+                    linear_velocity=self._linear_velocity,
+                )
                 self._joints = self._imu = self._battery = self._arrival = None
+                self._linear_velocity = None
                 self._pacer.stepped(now, arrival)
             with self.lock:
                 output = self._controller.step(measurement, now - last)

@@ -9,6 +9,7 @@ import threading
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -113,6 +114,9 @@ class ControllerNode(Node):
         self._state = self.create_publisher(String, '~/state', LATCHED_QOS)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
+        if policy is not None and policy.needs_linear_velocity:
+            sensor = qos_profile_sensor_data
+            self.create_subscription(Odometry, 'odom', self._take_odometry, sensor)
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
         self._gait = settings.gait
@@ -189,6 +193,9 @@ class ControllerNode(Node):
             self._loop.offer_imu(messages.imu_sample(*self._imu.read(data)))
         except ValueError as error:
             self._refuse(Fault.IMU, str(error))
+
+    def _take_odometry(self, message: Odometry) -> None:
+        self._loop.offer_linear_velocity(messages.linear_velocity(message))
 
     def _refuse(self, what: Fault, reason: str) -> None:
         with self._loop.lock:

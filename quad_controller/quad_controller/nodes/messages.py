@@ -10,11 +10,12 @@ import math
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, Twist
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Header
 
 from quad_description import ImuSample
-from quad_description.rotations import normalized, roll_pitch_yaw
+from quad_description.rotations import normalized, roll_pitch_yaw, Vector
 from quad_msgs.msg import JointCommand
 
 from ..gait.body import BodyPose
@@ -72,6 +73,12 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
 def charge(message: BatteryState) -> float | None:
     """Return the charge 0 to 1, None when it is not known."""
     return float(message.percentage) if math.isfinite(message.percentage) else None
+
+
+def linear_velocity(message: Odometry) -> Vector:
+    """Return the velocity of the body in its own frame [m/s]."""
+    linear = message.twist.twist.linear
+    return linear.x, linear.y, linear.z
 
 
 def velocity(message: Twist) -> Velocity:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -59,7 +60,7 @@ SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
     'mass': ((0.0, 100.0), 'what the legs carry [kg]; 0: as in the URDF'),
 }
 POLICY_MEANINGS: Mapping[str, str] = {
-    'phase_period': "[s]; 0: that of the file, else the vendor's 0.4",
+    'phase_period': '[s]; 0: that of the contract',
     'soft_limits': "share of a joint's range that its targets may use",
     'low_pass': 'cut-off of a filter of its targets [Hz]; 0: none',
 }
@@ -180,8 +181,12 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
         name: read.number(f'policy_{name}', getattr(default, name), OPTION_RANGES[name], meaning)
         for name, meaning in POLICY_MEANINGS.items()
     }
+    contract = read.text(
+        'policy_contract', '', 'YAML file with the contract of the policy, or what its file lacks'
+    )
     return PolicyOptions(
         **values,
+        contract=Path(contract).expanduser() if contract else None,
         imu_frame=read.choice(
             'policy_imu_frame',
             default.imu_frame.value,

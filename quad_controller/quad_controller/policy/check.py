@@ -12,17 +12,16 @@ import numpy as np
 
 from quad_description import Quadruped, Targets
 
-from .metadata import PolicyMetadata
-from .network import FLOAT, Floats, Network
-from .observation import ALIASES, TERMS, width
-from .options import ImuFrame, PolicyOptions, VENDOR_PHASE_PERIOD, VENDOR_STEP_PERIOD
+from .contract.declared import Declared
+from .contract.document import ContractDocument
+from .contract.mjlab import VENDOR
+from .contract.model import PolicyContract
+from .network import FLOAT, Floats, Network, observation_ports
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
 MAX_SCALE = 1.0  # [rad] an action of one may move a joint by
 MAX_RESTING_ACTION = 1.0  # [rad] a policy that wants more while standing is another robot's
 MAX_PERIOD_ERROR = 0.02  # of the loop's period, that of the training may differ by
-PHASE_PERIODS = (0.1, 5.0)  # [s] of a gait of legs of this size
-MAX_THRESHOLD = 1.0  # a gait that has no phase at faster commands is none
 WARM_UP = 20
 TIMED_RUNS = 100
 MAX_LATENCY_RATIO = 0.25  # of the period
@@ -88,46 +87,55 @@ class Report:
 
 def check_contract(
     network: Network,
-    metadata: PolicyMetadata,
+    contract: PolicyContract,
     robot: Quadruped,
     stand: Targets,
     *,
-    options: PolicyOptions,
+    document: ContractDocument,
+    declared: Declared,
+    hold_missing: bool,
     period: float,
 ) -> Iterator[Row]:
     """Compare what a policy declares with the robot; yields a row for each.
 
     Args:
         network: The network.
-        metadata: What its file has.
+        contract: What it expects.
         robot: The robot.
         stand: Where the gait stands [rad].
-        options: How it shall be run.
-        period: Time between two steps in [s].
+        document: Where the values of the contract come from.
+        declared: What its file says of sizes and rate besides.
+        hold_missing: Joints that the robot lacks count as being at their default.
+        period: Time between two steps of the control loop in [s].
     """
-    count = len(metadata.joint_names)
-    yield _shape('input', network.inputs, width(count), f'11 + 3 x {count} joints')
-    yield _shape('output', network.outputs, count, f'{count} joints')
-    yield from _sizes('observation', metadata.observation_sizes, width(count))
-    yield from _sizes('action', metadata.action_sizes, count)
-    yield from _rates(metadata, period)
-    yield from _joints(metadata, robot, options)
-    yield from _lengths(metadata)
-    yield from _defaults(metadata, robot, stand)
-    largest = max((abs(scale) for scale in metadata.action_scale), default=0.0)
-    fits = all(0.0 < scale <= MAX_SCALE for scale in metadata.action_scale)
-    yield _row('action_scale', f'0 to {MAX_SCALE:g} rad', f'{largest:g}', fits)
-    yield _observation(metadata.observation_names)
-    unusual = ', '.join(f'{key} = {value}' for key, value in metadata.unusual.items())
-    yield _row('history, scale, clip', 'none', unusual or 'none', not unusual)
-    if metadata.unknown:
-        unknown = ', '.join(f'{key} = {value}' for key, value in metadata.unknown.items())
+    count = len(contract.joint_names)
+    inputs, outputs = observation_ports(network, contract.recurrence)
+    terms = ' + '.join(
+        f'{term.name} {term.width}' + (f' x {term.history}' if term.history > 1 else '')
+        for term in contract.terms
+    )
+    yield _shape('input', inputs, contract.width, terms)
+    yield _shape('output', outputs, count, f'{count} joints')
+    yield from _recurrent(network, contract)
+    yield from _sizes('observation', declared.observation_sizes, contract.width)
+    yield from _sizes('action', declared.action_sizes, count)
+    yield from _rates(contract, declared, document, period)
+    yield from _joints(contract.joint_names, robot, hold_missing=hold_missing)
+    yield from _defaults(contract, robot, stand)
+    largest = max((abs(scale) for scale in contract.action.scale), default=0.0)
+    fits = all(0.0 < abs(scale) <= MAX_SCALE for scale in contract.action.scale)
+    yield _row('action.scale', f'up to {MAX_SCALE:g} rad, not 0', f'{largest:g}', fits)
+    yield from _training(contract)
+    if declared.unknown:
+        unknown = ', '.join(f'{key} = {value}' for key, value in declared.unknown.items())
         yield Row('keys', 'understood', f'not understood: {unknown}', Verdict.WARN)
-    yield from _assumptions(metadata, options)
+    for path, value, origin in document.rows():
+        if origin == VENDOR:
+            yield Row(path, 'known', f'{value}, of {VENDOR}', Verdict.WARN)
 
 
 def check_answers(
-    run: Callable[[Floats], Floats],
+    network: Network,
     standing: Floats,
     scale: Floats,
     period: float,
@@ -136,12 +144,17 @@ def check_answers(
     """Ask a policy for actions as it will be asked, and look at them.
 
     Args:
-        run: The network.
+        network: The network.
         standing: The observation of a robot that stands.
         scale: Positions in [rad] for an action of one.
         period: Time between two steps in [s].
         clock: A monotonic clock in [s].
     """
+
+    def run(observation: Floats) -> Floats:
+        network.reset()
+        return network.run(observation)
+
     # all zero is no state of a robot (gravity has a direction): finite numbers will do
     finite = bool(np.isfinite(run(np.zeros_like(standing))).all())
     yield _row('answer to all zero', 'numbers', 'numbers' if finite else 'NaN', finite)
@@ -172,6 +185,7 @@ def _shape(
     expected: int,
     meaning: str,
 ) -> Row:
+    """Compare the one input or output with its width."""
     found = ', '.join(f'{kind} {list(shape)}' for _, kind, shape in ports)
     fits = (
         len(ports) == 1
@@ -188,20 +202,56 @@ def _sizes(what: str, sizes: Mapping[str, float], expected: int) -> Iterator[Row
         yield _row(f'{key} ({what})', f'{expected}', f'{size:g}', size == expected)
 
 
-def _rates(metadata: PolicyMetadata, period: float) -> Iterator[Row]:
+def _recurrent(network: Network, contract: PolicyContract) -> Iterator[Row]:
+    """Compare each recurrent input with its output."""
+    inputs = {name: (kind, shape) for name, kind, shape in network.inputs}
+    outputs = {name: (kind, shape) for name, kind, shape in network.outputs}
+    for state in contract.recurrence:
+        fed, kept = inputs.get(state.input), outputs.get(state.output)
+        found = f'{fed} from {kept}'
+        sizes = [len(port[1]) if port else 0 for port in (fed, kept)]
+        fits = fed is not None and kept is not None and fed[0] == FLOAT and sizes[0] == sizes[1]
+        yield _row(f'recurrence.{state.input}', f'an input, from {state.output}', found, fits)
+
+
+def _rates(
+    contract: PolicyContract, declared: Declared, document: ContractDocument, period: float
+) -> Iterator[Row]:
     """Compare the rate that the policy was trained for with that of the loop."""
-    said = metadata.step_periods or {"the vendor's": VENDOR_STEP_PERIOD}
-    for key, step in said.items():
-        fits = abs(step - period) <= MAX_PERIOD_ERROR * period
+    periods = declared.step_periods
+    origin = document.origins.get('period', '')
+    for key, step in (periods or {origin: contract.period}).items():
+        fits = abs(step - contract.period) <= MAX_PERIOD_ERROR * contract.period
+        if not periods or fits:
+            several = max(round(step / period), 1) if step > 0.0 else 1
+            fits = abs(step - several * period) <= MAX_PERIOD_ERROR * step
         expected = f'{1.0 / step:g} Hz ({key})' if step > 0.0 else f'{step:g} s ({key})'
-        yield _row('loop_rate', expected, f'{1.0 / period:g} Hz', fits)
+        found = f'{1.0 / period:g} Hz'
+        yield _row('loop_rate', f'{expected}, or several times that', found, fits)
 
 
-def _joints(metadata: PolicyMetadata, robot: Quadruped, options: PolicyOptions) -> Iterator[Row]:
-    names = metadata.joint_names
+def _training(contract: PolicyContract) -> Iterator[Row]:
+    """Yield what the policy was trained with, for people to compare."""
+    gains, commands = contract.gains, contract.commands
+    if gains is not None:
+        spring, damper = (
+            f'{min(each):g}' if min(each) == max(each) else f'{min(each):g} to {max(each):g}'
+            for each in (gains.stiffness, gains.damping)
+        )
+        found = f'{spring} N m/rad, {damper} N m s/rad'
+        yield Row('gains of the training', "near the servos'", found, Verdict.OK)
+    if commands is not None:
+        found = ', '.join(
+            f'{axis} {low:g} to {high:g}'
+            for axis, (low, high) in zip(('x', 'y', 'yaw'), commands.axes, strict=True)
+        )
+        yield Row('commands', 'any', f'clamped to {found}', Verdict.OK)
+
+
+def _joints(names: tuple[str, ...], robot: Quadruped, *, hold_missing: bool) -> Iterator[Row]:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        yield _row('joint_names', 'each once', f'twice: {", ".join(twice)}', fits=False)
+        yield _row('joints', 'each once', f'twice: {", ".join(twice)}', fits=False)
     missing = [name for name in names if name not in robot.names]
     legs = [robot.names[index] for indices in robot.leg_indices for index in indices]
     unmoved = [name for name in legs if name not in names]
@@ -210,30 +260,20 @@ def _joints(metadata: PolicyMetadata, robot: Quadruped, options: PolicyOptions) 
         found = f'not in the robot: {", ".join(missing)}'
     if unmoved:
         found += f'; legs without: {", ".join(unmoved)}'
-    held = bool(missing) and not unmoved and options.hold_missing
+    held = bool(missing) and not unmoved and hold_missing
     if held:
         found += ' (held at default)'
     fits = not unmoved and (not missing or held)
     verdict = Verdict.REFUSE if not fits else Verdict.WARN if held else Verdict.OK
-    yield Row('joint_names', f"all of the legs', of {len(robot.names)}", found, verdict)
+    yield Row('joints', f"all of the legs', of {len(robot.names)}", found, verdict)
     ours = [name for name in robot.names if name in names]
     order = [name for name in names if name in robot.names]
     moved = 'as in the URDF' if ours == order else 'permuted, by name'
     yield Row('order of joints', 'any', moved, Verdict.OK)
 
 
-def _lengths(metadata: PolicyMetadata) -> Iterator[Row]:
-    count = len(metadata.joint_names)
-    for key, values in (
-        ('default_joint_pos', metadata.default_joint_pos),
-        ('action_scale', metadata.action_scale),
-    ):
-        if len(values) != count:
-            yield _row(f'length of {key}', f'{count}', f'{len(values)}', fits=False)
-
-
-def _defaults(metadata: PolicyMetadata, robot: Quadruped, stand: Targets) -> Iterator[Row]:
-    named = dict(zip(metadata.joint_names, metadata.default_joint_pos, strict=False))
+def _defaults(contract: PolicyContract, robot: Quadruped, stand: Targets) -> Iterator[Row]:
+    named = dict(zip(contract.joint_names, contract.default_positions, strict=True))
     legs = {index for indices in robot.leg_indices for index in indices}
     outside, farthest, where = [], 0.0, ''
     for index, (name, limits) in enumerate(zip(robot.names, robot.limits, strict=True)):
@@ -248,33 +288,6 @@ def _defaults(metadata: PolicyMetadata, robot: Quadruped, stand: Targets) -> Ite
     found = f'{farthest:.2f} rad' + (f' ({where})' if where else '')
     expected = f'{MAX_POSE_DISTANCE:g} rad from our stand'
     yield _row('default pose', expected, found, farthest <= MAX_POSE_DISTANCE)
-
-
-def _observation(names: tuple[str, ...]) -> Row:
-    ours = tuple(ALIASES.get(name, name) for name in names)
-    return _row('observation_names', ' '.join(TERMS), ' '.join(names), ours == TERMS)
-
-
-def _assumptions(metadata: PolicyMetadata, options: PolicyOptions) -> Iterator[Row]:
-    """Yield what a file may leave open: some of it is assumed to be the vendor's."""
-    known = metadata.phase_period if metadata.phase_period is not None else VENDOR_PHASE_PERIOD
-    period = options.phase_period or known
-    said = bool(options.phase_period) or metadata.phase_period is not None
-    found = f'{period:g} s' if said else f"{period:g} s, the vendor's"
-    verdict = Verdict.OK if said else Verdict.WARN
-    least, most = PHASE_PERIODS
-    fits = least <= period <= most
-    expected = f'known, {least:g} to {most:g} s'
-    yield Row('phase period', expected, found, verdict if fits else Verdict.REFUSE)
-    threshold = metadata.phase_threshold
-    if threshold is not None:
-        fits = 0.0 <= threshold <= MAX_THRESHOLD
-        yield _row('phase threshold', f'0 to {MAX_THRESHOLD:g}', f'{threshold:g}', fits)
-    frame = metadata.imu_frame if options.imu_frame is ImuFrame.AUTO else options.imu_frame.value
-    known_frames = {ImuFrame.BASE.value, ImuFrame.YAWED.value}
-    # no measurement shows which it is, and with the wrong one the policy falls
-    found = 'not in the file: set policy_imu_frame' if frame is None else frame
-    yield _row('imu frame', 'base or yawed', found, frame in known_frames)
 
 
 def _row(subject: str, expected: str, found: str, fits: bool) -> Row:

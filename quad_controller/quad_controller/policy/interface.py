@@ -8,8 +8,26 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from quad_description import ImuSample, JointSample, Targets
+from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyInputs:
+    """What a policy may see in one step.
+
+    Attributes:
+        joints: Measured joints.
+        imu: Measured attitude and turning.
+        velocity: Velocity that is requested.
+        linear_velocity: Of the body in its own frame in [m/s], estimated; None where nobody does.
+    """
+
+    joints: JointSample
+    imu: ImuSample
+    velocity: Velocity
+    linear_velocity: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,26 +43,21 @@ class PolicyStep:
     reason: str = ''
 
 
-def missing_inputs(joints: JointSample, imu: ImuSample) -> str:
-    """Return what is not measured that a policy needs; nothing when all is there.
-
-    Args:
-        joints: The joints.
-        imu: Attitude and turning.
-    """
-    if joints.velocities is None:
-        return 'a policy needs the velocities of the joints, which /joint_states does not have'
-    if imu.angular_velocity is None:
-        return 'a policy needs the angular velocity, which /imu does not have'
-    return ''
-
-
 class Policy(Protocol):
     """A trained policy that fits the robot."""
 
     @property
     def name(self) -> str:
         """How it is called in messages."""
+        ...
+
+    @property
+    def needs_linear_velocity(self) -> bool:
+        """Whether it sees the linear velocity of the body, which has to be estimated."""
+        ...
+
+    def missing(self, inputs: PolicyInputs) -> str:
+        """Return what it needs and nobody measures; nothing when all is there."""
         ...
 
     def reset(self, others: Targets) -> None:
@@ -55,15 +68,6 @@ class Policy(Protocol):
         """
         ...
 
-    def step(
-        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
-    ) -> PolicyStep:
-        """Advance.
-
-        Args:
-            joints: Measured joints.
-            imu: Measured attitude and turning.
-            velocity: Velocity that is requested.
-            dt: Duration of the step in [s].
-        """
+    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
+        """Advance by some [s]."""
         ...

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 import time
@@ -16,9 +16,15 @@ from quad_description import ImuSample, JointSample, Quadruped, Targets
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
 from .check import check_answers, check_contract, Report
-from .metadata import read_metadata
+from .contract.build import build_contract
+from .contract.declared import read_declared
+from .contract.document import ContractDocument, document_of
+from .contract.files import read_contract_file
+from .contract.mjlab import CONTRACT_KEY, read_metadata
+from .contract.model import PolicyContract, Source
+from .interface import PolicyInputs
 from .network import Network, OnnxNetwork
-from .options import PolicyOptions
+from .options import ImuFrame, PolicyOptions
 from .runner import PolicyRunner
 
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
@@ -30,12 +36,16 @@ class LoadedPolicy:
 
     Attributes:
         runner: What runs it.
+        contract: What it expects.
+        document: The contract, and where each of its values comes from.
         report: The table of the check.
-        digest: SHA-256 of its file.
+        digest: SHA-256 of its file, and of those that its weights lie in.
         metadata: What its file has, as it stands there.
     """
 
     runner: PolicyRunner
+    contract: PolicyContract
+    document: ContractDocument
     report: Report
     digest: str
     metadata: dict[str, str]
@@ -43,8 +53,52 @@ class LoadedPolicy:
     def __str__(self) -> str:
         """Return everything for people."""
         lines = [f'policy {self.runner.name}', f'sha256 {self.digest}', str(self.report)]
-        lines += [f'{key}: {value}' for key, value in sorted(self.metadata.items())]
+        lines += [f'{path}: {value}  ({origin})' for path, value, origin in self.document.rows()]
+        lines += [
+            f'metadata {key}: {value}'
+            for key, value in sorted(self.metadata.items())
+            if key != CONTRACT_KEY
+        ]
         return '\n'.join(lines)
+
+
+def document_for(network: Network, options: PolicyOptions) -> ContractDocument:
+    """Return all that is known of a policy's contract; what counts most lies on top.
+
+    Args:
+        network: The network, with what its file has.
+        options: What was set for it.
+
+    Raises:
+        PolicyError: A file cannot be read, or a value of it.
+    """
+    document = read_metadata(network.metadata)
+    if options.contract is not None:
+        joints = document.values.get('joints') or ()
+        document = read_contract_file(options.contract, joints).over(document)
+    return _settings(document, options).over(document)
+
+
+def _settings(document: ContractDocument, options: PolicyOptions) -> ContractDocument:
+    """Return what parameters say of terms."""
+    terms = document.values.get('observation', {}).get('terms', {})
+    settings: dict[str, dict[str, object]] = {}
+    for name, source, key, value in _term_settings(terms, options):
+        if terms[name].get('source') == source.value:
+            settings.setdefault(name, {})[key] = value
+    if not settings:
+        return ContractDocument({})
+    return document_of({'observation': {'terms': settings}}, 'parameter')
+
+
+def _term_settings(
+    terms: dict[str, dict[str, object]], options: PolicyOptions
+) -> Iterator[tuple[str, Source, str, object]]:
+    for name in terms:
+        if options.imu_frame is not ImuFrame.AUTO:
+            yield name, Source.ANGULAR_VELOCITY, 'frame', options.imu_frame.value
+        if options.phase_period:
+            yield name, Source.PHASE, 'phase_period', options.phase_period
 
 
 def load_policy(
@@ -92,22 +146,35 @@ def validate_policy(
     Raises:
         PolicyError: It does not fit; the message has the table.
     """
-    metadata = read_metadata(network.metadata)
+    document = document_for(network, options)
+    contract = build_contract(document)
     report = Report(
-        tuple(check_contract(network, metadata, robot, stand, options=options, period=period))
+        tuple(
+            check_contract(
+                network,
+                contract,
+                robot,
+                stand,
+                document=document,
+                declared=read_declared(network.metadata),
+                hold_missing=options.hold_missing,
+                period=period,
+            )
+        )
     )
     if report.refused:
         raise PolicyError(f'policy {name} does not fit this robot:\n{report}', report.reason)
-    runner = PolicyRunner(name, network, metadata, robot, options)
+    network.recur(contract.recurrence)
+    runner = PolicyRunner(name, network, contract, robot, options=options, period=period)
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
-    standing = runner.observe(still, UPRIGHT, REST).copy()
-    scale = np.array(metadata.action_scale, np.float32)
+    standing = runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0)))
+    scale = np.array(contract.action.scale, np.float32)
     try:
-        answers = tuple(check_answers(network.run, standing, scale, period, clock))
+        answers = tuple(check_answers(network, standing, scale, period, clock))
     except Exception as error:
         raise PolicyError(f'policy {name} cannot be run: {error}') from error
     report = Report((*report.rows, *answers))
     if report.refused:
         raise PolicyError(f'policy {name} does not behave:\n{report}', report.reason)
-    return LoadedPolicy(runner, report, network.digest, dict(network.metadata))
+    return LoadedPolicy(runner, contract, document, report, network.digest, dict(network.metadata))

@@ -1,55 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The observation of a policy, as the article and the vendor's training have it.
-
-``ang_vel(3) gravity(3) cmd(3) phase(2) joint_pos(J) joint_vel(J) prev_action(J)``, raw SI values,
-no history; joint positions relative to the default pose; ``obs_dim = 11 + 3 J``.
-"""
+"""Makes the observation of a policy, as its contract says: terms, scales, clips, history."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from quad_description import ImuSample
 from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
+from .contract.model import (
+    BodyFrame,
+    HistoryLayout,
+    HistoryStart,
+    Newest,
+    ObservationTerm,
+    PolicyContract,
+    QuaternionOrder,
+    Source,
+)
 from .network import Floats
 from .options import GravitySource
 
-TERMS = ('ang_vel', 'gravity', 'cmd', 'phase', 'joint_pos', 'joint_vel', 'prev_action')
-"""Terms in their order."""
-
-ALIASES = {
-    'base_ang_vel': 'ang_vel',
-    'gyro': 'ang_vel',
-    'imu_ang_vel': 'ang_vel',
-    'projected_gravity': 'gravity',
-    'command': 'cmd',
-    'velocity_commands': 'cmd',
-    'velocity_command': 'cmd',
-    'joint_pos_rel': 'joint_pos',
-    'joint_vel_rel': 'joint_vel',
-    'actions': 'prev_action',
-    'action': 'prev_action',
-    'last_action': 'prev_action',
-    'last_actions': 'prev_action',
-}
-"""Other names of the terms, as mjlab and its relatives write them."""
-
-FIXED_WIDTH = 11  # of the terms that do not depend on the number of joints
-CLIP = 100.0  # beyond it an observation is no observation
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 TRUSTED = 0.5  # [m/s^2] off 1 g up to which the accelerometer is blended in
 PLAUSIBLE = 2.0  # [m/s^2] off 1 g up to which it is believed at all
 BLEND_WEIGHT = 0.1
-
-
-def width(joints: int) -> int:
-    """Return the width of the observation for a number of joints."""
-    return FIXED_WIDTH + 3 * joints
 
 
 def gravity(imu: ImuSample, source: GravitySource) -> Vector:
@@ -75,70 +57,164 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
     return mixed[0] / norm, mixed[1] / norm, mixed[2] / norm
 
 
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What is measured and commanded in one step, joints in the order of the policy.
+
+    Attributes:
+        positions: Of the joints in [rad].
+        velocities: Of the joints in [rad/s].
+        imu: Attitude and turning.
+        velocity: Velocity that is requested.
+        previous: The last action.
+        linear_velocity: Of the body in its own frame in [m/s]; None while nobody estimates it.
+    """
+
+    positions: Floats
+    velocities: Floats
+    imu: ImuSample
+    velocity: Velocity
+    previous: Floats
+    linear_velocity: Vector | None = None
+
+
+def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:
+    x, y, z = vector or (0.0, 0.0, 0.0)
+    return (-x, -y, z) if frame is BodyFrame.YAWED else (x, y, z)
+
+
+def _quaternion(imu: ImuSample, order: QuaternionOrder) -> tuple[float, ...]:
+    x, y, z, w = imu.orientation
+    return (w, x, y, z) if order is QuaternionOrder.WXYZ else (x, y, z, w)
+
+
+MEASURED: Mapping[Source, Callable[[Observed, ObservationTerm], npt.ArrayLike]] = {
+    Source.LINEAR_VELOCITY: lambda seen, term: _in_frame(seen.linear_velocity, term.frame),
+    Source.ANGULAR_VELOCITY: lambda seen, term: _in_frame(seen.imu.angular_velocity, term.frame),
+    Source.ORIENTATION: lambda seen, term: _quaternion(seen.imu, term.quaternion),
+    Source.COMMAND: lambda seen, _: (seen.velocity.x, seen.velocity.y, seen.velocity.yaw),
+    Source.JOINT_POSITIONS: lambda seen, _: seen.positions,
+    Source.JOINT_VELOCITIES: lambda seen, _: seen.velocities,
+    Source.LAST_ACTION: lambda seen, _: seen.previous,
+    Source.HEIGHT_SCAN: lambda _, term: term.values,
+    Source.CONSTANT: lambda _, term: term.values,
+}
+"""Numbers of the terms that need nothing but what is measured and declared."""
+
+
 class ObservationBuilder:
     """Fills one buffer, step after step."""
 
-    def __init__(
-        self,
-        defaults: Floats,
-        period: float,
-        threshold: float,
-        *,
-        yawed: bool,
-        source: GravitySource,
-    ) -> None:
+    def __init__(self, contract: PolicyContract, source: GravitySource) -> None:
         """Prepare it.
 
         Args:
-            defaults: Default pose in the policy's order in [rad].
-            period: Of the phase in [s].
-            threshold: A command whose norm is smaller has no phase.
-            yawed: Whether the angular velocity is that of a frame turned by 180 degrees.
+            contract: What the policy expects.
             source: Of the direction of gravity.
         """
-        self._defaults, self._count = defaults, len(defaults)
-        self._period, self._threshold = period, threshold
-        self._sign = -1.0 if yawed else 1.0
-        self._source = source
-        self._phase = 0.0
-        self._row: Floats = np.zeros((1, width(self._count)), np.float32)
+        self._gravity = source
+        widths = [term.width for term in contract.terms]
+        ends = np.cumsum([0, *widths]).tolist()
+        self._terms = [
+            (term, slice(start, end))
+            for term, start, end in zip(contract.terms, ends, ends[1:], strict=False)
+        ]
+        self._defaults: Floats = np.array(contract.default_positions, np.float32)
+        self._scale: Floats = _joined([term.scale for term in contract.terms])
+        self._offset: Floats = _joined([term.offset for term in contract.terms])
+        clips = [term.clip or (-math.inf, math.inf) for term in contract.terms]
+        self._lowest: Floats = np.repeat(np.array([c[0] for c in clips], np.float32), widths)
+        self._highest: Floats = np.repeat(np.array([c[1] for c in clips], np.float32), widths)
+        self._clips = any(term.clip for term in contract.terms)
+        self._clip = contract.clip
+        # the newest step first
+        self._history: Floats = np.zeros(
+            (max((term.history for term in contract.terms), default=1), sum(widths)), np.float32
+        )
+        self._places = observed_places(contract)
+        self._repeats = contract.history_start is HistoryStart.REPEAT
+        self._begun = False
+        self._time = 0.0
 
     def reset(self) -> None:
-        """Begin with phase zero."""
-        self._phase = 0.0
+        """Begin anew: no history, all clocks at zero."""
+        self._history[:] = 0.0
+        self._begun = False
+        self._time = 0.0
 
     def advance(self, dt: float) -> None:
-        """Let the phase go on by some [s]."""
-        self._phase = math.fmod(self._phase + dt / self._period, 1.0)
+        """Let the clocks go on by some [s]."""
+        self._time += dt
 
-    def build(
-        self,
-        positions: Floats,
-        velocities: Floats,
-        imu: ImuSample,
-        velocity: Velocity,
-        previous: Floats,
-    ) -> Floats:
-        """Return the observation; the buffer is used again in the next step.
+    def build(self, observed: Observed) -> Floats:
+        """Return the observation; the history goes on by one step.
 
         Args:
-            positions: Joints in the policy's order in [rad].
-            velocities: The same in [rad/s].
-            imu: Attitude and turning.
-            velocity: Velocity that is requested.
-            previous: The raw action of the step before.
+            observed: What is measured and commanded.
         """
-        row, count = self._row[0], self._count
-        roll, pitch, yaw = imu.angular_velocity or (0.0, 0.0, 0.0)
-        row[0:3] = (self._sign * roll, self._sign * pitch, yaw)
-        row[3:6] = gravity(imu, self._source)
-        command = (velocity.x, velocity.y, velocity.yaw)
-        row[6:9] = command
-        angle = math.tau * self._phase
-        moves = math.hypot(*command) >= self._threshold
-        row[9:11] = (math.sin(angle), math.cos(angle)) if moves else (0.0, 0.0)
-        row[11 : 11 + count] = positions - self._defaults
-        row[11 + count : 11 + 2 * count] = velocities
-        row[11 + 2 * count :] = previous
-        np.clip(self._row, -CLIP, CLIP, out=self._row)
-        return self._row
+        past, frame = self._history[1:], self._history[0]
+        past[:] = self._history[:-1]
+        for term, place in self._terms:
+            frame[place] = self._numbers(term, observed)
+        if self._clips:
+            np.clip(frame, self._lowest, self._highest, out=frame)
+        frame *= self._scale
+        frame += self._offset
+        if self._clip is not None:
+            np.clip(frame, -self._clip, self._clip, out=frame)
+        if not self._begun:
+            self._begun = True
+            if self._repeats:
+                past[:] = frame
+        row: Floats = self._history.ravel()[self._places][np.newaxis, :]
+        return row
+
+    def _numbers(self, term: ObservationTerm, observed: Observed) -> npt.ArrayLike:
+        """Return one step of a term, before clip and scale."""
+        if term.source is Source.GRAVITY:
+            return gravity(observed.imu, self._gravity)
+        if term.source is Source.PHASE:
+            return self._phase(term, observed.velocity)
+        if term.source is Source.JOINT_POSITIONS and term.relative:
+            return observed.positions - self._defaults
+        return MEASURED[term.source](observed, term)
+
+    def _phase(self, term: ObservationTerm, velocity: Velocity) -> tuple[float, float]:
+        if math.hypot(velocity.x, velocity.y, velocity.yaw) < term.phase_threshold:
+            return 0.0, 0.0
+        angle = math.tau * math.fmod(self._time / term.phase_period, 1.0)
+        return math.sin(angle), math.cos(angle)
+
+
+def observed_places(contract: PolicyContract) -> npt.NDArray[np.intp]:
+    """Return where each number of the observation is found in the history.
+
+    The history is a table: a row for each step, the newest first; a column for each number of
+    one step. The places count its cells row by row.
+
+    Args:
+        contract: What the policy expects.
+    """
+    columns = sum(term.width for term in contract.terms)
+    newest_first = contract.newest is Newest.FIRST
+
+    def ages(length: int) -> list[int]:
+        return list(range(length)) if newest_first else list(range(length - 1, -1, -1))
+
+    places: list[int] = []
+    if contract.history_layout is HistoryLayout.FRAMES:
+        length = max((term.history for term in contract.terms), default=1)
+        for age in ages(length):
+            places.extend(range(age * columns, (age + 1) * columns))
+    else:
+        start = 0
+        for term in contract.terms:
+            for age in ages(term.history):
+                first = age * columns + start
+                places.extend(range(first, first + term.width))
+            start += term.width
+    return np.array(places, np.intp)
+
+
+def _joined(rows: Sequence[Sequence[float]]) -> Floats:
+    return np.array([number for row in rows for number in row], np.float32)

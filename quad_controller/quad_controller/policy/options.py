@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 import math
+from pathlib import Path
 
 from ..exceptions import ParameterError
 
@@ -23,20 +24,11 @@ class GravitySource(Enum):
 
 
 class ImuFrame(Enum):
-    """Frame in which the policy expects the angular velocity.
-
-    ``YAWED`` is turned by 180 degrees about z: in the vendor's training environment (luwu_mjlab)
-    the IMU sits so on the body. ``AUTO`` is that of the file; one without it is refused.
-    """
+    """Frame in which the policy expects the angular velocity; ``AUTO`` is that of its contract."""
 
     AUTO = 'auto'
     BASE = 'base'
     YAWED = 'yawed'
-
-
-VENDOR_PHASE_PERIOD = 0.4  # [s] luwu_mjlab, XGOMini velocity task; no exporter writes it
-VENDOR_STEP_PERIOD = 0.02  # [s] luwu_mjlab: 500 Hz physics, decimation 10
-VENDOR_PHASE_THRESHOLD = 0.1  # luwu_mjlab, norm of (vx, vy, yaw rate)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +36,8 @@ class PolicyOptions:
     """Options of the runner.
 
     Attributes:
-        phase_period: In [s]; 0 takes that of the file, and the vendor's where it has none.
+        contract: File whose values count before those in the policy's own; None for none.
+        phase_period: In [s]; 0 takes that of the contract.
         imu_frame: Of the angular velocity.
         gravity_source: Of the direction of gravity.
         hold_missing: Joints of the policy that the robot lacks count as being at their default.
@@ -52,6 +45,7 @@ class PolicyOptions:
         low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
     """
 
+    contract: Path | None = None
     phase_period: float = 0.0
     imu_frame: ImuFrame = ImuFrame.AUTO
     gravity_source: GravitySource = GravitySource.BLEND

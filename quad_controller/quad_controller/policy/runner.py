@@ -9,14 +9,14 @@ import math
 
 import numpy as np
 
-from quad_description import ImuSample, JointSample, Quadruped, Targets
+from quad_description import Quadruped, Targets
 
 from ..gait.velocity import Velocity
-from .interface import missing_inputs, PolicyStep
-from .metadata import PolicyMetadata
+from .contract.model import PolicyContract, Source
+from .interface import PolicyInputs, PolicyStep
 from .network import Floats, Network
-from .observation import ObservationBuilder
-from .options import ImuFrame, PolicyOptions, VENDOR_PHASE_PERIOD, VENDOR_PHASE_THRESHOLD
+from .observation import ObservationBuilder, Observed
+from .options import PolicyOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,42 +51,40 @@ class PolicyRunner:
         self,
         name: str,
         network: Network,
-        metadata: PolicyMetadata,
+        contract: PolicyContract,
         robot: Quadruped,
+        *,
         options: PolicyOptions,
+        period: float,
     ) -> None:
         """Prepare it.
 
         Args:
             name: How it is called in messages.
             network: What answers.
-            metadata: What its file has; checked before. It has the frame of the IMU where the
-                options leave it open.
+            contract: What it expects; checked before.
             robot: The robot.
             options: How to run it.
+            period: Of the control loop in [s]; that of the policy is one or several of them.
         """
-        self._name, self._network, self._options = name, network, options
-        self._map = joint_mapping(metadata.joint_names, robot)
+        self._name, self._network, self._contract = name, network, contract
+        self._low_pass = options.low_pass or contract.action.low_pass
+        self._map = joint_mapping(contract.joint_names, robot)
         self._policy_places = np.array(self._map.policy)
         self._robot_places = np.array(self._map.robot)
-        self._defaults: Floats = np.array(metadata.default_joint_pos, np.float32)
-        self._scale: Floats = np.array(metadata.action_scale, np.float32)
-        self._lower, self._upper = self._soft_limits(robot, options.soft_limits)
-        threshold = metadata.phase_threshold
-        frame = options.imu_frame
-        if frame is ImuFrame.AUTO:
-            frame = ImuFrame(metadata.imu_frame)
-        self._builder = ObservationBuilder(
-            self._defaults,
-            options.phase_period or metadata.phase_period or VENDOR_PHASE_PERIOD,
-            VENDOR_PHASE_THRESHOLD if threshold is None else threshold,
-            yawed=frame is ImuFrame.YAWED,
-            source=options.gravity_source,
-        )
+        self._defaults: Floats = np.array(contract.default_positions, np.float32)
+        self._scale: Floats = np.array(contract.action.scale, np.float32)
+        self._offset: Floats = np.array(contract.action.offset, np.float32)
+        self._clip = contract.action.clip and np.array(contract.action.clip, np.float32).T
+        self._lower, self._upper = self._limits(robot, options.soft_limits)
+        self._builder = ObservationBuilder(contract, options.gravity_source)
+        self._decimation = max(round(contract.period / period), 1)
+        self._waits = 0
         self._previous: Floats = np.zeros(self._map.count, np.float32)
         self._positions = self._defaults.copy()
         self._velocities = np.zeros_like(self._defaults)
         self._others: Targets = ()
+        self._wanted: Floats | None = None
         self._filtered: Floats | None = None
 
     @property
@@ -94,47 +92,61 @@ class PolicyRunner:
         """How it is called in messages."""
         return self._name
 
+    @property
+    def needs_linear_velocity(self) -> bool:
+        """Whether it sees the linear velocity of the body, which has to be estimated."""
+        return self._contract.needs(Source.LINEAR_VELOCITY)
+
+    def missing(self, inputs: PolicyInputs) -> str:
+        """Return what it needs and nobody measures; nothing when all is there."""
+        needs, joints, imu = self._contract.needs, inputs.joints, inputs.imu
+        if joints.velocities is None and needs(Source.JOINT_VELOCITIES):
+            return 'a policy needs the velocities of the joints, which /joint_states does not have'
+        if imu.angular_velocity is None and needs(Source.ANGULAR_VELOCITY):
+            return 'a policy needs the angular velocity, which /imu does not have'
+        if inputs.linear_velocity is None and needs(Source.LINEAR_VELOCITY):
+            return 'the policy needs the linear velocity of the body, which nobody estimates'
+        return ''
+
     def reset(self, others: Targets) -> None:
-        """Begin anew: no previous action, phase zero.
+        """Begin anew: no previous action, no history, phase zero.
 
         Args:
             others: Positions of all joints, for those that the policy does not move [rad].
         """
         self._others = others
         self._previous[:] = 0.0
-        self._filtered = None
+        self._filtered = self._wanted = None
+        self._waits = 0
         self._builder.reset()
+        self._network.reset()
 
-    def observe(self, joints: JointSample, imu: ImuSample, velocity: Velocity) -> Floats:
-        """Return the observation; it is valid until the next one.
-
-        Args:
-            joints: Measured joints.
-            imu: Measured attitude and turning.
-            velocity: Velocity that is requested.
-        """
+    def observe(self, inputs: PolicyInputs) -> Floats:
+        """Return the observation; its history goes on by one step."""
+        joints = inputs.joints
         self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
         if joints.velocities is not None:
             self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
         return self._builder.build(
-            self._positions, self._velocities, imu, velocity, self._previous
+            Observed(
+                self._positions,
+                self._velocities,
+                inputs.imu,
+                self._command(inputs.velocity),
+                self._previous,
+                inputs.linear_velocity,
+            )
         )
 
-    def step(
-        self, joints: JointSample, imu: ImuSample, velocity: Velocity, dt: float
-    ) -> PolicyStep:
-        """Advance.
-
-        Args:
-            joints: Measured joints.
-            imu: Measured attitude and turning.
-            velocity: Velocity that is requested.
-            dt: Duration of the step in [s].
-        """
+    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
+        """Advance by some [s]; a slower policy is asked in one of several steps."""
         self._builder.advance(dt)
-        if missing := missing_inputs(joints, imu):
+        if missing := self.missing(inputs):
             return PolicyStep(None, missing)
-        observation = self.observe(joints, imu, velocity)
+        if self._waits > 0 and self._wanted is not None:
+            self._waits -= 1
+            return PolicyStep(self._targets(self._wanted, dt))
+        observation = self.observe(inputs)
         if not np.isfinite(observation).all():
             return PolicyStep(None, 'the observation is not finite')
         try:
@@ -143,13 +155,28 @@ class PolicyRunner:
             return PolicyStep(None, f'the network failed: {error}')
         if not np.isfinite(action).all():
             return PolicyStep(None, 'the action is not finite')
+        if self._clip is not None:
+            action = np.clip(action, *self._clip)
         self._previous[:] = action
-        return PolicyStep(self._targets(action, dt))
+        self._waits = self._decimation - 1
+        self._wanted = np.clip(self._offset + self._scale * action, self._lower, self._upper)
+        return PolicyStep(self._targets(self._wanted, dt))
 
-    def _targets(self, action: Floats, dt: float) -> Targets:
-        wanted = np.clip(self._defaults + self._scale * action, self._lower, self._upper)
-        if self._options.low_pass > 0.0:
-            share = 1.0 - math.exp(-math.tau * self._options.low_pass * dt)
+    def _command(self, velocity: Velocity) -> Velocity:
+        """Return a velocity within what the policy was trained for."""
+        if self._contract.commands is None:
+            return velocity
+        x, y, yaw = (
+            min(max(value, low), high)
+            for value, (low, high) in zip(
+                (velocity.x, velocity.y, velocity.yaw), self._contract.commands.axes, strict=True
+            )
+        )
+        return Velocity(x, y, yaw)
+
+    def _targets(self, wanted: Floats, dt: float) -> Targets:
+        if self._low_pass > 0.0:
+            share = 1.0 - math.exp(-math.tau * self._low_pass * dt)
             before = wanted if self._filtered is None else self._filtered
             wanted = self._filtered = before + np.float32(share) * (wanted - before)
         targets = list(self._others)
@@ -158,8 +185,8 @@ class PolicyRunner:
             targets[place] = values[policy]
         return tuple(targets)
 
-    def _soft_limits(self, robot: Quadruped, share: float) -> tuple[Floats, Floats]:
-        """Return the range of each joint in the policy's order; the default pose is in it."""
+    def _limits(self, robot: Quadruped, share: float) -> tuple[Floats, Floats]:
+        """Return the range of each target in the policy's order; the default pose is in it."""
         lower, upper = self._defaults.copy(), self._defaults.copy()
         for policy, place in zip(self._map.policy, self._map.robot, strict=True):
             limits = robot.limits[place]
@@ -169,4 +196,8 @@ class PolicyRunner:
             middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
             lower[policy] = min(middle - share * half, self._defaults[policy])
             upper[policy] = max(middle + share * half, self._defaults[policy])
+        if self._contract.action.target_clip is not None:
+            lowest, highest = np.array(self._contract.action.target_clip, np.float32).T
+            np.maximum(lower, lowest, out=lower)
+            np.minimum(upper, highest, out=upper)
         return lower, upper

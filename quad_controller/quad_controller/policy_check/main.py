@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 import math
+from pathlib import Path
 import signal
 import sys
 
@@ -44,6 +45,7 @@ def run(arguments: Sequence[str]) -> int:
             robot,
             GaitGenerator(robot, GaitParameters()).stand_targets,
             PolicyOptions(
+                contract=options.contract,
                 phase_period=options.phase_period,
                 imu_frame=ImuFrame(options.imu_frame),
                 gravity_source=GravitySource(options.gravity_source),
@@ -97,6 +99,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
     parser.add_argument('--arm', action='store_true', help='the robot has its arm')
+    parser.add_argument(
+        '--contract',
+        type=Path,
+        metavar='FILE',
+        help='contract of the policy: YAML, deploy.yaml, env.yaml, config.yaml, config.json',
+    )
     parser.add_argument('--phase-period', type=_time, default=0.0, help='[s]; 0: that of the file')
     parser.add_argument(
         '--imu-frame',

@@ -20,8 +20,8 @@ from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
-from ..gait.velocity import Velocity
-from ..policy.interface import missing_inputs, Policy
+from ..gait.velocity import REST, Velocity
+from ..policy.interface import Policy, PolicyInputs
 from .commands import Commands
 from .faults import Fault, FaultLatch
 from .health import Health
@@ -360,6 +360,7 @@ class Controller:
             imu=health.attitude,
             velocity=self._commands.velocity(state),
             pose=self._commands.pose,
+            linear_velocity=health.linear_velocity,
         )
 
     def _refusal(self, request: ModeRequest) -> str:
@@ -382,7 +383,11 @@ class Controller:
 
     def _unmeasured(self) -> str:
         """Return what a policy would need and nobody measures."""
-        joints, imu = self._health.joints, self._health.imu
-        if joints is None or imu is None:
+        health = self._health
+        if health.joints is None or health.imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'
-        return self._health.uncertainty or missing_inputs(joints, imu)
+        if health.uncertainty or self._policy is None:
+            return health.uncertainty
+        return self._policy.missing(
+            PolicyInputs(health.joints, health.imu, REST, health.linear_velocity)
+        )

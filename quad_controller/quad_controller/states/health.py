@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import math
 
 from quad_description import ImuSample, JointSample, RobotState
+from quad_description.rotations import Vector
 
 from .faults import Fault
 from .parameters import StateParameters
@@ -42,6 +43,8 @@ class Health:
         self.imu: ImuSample | None = None
         self.battery: float | None = None
         self.joints_age = self.imu_age = math.inf
+        self._linear_velocity: Vector | None = None
+        self._linear_velocity_age = math.inf
         self.refused = 0
         self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
@@ -66,7 +69,12 @@ class Health:
             for what, (reason, age) in self._refusals.items()
             if age + waited <= REFUSAL_LIFE
         }
-        problems = [*self._take_joints(measurement.joints), *self._take_imu(measurement.imu)]
+        self._linear_velocity_age += waited
+        problems = [
+            *self._take_joints(measurement.joints),
+            *self._take_imu(measurement.imu),
+            *self._take_linear_velocity(measurement.linear_velocity),
+        ]
         self.refused += len(problems)
         battery = measurement.battery
         if battery is not None and math.isfinite(battery):
@@ -94,6 +102,12 @@ class Health:
     def attitude(self) -> ImuSample | None:
         """The newest attitude, None when it is too old to act upon."""
         return self.imu if self.imu_age <= self._parameters.hold_age else None
+
+    @property
+    def linear_velocity(self) -> Vector | None:
+        """That of the body in [m/s], None when it is too old to act upon."""
+        fresh = self._linear_velocity_age <= self._parameters.hold_age
+        return self._linear_velocity if fresh else None
 
     @property
     def complete(self) -> bool:
@@ -200,6 +214,14 @@ class Health:
         else:
             self.imu, self.imu_age = imu, 0.0
             self._refusals.pop(Fault.IMU, None)
+
+    def _take_linear_velocity(self, velocity: Vector | None) -> Iterator[str]:
+        if velocity is None:
+            return
+        if all(map(math.isfinite, velocity)):
+            self._linear_velocity, self._linear_velocity_age = velocity, 0.0
+        else:
+            yield 'refused a velocity of the body that is not finite'
 
 
 def _longer(time: float | None, dt: float) -> float:

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import math
 
 from quad_description import ImuSample, JointSample, Targets
+from quad_description.rotations import Vector
 
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.velocity import Velocity
+from ..policy.interface import PolicyInputs
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +26,21 @@ class Situation:
         imu: Attitude and turning, None when they are not known any more.
         velocity: Velocity that is requested.
         pose: Pose of the body that is requested.
+        linear_velocity: Of the body in its own frame in [m/s], None while nobody estimates it.
     """
 
     joints: JointSample | None
     imu: ImuSample | None
     velocity: Velocity
     pose: BodyPose
+    linear_velocity: Vector | None = None
+
+    @property
+    def policy_inputs(self) -> PolicyInputs | None:
+        """What a policy may see; None while joints or attitude are not known."""
+        if self.joints is None or self.imu is None:
+            return None
+        return PolicyInputs(self.joints, self.imu, self.velocity, self.linear_velocity)
 
 
 class Motion(ABC):

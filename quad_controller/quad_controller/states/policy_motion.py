@@ -45,9 +45,10 @@ class PolicyMotion(Motion):
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones when there is nothing to go by."""
         self._rest_time = self._rest_time + dt if situation.velocity.at_rest else 0.0
-        if situation.joints is None or situation.imu is None:
+        inputs = situation.policy_inputs
+        if inputs is None:
             return self._last
-        step = self._policy.step(situation.joints, situation.imu, situation.velocity, dt)
+        step = self._policy.step(inputs, dt)
         if step.targets is None:
             self._bad_steps += 1
             if self._bad_steps >= MAX_BAD_STEPS:

@@ -26,9 +26,10 @@ class Shadow:
             dt: Duration of the step in [s].
             last: The last targets of all joints in [rad].
         """
-        if situation.joints is None or situation.imu is None:
+        inputs = situation.policy_inputs
+        if inputs is None:
             return None
         if not self._started:
             self._policy.reset(last)
             self._started = True
-        return self._policy.step(situation.joints, situation.imu, situation.velocity, dt).targets
+        return self._policy.step(inputs, dt).targets

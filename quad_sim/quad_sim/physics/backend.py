@@ -55,6 +55,7 @@ class PhysicsBackend(Backend):
             JointSample(tuple(positions.tolist()), tuple(velocities.tolist()), robot.time),
             ImuSample(pose.orientation, robot.base_velocity.angular, robot.imu.specific_force),
             position=pose.position,
+            linear_velocity=robot.base_velocity.linear,
             time=robot.time,
         )
 

@@ -1,15 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a file has beside the keys of mjlab's exporter: its rate, its sizes, scales and clips.
+"""What the metadata of a file say of its sizes and rate, and keys that nobody understands.
 
 Nobody has agreed on these keys; those below are in use (unitree_rl_lab's deploy.yaml, rl_sar,
-IsaacLab). What looks like one of them and is not understood is reported, and what would change
-observations or actions is refused.
+IsaacLab). The sizes are compared with the contract. What looks like one of them and is not
+understood is reported, and what would change observations or actions is refused.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 import math
 import re
 
@@ -22,12 +23,48 @@ SIZES_KEY = 'dims'
 """Both sizes: the first number is the observation's, the last one the action's."""
 
 KNOWN_KEYS = frozenset(
-    {'action_scale', SIZES_KEY, *STEP_KEYS, *OBSERVATION_SIZE_KEYS, *ACTION_SIZE_KEYS}
+    {
+        'action_scale',
+        'observation_terms_scale',
+        'observation_terms_clip',
+        'observation_terms_history_length',
+        'observation_terms_flatten_history_dim',
+        SIZES_KEY,
+        *STEP_KEYS,
+        *OBSERVATION_SIZE_KEYS,
+        *ACTION_SIZE_KEYS,
+    }
 )
+"""Keys that are read."""
 CHANGING = re.compile(r'scale|clip|history')  # keys of what changes observations or actions
 SUSPICIOUS = re.compile(r'dim|(^|_)dt($|_)|decimation|rate$|frequency|(^|_)hz($|_)')
 NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+|inf)', re.IGNORECASE)
 NO_CLIP = 100.0  # where observations are clipped anyway, and no action is ever
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """What the metadata of a file say beside the contract.
+
+    Attributes:
+        step_periods: Time between two steps in [s], by key.
+        observation_sizes: Width of the observation, by key.
+        action_sizes: Number of actions, by key.
+        unknown: Keys that look as if they mattered, with their values.
+    """
+
+    step_periods: Mapping[str, float]
+    observation_sizes: Mapping[str, float]
+    action_sizes: Mapping[str, float]
+    unknown: Mapping[str, str]
+
+
+def read_declared(values: Mapping[str, str]) -> Declared:
+    """Read what metadata say of sizes and rate."""
+    return Declared(
+        step_periods(values), observation_sizes(values), action_sizes(values),
+        not_understood(values),
+    )  # fmt: skip
 
 
 def step_periods(values: Mapping[str, str]) -> dict[str, float]:
@@ -73,8 +110,6 @@ def _numbers(text: str) -> list[float]:
 
 def _neutral(key: str, text: str) -> bool:
     """Return whether a scale, clip or history changes nothing."""
-    if key.endswith('flatten_history_dim'):
-        return True  # matters only with a history, which has a key of its own
     numbers = _numbers(text)
     if re.sub(r'none|[\s,\[\]()]', '', NUMBER.sub('', text), flags=re.IGNORECASE):
         return False  # words that are no list of numbers

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_controller attach_contract``: writes the contract of a policy into its file."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+import signal
+import sys
+
+from .exceptions import QuadControllerError
+from .policy import onnx_file
+from .policy.contract.build import build_contract
+from .policy.contract.document import ContractDocument, setting
+from .policy.contract.files import read_contract_file
+from .policy.contract.mjlab import CONTRACT_KEY, read_metadata
+from .policy.network import OnnxNetwork
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Write a contract; return 0 when nothing of it is open."""
+    options = _parser().parse_args(arguments)
+    try:
+        document = _document(options.model, options.file, options.set)
+        _print_table(document)
+        build_contract(document)
+        if options.dry_run:
+            return 0
+        target = options.output or options.model
+        data = onnx_file.with_metadata(
+            options.model.read_bytes(), CONTRACT_KEY, document.to_yaml()
+        )
+        target.write_bytes(data)
+    except (QuadControllerError, OSError) as error:
+        sys.stdout.write(f'{error}\n')
+        return 1
+    sys.stdout.write(f'{target} has its contract, sha256 {onnx_file.digest(target)}\n')
+    return 0
+
+
+def main() -> None:
+    """Entry point."""
+    # a script's shell starts background jobs with SIGINT ignored
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    sys.exit(run(sys.argv[1:]))
+
+
+def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> ContractDocument:
+    """Lay what was set over the files, those over each other, and all over the model's own.
+
+    Raises:
+        PolicyError: Something cannot be read.
+    """
+    document = read_metadata(OnnxNetwork(model).metadata)
+    top = ContractDocument({})
+    for text in settings:
+        top = setting(text).over(top)
+    # patterns of some files are matched with the joints, wherever those stand
+    joints = top.values.get('joints') or document.values.get('joints') or ()
+    for path in files:
+        document = read_contract_file(path, joints).over(document)
+        joints = joints or document.values.get('joints') or ()
+    return top.over(document)
+
+
+def _print_table(document: ContractDocument) -> None:
+    rows = [('contract', 'value', 'from'), *document.rows()]
+    widths = [max(len(row[column]) for row in rows) for column in range(2)]
+    for row in rows:
+        line = f'{row[0].ljust(widths[0])}  {row[1].ljust(min(widths[1], 60))}  {row[2]}'
+        sys.stdout.write(f'{line.rstrip()}\n')
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description='Write the contract of a policy into its ONNX file: what it observes, in what '
+        'order, frames and scales. Later files count before earlier ones, --set before all.',
+        allow_abbrev=False,
+    )
+    parser.add_argument('model', type=Path, help='ONNX file')
+    parser.add_argument(
+        'file',
+        type=Path,
+        nargs='*',
+        help='our YAML; deploy.yaml or env.yaml of Isaac Lab; config.yaml and base.yaml of '
+        'rl_sar; config.json of MuJoCo Playground',
+    )
+    parser.add_argument(
+        '--set',
+        action='append',
+        default=[],
+        metavar='KEY=VALUE',
+        help='such as observation.terms.gyro.frame=base; the value is YAML',
+    )
+    parser.add_argument('--output', type=Path, help='write another file, not the model itself')
+    parser.add_argument(
+        '--dry-run', action='store_true', help='print what there is, write nothing'
+    )
+    return parser
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,397 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""From a document to a contract: all that is open, unknown or senseless is named at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+import difflib
+from enum import Enum
+import math
+from typing import Any, TypeVar
+
+from ...exceptions import PolicyError
+from .document import ContractDocument, Values
+from .model import (
+    ActionContract,
+    BodyFrame,
+    CommandRanges,
+    FIXED_WIDTHS,
+    Gains,
+    HistoryLayout,
+    HistoryStart,
+    Newest,
+    ObservationTerm,
+    PER_JOINT,
+    PolicyContract,
+    QuaternionOrder,
+    RecurrentState,
+    Source,
+)
+
+T = TypeVar('T')
+E = TypeVar('E', bound=Enum)
+MAX_HISTORY = 200  # steps; more is a mistake
+MAX_POINTS = 10_000  # of a constant or a scan
+
+MEANINGS = {
+    'joints': 'names of the joints in the order of observations and actions',
+    'default_positions': 'default pose in [rad], a number for each joint',
+    'period': 'time between two steps of the policy in [s]',
+    'observation.terms': 'terms of the observation, in their order',
+    'action.scale': 'what an action of 1 moves a joint by in [rad]',
+    'source': f'one of {", ".join(each.value for each in Source)}',
+    'frame': 'frame of the velocity: base, or yawed (turned by 180 degrees about z)',
+    'order': 'order of the quaternion: xyzw or wxyz',
+    'relative': 'true where joint positions count from the default pose, else false',
+    'phase_period': 'period of the clock in [s]',
+    'values': 'what it always is; for a height scan: that of a flat ground at normal height',
+    'flat': 'true: the ground counts as flat; nothing measures heights here',
+    'layout': 'per_term (all steps of a term together) or frames (whole observations)',
+    'newest': 'first or last',
+}
+"""What an open key means, by its path or its last part."""
+
+
+class _UnfitError(Exception):
+    """A value is not what its key needs; the text says what it should be."""
+
+
+@dataclass(slots=True)
+class _Findings:
+    """What stands in the way of a contract."""
+
+    hints: Mapping[str, str]
+    open: list[str] = field(default_factory=list)
+    wrong: list[str] = field(default_factory=list)
+
+    def missing(self, path: str) -> None:
+        """Note an open key."""
+        meaning = MEANINGS.get(path) or MEANINGS.get(path.rpartition('.')[2], '')
+        hint = self.hints.get(path)
+        self.open.append(
+            f'{path}' + (f': {meaning}' if meaning else '') + (f' ({hint})' if hint else '')
+        )
+
+
+class _Section:
+    """Takes keys out of a mapping, one after the other."""
+
+    def __init__(self, values: object, path: str, findings: _Findings) -> None:
+        self._findings, self._path = findings, path
+        self._known: list[str] = []
+        if not isinstance(values, Mapping):
+            findings.wrong.append(f'{path or "the contract"} must be a mapping, not {values!r}')
+            values = {}
+        self._values = values
+
+    def path(self, key: str) -> str:
+        """Return the whole path of a key."""
+        return f'{self._path}.{key}' if self._path else key
+
+    def required(self, key: str, convert: Callable[[Any], T], default: T) -> T:
+        """Return a value; an open one is noted, and the default stands for it."""
+        if self._values.get(key) is None:
+            self._known.append(key)
+            self._findings.missing(self.path(key))
+            return default
+        return self.optional(key, convert, default)
+
+    def optional(self, key: str, convert: Callable[[Any], T], default: T) -> T:
+        """Return a value, or the default where there is none."""
+        self._known.append(key)
+        value = self._values.get(key)
+        if value is None:
+            return default
+        try:
+            return convert(value)
+        except _UnfitError as problem:
+            self._findings.wrong.append(f'{self.path(key)} {value!r} must be {problem}')
+            return default
+
+    def section(self, key: str) -> _Section:
+        """Return a mapping below a key; an empty one where there is none."""
+        self._known.append(key)
+        value = self._values.get(key)
+        return _Section({} if value is None else value, self.path(key), self._findings)
+
+    @property
+    def filled(self) -> bool:
+        """Whether there is any key."""
+        return bool(self._values)
+
+    @property
+    def entries(self) -> Mapping[str, object]:
+        """All keys with their values; they count as known."""
+        self._known.extend(self._values)
+        return self._values
+
+    def end(self) -> None:
+        """Note what nobody asked for."""
+        for key in self._values:
+            if key not in self._known:
+                close = difflib.get_close_matches(str(key), self._known, n=1)
+                hint = f'did you mean {close[0]!r}?' if close else f'known: {sorted(self._known)}'
+                self._findings.wrong.append(f'unknown key {self.path(str(key))}; {hint}')
+
+
+def build_contract(document: ContractDocument) -> PolicyContract:
+    """Make a contract.
+
+    Args:
+        document: Its values, all of them laid over each other.
+
+    Raises:
+        PolicyError: Something is open, unknown, senseless, or cannot be run here; all is named.
+    """
+    findings = _Findings(document.hints)
+    contract = _contract(document.values, findings)
+    problems = [*document.refusals, *findings.wrong]
+    if findings.open:
+        problems.append(f'open: {"; ".join(findings.open)}')
+    if problems:
+        raise PolicyError(
+            'the contract of the policy is not complete:\n'
+            + '\n'.join(f'  {problem}' for problem in problems),
+            '; '.join(problems),
+        )
+    return contract
+
+
+def _contract(values: Values, findings: _Findings) -> PolicyContract:
+    top = _Section(values, '', findings)
+    nobody: tuple[str, ...] = ()
+    joints = top.required('joints', _words, nobody)
+    count = len(joints)
+    defaults = top.required('default_positions', _numbers(count), (0.0,) * count)
+    observation = top.section('observation')
+    history = observation.section('history')
+    terms = _terms(observation.section('terms'), count, findings)
+    stacked = any(term.history > 1 for term in terms)
+    layout = (history.required if stacked else history.optional)(
+        'layout', _choice(HistoryLayout), HistoryLayout.PER_TERM
+    )
+    if layout is HistoryLayout.FRAMES and len({term.history for term in terms}) > 1:
+        findings.wrong.append(
+            'observation.history.layout frames needs the same history of all terms, not '
+            + ', '.join(f'{term.name} {term.history}' for term in terms)
+        )
+    contract = PolicyContract(
+        joint_names=joints,
+        default_positions=defaults,
+        period=top.required('period', _number(1e-4, 10.0), 0.02),
+        terms=terms,
+        clip=observation.optional('clip', _number(0.0, math.inf), None),
+        history_layout=layout,
+        newest=(history.required if stacked else history.optional)(
+            'newest', _choice(Newest), Newest.LAST
+        ),
+        history_start=history.optional('start', _choice(HistoryStart), HistoryStart.REPEAT),
+        action=_action(top.section('action'), count, defaults),
+        recurrence=_recurrence(top.section('recurrence')),
+        commands=_commands(top.section('commands')),
+        gains=_gains(top.section('gains'), count),
+        robot=top.optional('robot', str, ''),
+        kind=top.optional('kind', str, ''),
+    )
+    history.end()
+    observation.end()
+    top.end()
+    return contract
+
+
+def _terms(section: _Section, joints: int, findings: _Findings) -> tuple[ObservationTerm, ...]:
+    entries = section.entries
+    if not entries:
+        findings.missing('observation.terms')
+    return tuple(
+        _term(str(name), _Section(value, section.path(str(name)), findings), joints)
+        for name, value in entries.items()
+    )
+
+
+def _term(name: str, section: _Section, joints: int) -> ObservationTerm:
+    source = section.required('source', _choice(Source), Source.CONSTANT)
+    values: tuple[float, ...] = ()
+    if source is Source.FOOT_CONTACTS:
+        section.required('source', _unmeasured, default=None)
+    if source is Source.HEIGHT_SCAN:
+        section.required('flat', _declared, default=True)
+    if source in {Source.HEIGHT_SCAN, Source.CONSTANT}:
+        values = section.required('values', _any_numbers, (0.0,))
+    count = FIXED_WIDTHS.get(source) or (joints if source in PER_JOINT else len(values))
+    velocity = source in {Source.LINEAR_VELOCITY, Source.ANGULAR_VELOCITY}
+    phase = source is Source.PHASE
+    frame, relative, order, period = BodyFrame.BASE, True, QuaternionOrder.XYZW, 1.0
+    threshold = 0.0
+    if velocity:
+        frame = section.required('frame', _choice(BodyFrame), frame)
+    if source is Source.JOINT_POSITIONS:
+        relative = section.required('relative', _flag, relative)
+    if source is Source.ORIENTATION:
+        order = section.required('order', _choice(QuaternionOrder), order)
+    if phase:
+        period = section.required('phase_period', _number(0.1, 5.0), period)
+        threshold = section.optional('phase_threshold', _number(0.0, 1.0), threshold)
+    term = ObservationTerm(
+        name=name,
+        source=source,
+        width=count,
+        scale=section.optional('scale', _numbers(count), (1.0,) * count),
+        offset=section.optional('offset', _numbers(count), (0.0,) * count),
+        clip=section.optional('clip', _pair, None),
+        history=section.optional('history', _whole(1, MAX_HISTORY), 1),
+        frame=frame,
+        relative=relative,
+        quaternion=order,
+        phase_period=period,
+        phase_threshold=threshold,
+        values=values,
+    )
+    section.end()
+    return term
+
+
+def _action(section: _Section, joints: int, defaults: tuple[float, ...]) -> ActionContract:
+    action = ActionContract(
+        scale=section.required('scale', _numbers(joints), (1.0,) * joints),
+        offset=section.optional('offset', _numbers(joints), defaults),
+        clip=section.optional('clip', _pairs(joints), None),
+        target_clip=section.optional('target_clip', _pairs(joints), None),
+        low_pass=section.optional('low_pass', _number(0.0, 1000.0), 0.0),
+    )
+    section.end()
+    return action
+
+
+def _recurrence(section: _Section) -> tuple[RecurrentState, ...]:
+    return tuple(
+        RecurrentState(str(name), str(output)) for name, output in section.entries.items()
+    )
+
+
+def _commands(section: _Section) -> CommandRanges | None:
+    if not section.filled:
+        return None
+    free = (-math.inf, math.inf)
+    ranges = CommandRanges(*(section.optional(axis, _pair, free) for axis in ('x', 'y', 'yaw')))
+    section.end()
+    return ranges
+
+
+def _gains(section: _Section, joints: int) -> Gains | None:
+    none = (0.0,) * joints
+    stiffness = section.optional('stiffness', _numbers(joints), none)
+    damping = section.optional('damping', _numbers(joints), none)
+    section.end()
+    return Gains(stiffness, damping) if any(stiffness) or any(damping) else None
+
+
+def _one_number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise _UnfitError('a number')
+    try:
+        # YAML 1.1 takes 1e-3 for a text
+        number = float(value)
+    except ValueError:
+        raise _UnfitError('a number') from None
+    if math.isnan(number):
+        raise _UnfitError('a number')
+    return number
+
+
+def _number(lowest: float, highest: float) -> Callable[[object], float]:
+    def convert(value: object) -> float:
+        number = _one_number(value)
+        if not lowest <= number <= highest:
+            raise _UnfitError(f'within {lowest:g} to {highest:g}')
+        return number
+
+    return convert
+
+
+def _whole(lowest: int, highest: int) -> Callable[[object], int]:
+    def convert(value: object) -> int:
+        number = _number(lowest, highest)(value)
+        if number != int(number):
+            raise _UnfitError('a whole number')
+        return int(number)
+
+    return convert
+
+
+def _any_numbers(value: object) -> tuple[float, ...]:
+    entries = value if isinstance(value, (list, tuple)) else [value]
+    if not 1 <= len(entries) <= MAX_POINTS:
+        raise _UnfitError(f'1 to {MAX_POINTS} numbers')
+    numbers = tuple(map(_one_number, entries))
+    if not all(map(math.isfinite, numbers)):
+        raise _UnfitError('finite numbers')
+    return numbers
+
+
+def _numbers(count: int) -> Callable[[object], tuple[float, ...]]:
+    def convert(value: object) -> tuple[float, ...]:
+        numbers = _any_numbers(value)
+        if not isinstance(value, (list, tuple)):
+            return numbers * count
+        if len(numbers) != count:
+            raise _UnfitError(f'a number or {count} of them, not {len(numbers)}')
+        return numbers
+
+    return convert
+
+
+def _pair(value: object) -> tuple[float, float]:
+    if not isinstance(value, (list, tuple)) or len(value) != 2:
+        raise _UnfitError('two numbers, lowest and highest')
+    low, high = map(_one_number, value)
+    if not low <= high:
+        raise _UnfitError('two numbers, lowest and highest')
+    return low, high
+
+
+def _pairs(count: int) -> Callable[[object], tuple[tuple[float, float], ...]]:
+    def convert(value: object) -> tuple[tuple[float, float], ...]:
+        if not isinstance(value, (list, tuple)):
+            raise _UnfitError('two numbers, or two for each joint')
+        if all(isinstance(each, (list, tuple)) for each in value):
+            if len(value) != count:
+                raise _UnfitError(f'two numbers, or two for each of {count} joints')
+            return tuple(map(_pair, value))
+        return (_pair(value),) * count
+
+    return convert
+
+
+def _flag(value: object) -> bool:
+    if not isinstance(value, bool):
+        raise _UnfitError('true or false')
+    return value
+
+
+def _unmeasured(_value: object) -> None:
+    raise _UnfitError('something that is measured: nothing here senses the contacts of feet')
+
+
+def _declared(value: object) -> bool:
+    if value is not True:
+        raise _UnfitError('true: nothing measures heights here')
+    return value
+
+
+def _words(value: object) -> tuple[str, ...]:
+    if not isinstance(value, (list, tuple)) or not all(isinstance(each, str) for each in value):
+        raise _UnfitError('a list of names')
+    return tuple(value)
+
+
+def _choice(kind: type[E]) -> Callable[[object], E]:
+    def convert(value: object) -> E:
+        try:
+            return kind(value)
+        except ValueError:
+            raise _UnfitError(f'one of {", ".join(each.value for each in kind)}') from None
+
+    return convert

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A contract as a document: nested keys, and where each value comes from.
+
+Readers of other tools' files make such documents, a person writes one in YAML. They are laid over
+each other, later ones count, and what is still open then is asked for by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from ...exceptions import PolicyError
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class ContractDocument:
+    """Values of a contract, as far as they are known.
+
+    Attributes:
+        values: Nested keys; terms of the observation are in their order.
+        origins: Where each value comes from, by its path (``action.scale``).
+        hints: Why a path is open that the reader could not fill.
+        refusals: What stands in the file and cannot be run here.
+        ignored: Keys of the file that change nothing here, or that nobody understood.
+    """
+
+    values: Values
+    origins: Mapping[str, str] = field(default_factory=dict)
+    hints: Mapping[str, str] = field(default_factory=dict)
+    refusals: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+
+    def over(self, base: ContractDocument) -> ContractDocument:
+        """Return this one laid over another: its values count, the other's order stays."""
+        return self._joined(base, _merged(base.values, self.values, top_counts=True))
+
+    def completed_by(self, other: ContractDocument) -> ContractDocument:
+        """Return this one with the values of another where it has none; its order stays."""
+        return self._joined(other, _merged(self.values, other.values, top_counts=False))
+
+    def _joined(self, below: ContractDocument, values: Values) -> ContractDocument:
+        return ContractDocument(
+            values,
+            {**below.origins, **self.origins},
+            {**below.hints, **self.hints},
+            (*below.refusals, *self.refusals),
+            (*below.ignored, *self.ignored),
+        )
+
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield path, value and origin of each value."""
+        for path, value in flatten(self.values):
+            yield path, _text(value), self.origins.get(path, '')
+
+    def to_yaml(self) -> str:
+        """Return it as YAML, with the origin of each value that is not its own."""
+        head = ''.join(
+            f'# {path}: {origin}\n' for path, origin in sorted(self.origins.items()) if origin
+        )
+        return head + yaml.safe_dump(self.values, sort_keys=False, default_flow_style=None)
+
+
+def flatten(values: Mapping[str, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield path and value of each leaf; an empty mapping is a leaf."""
+    for key, value in values.items():
+        path = f'{prefix}{key}'
+        if isinstance(value, dict) and value:
+            yield from flatten(value, f'{path}.')
+        else:
+            yield path, value
+
+
+def document_of(values: Values, origin: str) -> ContractDocument:
+    """Make a document whose values all come from one place."""
+    return ContractDocument(values, {path: origin for path, _ in flatten(values)})
+
+
+def read_yaml(text: str, origin: str) -> ContractDocument:
+    """Read a document from YAML.
+
+    Args:
+        text: The YAML.
+        origin: Where it is from, for messages.
+
+    Raises:
+        PolicyError: It is no YAML, or no mapping.
+    """
+    try:
+        values = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise PolicyError(f'{origin} is not valid YAML: {error}') from error
+    if not isinstance(values, dict):
+        raise PolicyError(f'{origin} is not a mapping of keys to values')
+    return document_of(values, origin)
+
+
+def setting(text: str) -> ContractDocument:
+    """Read ``path=value`` as a document; the value is YAML.
+
+    Raises:
+        PolicyError: There is no ``=``, or the value is no YAML.
+    """
+    path, sign, value = text.partition('=')
+    if not sign or not path:
+        raise PolicyError(f'{text!r} is not KEY=VALUE, such as action.scale=0.25')
+    try:
+        values: Any = yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise PolicyError(f'{path}: {value!r} is not valid YAML: {error}') from error
+    for key in reversed(path.split('.')):
+        values = {key: values}
+    return document_of(values, f'set as {path}')
+
+
+def _merged(base: Values, top: Values, *, top_counts: bool) -> Values:
+    merged = dict(base)
+    for key, value in top.items():
+        below = merged.get(key)
+        if isinstance(value, dict) and isinstance(below, dict):
+            merged[key] = _merged(below, value, top_counts=top_counts)
+        elif top_counts or below is None:
+            merged[key] = value
+    return merged
+
+
+def _text(value: object) -> str:
+    if isinstance(value, float):
+        return f'{value:g}'
+    if isinstance(value, (list, tuple)):
+        if len(value) > 1 and all(each == value[0] for each in value):
+            return f'{len(value)} x {_text(value[0])}'
+        return f'[{", ".join(_text(each) for each in value)}]'
+    return str(value)

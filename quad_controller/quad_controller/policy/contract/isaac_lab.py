@@ -1,0 +1,219 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Contracts from Isaac Lab: ``params/env.yaml`` of a training, ``deploy.yaml`` of unitree_rl_lab.
+
+Velocities are those of the root in its own frame (``isaaclab.envs.mdp``). A history is that of
+each term, oldest first, and begins with its first step repeated (``CircularBuffer``). Neither file
+has the order of the joints: it is the simulator's, and has to be given by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import re
+from typing import Any
+
+import yaml
+
+from ...exceptions import PolicyError
+from .document import ContractDocument, document_of, Values
+from .model import Source
+from .terms import ISAAC_LAB
+
+JOINTS_HINT = 'the file does not have the order of the joints; Isaac Lab prints robot.joint_names'
+PER_TERM = {'layout': 'per_term', 'newest': 'last', 'start': 'repeat'}
+FRAMES = {'layout': 'frames', 'newest': 'last', 'start': 'repeat'}
+RANGES = {'lin_vel_x': 'x', 'lin_vel_y': 'y', 'ang_vel_z': 'yaw'}
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads the tags of Python that Isaac Lab writes as plain values; nothing is executed."""
+
+
+def _plain(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> object:
+    if isinstance(node, yaml.SequenceNode):
+        return loader.construct_sequence(node, deep=True)
+    if isinstance(node, yaml.MappingNode):
+        return loader.construct_mapping(node, deep=True)
+    return node.value
+
+
+_Loader.add_multi_constructor('tag:yaml.org,2002:python/', _plain)
+
+
+def load_tagged(text: str, origin: str) -> Values:
+    """Read YAML with tags of Python in it.
+
+    Raises:
+        PolicyError: It is no YAML, or no mapping.
+    """
+    try:
+        values = yaml.load(text, _Loader)  # noqa: S506  # a SafeLoader; tags become plain values
+    except yaml.YAMLError as error:
+        raise PolicyError(f'{origin} is not valid YAML: {error}') from error
+    if not isinstance(values, dict):
+        raise PolicyError(f'{origin} is not a mapping of keys to values')
+    return values
+
+
+def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
+    """Read ``deploy.yaml`` of unitree_rl_lab.
+
+    Args:
+        values: The file.
+        origin: Its name, for messages.
+    """
+    observations = _mapping(values, 'observations')
+    frames = bool(observations.get('use_gym_history'))
+    terms = {
+        name: _term(name, term) for name, term in observations.items() if isinstance(term, Mapping)
+    }
+    contract: Values = {
+        'period': values.get('step_dt'),
+        'default_positions': values.get('default_joint_pos'),
+        'observation': {'terms': terms},
+        'action': {},
+    }
+    if _has_history(terms):
+        contract['observation']['history'] = dict(FRAMES if frames else PER_TERM)
+    actions = _mapping(values, 'actions')
+    refusals = _one_action(actions, origin)
+    for action in actions.values():
+        contract['action'] = _known(
+            scale=action.get('scale'), offset=action.get('offset'), target_clip=action.get('clip')
+        )
+    gains = {name: _uniform(values.get(name)) for name in ('stiffness', 'damping')}
+    contract['gains'] = {name: value for name, value in gains.items() if value is not None}
+    commands = _mapping(values, 'commands')
+    contract['commands'] = _ranges(_mapping(commands, 'base_velocity').get('ranges'))
+    hints = {'joints': JOINTS_HINT}
+    if 'stiffness' in values and not contract['gains']:
+        hints['gains.stiffness'] = 'in the order of the motors in the file'
+    return _document(contract, origin, hints, refusals)
+
+
+def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> ContractDocument:
+    """Read ``params/env.yaml`` of a training with Isaac Lab.
+
+    Args:
+        values: The file.
+        origin: Its name, for messages.
+        joints: Names of the joints in the policy's order; empty while nobody knows them. Patterns
+            of the file are matched with them.
+    """
+    group = _mapping(_mapping(values, 'observations'), 'policy')
+    length = group.get('history_length')
+    terms: dict[str, Values] = {}
+    refusals: list[str] = []
+    for name, term in group.items():
+        if not isinstance(term, Mapping) or 'func' not in term:
+            continue
+        kind = str(term['func']).rpartition(':')[2]
+        terms[name] = _term(kind, {**term, **({'history_length': length} if length else {})})
+        if term.get('modifiers'):
+            refusals.append(f'{origin}: observations.policy.{name}.modifiers cannot be run here')
+    sim = _mapping(values, 'sim')
+    period = None
+    if isinstance(sim.get('dt'), (int, float)) and isinstance(values.get('decimation'), int):
+        period = sim['dt'] * values['decimation']
+    robot = _mapping(_mapping(values, 'scene'), 'robot')
+    state = _mapping(robot, 'init_state')
+    defaults = _matched(state.get('joint_pos'), joints, 0.0)
+    contract: Values = {
+        'joints': list(joints) or None,
+        'default_positions': defaults,
+        'period': period,
+        'observation': {'terms': terms},
+        'commands': _ranges(_mapping(_mapping(values, 'commands'), 'base_velocity').get('ranges')),
+    }
+    if _has_history(terms):
+        contract['observation']['history'] = dict(PER_TERM)
+        if group.get('flatten_history_dim') is False:
+            refusals.append(f'{origin}: observations.policy.flatten_history_dim must be true')
+    actions = {
+        name: each for name, each in _mapping(values, 'actions').items()
+        if isinstance(each, Mapping)
+    }  # fmt: skip
+    refusals += _one_action(actions, origin)
+    for action in actions.values():
+        offset = _matched(action.get('offset'), joints, 0.0)
+        contract['action'] = _known(
+            scale=_matched(action.get('scale'), joints, 1.0),
+            offset=None if action.get('use_default_offset') else offset,
+            target_clip=action.get('clip'),
+        )
+    hints = {'joints': JOINTS_HINT}
+    if not joints:
+        hints['default_positions'] = 'found by the names of the joints'
+        hints['action.scale'] = 'found by the names of the joints'
+    return _document(contract, origin, hints, refusals)
+
+
+def _term(kind: str, term: Mapping[str, Any]) -> Values:
+    known = dict(ISAAC_LAB.get(kind, {}))
+    if kind == 'gait_phase':
+        known['phase_period'] = _mapping(term, 'params').get('period')
+    if known.get('source') == Source.HEIGHT_SCAN.value:
+        known.pop('values', None)
+    return _known(
+        **known,
+        scale=term.get('scale'),
+        clip=term.get('clip'),
+        history=max(int(term.get('history_length') or 1), 1),
+    )
+
+
+def _document(
+    contract: Values, origin: str, hints: Mapping[str, str], refusals: Sequence[str]
+) -> ContractDocument:
+    document = document_of({k: v for k, v in contract.items() if v not in (None, {})}, origin)
+    return ContractDocument(document.values, document.origins, hints, tuple(refusals))
+
+
+def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
+    if len(actions) == 1:
+        return []
+    names = ', '.join(actions) or 'none'
+    return [f'{origin}: one action of joint positions can be run here, not {names}']
+
+
+def _matched(value: object, joints: Sequence[str], default: float) -> object:
+    """Return a number for each joint where the file has patterns; else what it has."""
+    if not isinstance(value, Mapping):
+        return value
+    if not joints:
+        return None
+    return [
+        next((number for pattern, number in value.items() if re.fullmatch(pattern, name)), default)
+        for name in joints
+    ]
+
+
+def _has_history(terms: Mapping[str, Values]) -> bool:
+    return any(term.get('history', 1) > 1 for term in terms.values())
+
+
+def _uniform(value: object) -> object:
+    """Return the number that a list holds, None where its entries differ."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    return value[0] if value and all(each == value[0] for each in value) else None
+
+
+def _ranges(ranges: object) -> Values:
+    if not isinstance(ranges, Mapping):
+        return {}
+    return {
+        axis: list(ranges[key])
+        for key, axis in RANGES.items()
+        if isinstance(ranges.get(key), (list, tuple))
+    }
+
+
+def _known(**values: object) -> Values:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _mapping(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    found = values.get(key)
+    return found if isinstance(found, Mapping) else {}

@@ -1,0 +1,224 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The metadata of an ONNX file, as mjlab's exporter and the vendor's training write them.
+
+All values are texts; lists are joined by commas, numbers have three decimals (mjlab,
+rl/exporter_utils.py). Newer exporters print nested lists as Python does, and have scales, clips
+and histories of the terms. A joint may have a prefix like ``robot/``. No exporter writes the frame
+of the IMU, the period of the phase, or the rate; :data:`OWN_KEYS` are ours.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+import math
+import re
+from typing import Any
+
+from ...exceptions import PolicyError
+from . import declared
+from .document import ContractDocument, document_of, read_yaml, Values
+from .model import Source
+from .terms import MJLAB
+
+CONTRACT_KEY = 'policy_contract'
+"""Key of a whole contract in YAML; its values count before all others of the file."""
+
+OWN_KEYS = {
+    CONTRACT_KEY: 'contract of the policy in YAML',
+    'phase_period': 'period of the phase in [s]',
+    'phase_command_threshold': 'a slower command has no phase',
+    'imu_frame': 'frame of the angular velocity: base or yawed',
+    'kind': 'how the policy was made',
+}
+"""Keys that only policies made by this package have."""
+
+VENDOR_TERMS = ('ang_vel', 'gravity', 'cmd', 'phase', 'joint_pos', 'joint_vel', 'prev_action')
+VENDOR_PHASE_PERIOD = 0.4  # [s] luwu_mjlab, XGOMini velocity task; no exporter writes it
+VENDOR_STEP_PERIOD = 0.02  # [s] luwu_mjlab: 500 Hz physics, decimation 10
+VENDOR_PHASE_THRESHOLD = 0.1  # luwu_mjlab, norm of (vx, vy, yaw rate)
+VENDOR = "the vendor's training (luwu_mjlab)"
+FILE = 'metadata'
+
+
+def read_metadata(values: Mapping[str, str]) -> ContractDocument:
+    """Read the metadata of a file.
+
+    Args:
+        values: Keys and texts.
+
+    Raises:
+        PolicyError: A text is not a number, a list, or YAML.
+    """
+    document = document_of(_mjlab(values), FILE)
+    document = document.completed_by(document_of(_assumed(document.values), VENDOR))
+    refusals = [
+        f'metadata {key} = {text} is not understood, and would change observations or actions'
+        for key, text in declared.changing(values).items()
+    ]
+    document = ContractDocument(
+        document.values, document.origins, HINTS, tuple(refusals + _layouts(values))
+    )
+    if CONTRACT_KEY in values:
+        document = read_yaml(values[CONTRACT_KEY], f'metadata {CONTRACT_KEY}').over(document)
+    return document
+
+
+HINTS = {
+    'joints': 'the file has no metadata joint_names',
+    'default_positions': 'the file has no metadata default_joint_pos',
+    'action.scale': 'the file has no metadata action_scale',
+    'observation.terms': 'the file has no metadata observation_names',
+    'period': 'no exporter of mjlab writes it',
+}
+
+
+def _mjlab(values: Mapping[str, str]) -> Values:
+    contract: Values = {}
+    if 'default_joint_pos' in values:
+        contract['default_positions'] = _numbers(values, 'default_joint_pos')
+    if 'joint_names' in values:
+        contract['joints'] = [_base_name(word) for word in _words(values['joint_names'])]
+    if 'action_scale' in values:
+        scale = _numbers(values, 'action_scale')
+        contract['action'] = {'scale': scale[0] if len(scale) == 1 else scale}
+    gains = {
+        name: _numbers(values, f'joint_{name}')
+        for name in ('stiffness', 'damping')
+        if f'joint_{name}' in values
+    }
+    if gains:
+        contract['gains'] = gains
+    steps = declared.step_periods(values)
+    if steps:
+        contract['period'] = next(iter(steps.values()))
+    if 'kind' in values:
+        contract['kind'] = values['kind']
+    if 'observation_names' in values:
+        contract['observation'] = {'terms': _terms(values)}
+        if any(term.get('history', 1) > 1 for term in contract['observation']['terms'].values()):
+            contract['observation']['history'] = {
+                'layout': 'per_term', 'newest': 'last', 'start': 'repeat',
+            }  # fmt: skip
+    return contract
+
+
+def _terms(values: Mapping[str, str]) -> dict[str, Values]:
+    names = [_base_name(word) for word in _words(values['observation_names'])]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise PolicyError(f'metadata observation_names has {", ".join(repeated)} twice')
+    columns = {
+        name: _entries(values, f'observation_terms_{key}', len(names))
+        for key, name in (('scale', 'scale'), ('clip', 'clip'), ('history_length', 'history'))
+    }
+    # 0 is how exporters write that there is none
+    columns['history'] = [entry or None for entry in columns['history']]
+    terms: dict[str, Values] = {}
+    for place, name in enumerate(names):
+        term = dict(MJLAB.get(name, {}))
+        for key, column in columns.items():
+            if column[place] is not None:
+                term[key] = column[place]
+        terms[name] = term | _own_keys(values, term.get('source'))
+    return terms
+
+
+def _own_keys(values: Mapping[str, str], source: object) -> Values:
+    if source == Source.ANGULAR_VELOCITY.value and 'imu_frame' in values:
+        return {'frame': values['imu_frame']}
+    if source == Source.PHASE.value:
+        return {
+            name: _numbers(values, key)[0]
+            for key, name in (
+                ('phase_period', 'phase_period'),
+                ('phase_command_threshold', 'phase_threshold'),
+            )
+            if key in values
+        }
+    return {}
+
+
+def _assumed(known: Values) -> Values:
+    """Return what is known of the vendor's task, where a file has its terms."""
+    terms = known.get('observation', {}).get('terms', {})
+    sources = [term.get('source') for term in terms.values()]
+    if sources != [MJLAB[name]['source'] for name in VENDOR_TERMS]:
+        return {}
+    phase = next(name for name, term in terms.items() if term['source'] == Source.PHASE.value)
+    return {
+        'period': VENDOR_STEP_PERIOD,
+        'observation': {
+            'terms': {
+                phase: {
+                    'phase_period': VENDOR_PHASE_PERIOD,
+                    'phase_threshold': VENDOR_PHASE_THRESHOLD,
+                }
+            }
+        },
+    }
+
+
+def _layouts(values: Mapping[str, str]) -> list[str]:
+    """Return what is said of a history that is not flat."""
+    text = values.get('observation_terms_flatten_history_dim', '')
+    histories = _flat(values.get('observation_terms_history_length', ''))
+    if 'False' not in text or not any(word.isdigit() and int(word) > 1 for word in histories):
+        return []
+    return [f'metadata observation_terms_flatten_history_dim = {text}: a history must be flat']
+
+
+def _entries(values: Mapping[str, str], key: str, count: int) -> list[Any]:
+    """Return one entry for each term; None where the file has no such key."""
+    if key not in values:
+        return [None] * count
+    # Python prints an infinite number as a name
+    text = re.sub(r'\binf\b', '1e999', values[key])
+    try:
+        entries = ast.literal_eval(f'[{text}]')
+    except (SyntaxError, ValueError):
+        raise PolicyError(f'metadata {key} {values[key]!r} is not a list') from None
+    if len(entries) == 1 and isinstance(entries[0], list):
+        entries = list(entries[0])
+    if len(entries) != count:
+        raise PolicyError(
+            f'metadata {key} {values[key]!r} has {len(entries)} entries for {count} terms'
+        )
+    return list(entries)
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in _flat(text)]
+
+
+def _flat(text: str) -> list[str]:
+    """Take a list apart, whether it is joined by commas or printed by Python."""
+    if '[' not in text and '(' not in text:
+        return text.split(',')
+    try:
+        tree = ast.literal_eval(text)
+    except (SyntaxError, ValueError):
+        return [text]
+    flat, waiting = [], [tree]
+    while waiting:
+        item = waiting.pop(0)
+        if isinstance(item, (list, tuple)):
+            waiting[:0] = item
+        else:
+            flat.append(str(item))
+    return flat
+
+
+def _numbers(values: Mapping[str, str], key: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in _words(values[key])]
+    except ValueError:
+        raise PolicyError(f'metadata {key} {values[key]!r} is not a list of numbers') from None
+    if not all(map(math.isfinite, numbers)):
+        raise PolicyError(f'metadata {key} {values[key]!r} has a number that is not finite')
+    return numbers
+
+
+def _base_name(name: str) -> str:
+    return name.rpartition('/')[2]

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The contract of a policy: its observation term by term, its actions, its rate.
+
+Conventions: joints are in the policy's own order, positions in [rad], velocities in [rad/s],
+vectors in the frame of the body (REP 103). A term is ``clip(value) * scale + offset``, as mjlab
+and Isaac Lab compute it; the whole observation may be clipped after that, as legged_gym does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Source(Enum):
+    """What a term of the observation is made of."""
+
+    LINEAR_VELOCITY = 'linear_velocity'
+    """Of the body in [m/s], estimated; 3 numbers."""
+    ANGULAR_VELOCITY = 'angular_velocity'
+    """Of the body in [rad/s]; 3 numbers."""
+    GRAVITY = 'gravity'
+    """Direction of gravity, (0, 0, -1) upright; 3 numbers."""
+    ORIENTATION = 'orientation'
+    """Unit quaternion of the body in the world; 4 numbers."""
+    COMMAND = 'command'
+    """x and y in [m/s], yaw in [rad/s]; 3 numbers."""
+    PHASE = 'phase'
+    """Sine and cosine of a clock, zero while the robot shall stand; 2 numbers."""
+    JOINT_POSITIONS = 'joint_positions'
+    """In [rad], relative to the default pose or absolute; a number for each joint."""
+    JOINT_VELOCITIES = 'joint_velocities'
+    """In [rad/s]; a number for each joint."""
+    LAST_ACTION = 'last_action'
+    """What the policy answered one step before; a number for each joint."""
+    FOOT_CONTACTS = 'foot_contacts'
+    """1 for a foot on the ground; 4 numbers in the order of the legs."""
+    HEIGHT_SCAN = 'height_scan'
+    """Heights of the ground; nothing measures them, a flat ground has to be declared."""
+    CONSTANT = 'constant'
+    """Always the same numbers."""
+
+
+FIXED_WIDTHS = {
+    Source.LINEAR_VELOCITY: 3,
+    Source.ANGULAR_VELOCITY: 3,
+    Source.GRAVITY: 3,
+    Source.ORIENTATION: 4,
+    Source.COMMAND: 3,
+    Source.PHASE: 2,
+    Source.FOOT_CONTACTS: 4,
+}
+"""Numbers of the terms whose width depends on nothing."""
+
+PER_JOINT = frozenset({Source.JOINT_POSITIONS, Source.JOINT_VELOCITIES, Source.LAST_ACTION})
+
+
+class BodyFrame(Enum):
+    """Frame of a vector; ``YAWED`` is the body's, turned by 180 degrees about z.
+
+    In the vendor's training environment (luwu_mjlab) the IMU sits so on the body.
+    """
+
+    BASE = 'base'
+    YAWED = 'yawed'
+
+
+class QuaternionOrder(Enum):
+    """Order of a quaternion's numbers."""
+
+    XYZW = 'xyzw'
+    WXYZ = 'wxyz'
+
+
+class HistoryLayout(Enum):
+    """How the steps of a history lie in the observation.
+
+    ``PER_TERM``: all steps of the first term, then all of the second (Isaac Lab, mjlab).
+    ``FRAMES``: one whole observation after the other (legged_gym and its relatives).
+    """
+
+    PER_TERM = 'per_term'
+    FRAMES = 'frames'
+
+
+class Newest(Enum):
+    """Which step of a history comes where."""
+
+    FIRST = 'first'
+    LAST = 'last'
+
+
+class HistoryStart(Enum):
+    """What a history holds before there was one: its first step again, or zeros."""
+
+    REPEAT = 'repeat'
+    ZERO = 'zero'
+
+
+@dataclass(frozen=True, slots=True)
+class ObservationTerm:
+    """One term of the observation.
+
+    Attributes:
+        name: How its tool calls it.
+        source: What it is made of.
+        width: Numbers of one step.
+        scale: For each number.
+        offset: For each number, added after the scale.
+        clip: Lowest and highest value before the scale; None for none.
+        history: Steps that are observed, 1 for the present one only.
+        frame: Of a velocity.
+        relative: Whether joint positions count from the default pose.
+        quaternion: Order of an orientation.
+        phase_period: Of the clock in [s].
+        phase_threshold: A command whose norm is smaller has no phase.
+        values: What a constant, or the scan of a flat ground, is.
+    """
+
+    name: str
+    source: Source
+    width: int
+    scale: tuple[float, ...]
+    offset: tuple[float, ...]
+    clip: tuple[float, float] | None = None
+    history: int = 1
+    frame: BodyFrame = BodyFrame.BASE
+    relative: bool = True
+    quaternion: QuaternionOrder = QuaternionOrder.XYZW
+    phase_period: float = 1.0
+    phase_threshold: float = 0.0
+    values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ActionContract:
+    """What becomes of an answer: ``target = clip(action) * scale + offset``.
+
+    Attributes:
+        scale: In [rad] for each joint.
+        offset: In [rad] for each joint; as a rule the default pose.
+        clip: Range of each raw action; what was clipped is the last action. None for none.
+        target_clip: Range of each target in [rad]; None for none.
+        low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
+    """
+
+    scale: tuple[float, ...]
+    offset: tuple[float, ...]
+    clip: tuple[tuple[float, float], ...] | None = None
+    target_clip: tuple[tuple[float, float], ...] | None = None
+    low_pass: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecurrentState:
+    """An input that gets what an output was a step before; zeros in the first step."""
+
+    input: str
+    output: str
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRanges:
+    """Commands that the policy was trained for: lowest and highest, [m/s] and [rad/s]."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    yaw: tuple[float, float]
+
+    @property
+    def axes(self) -> tuple[tuple[float, float], ...]:
+        """Ranges of x, y and yaw."""
+        return self.x, self.y, self.yaw
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Of the servos in the training, for each joint: [N m/rad] and [N m s/rad]."""
+
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyContract:
+    """All that has to agree between a policy and the robot that runs it.
+
+    Attributes:
+        joint_names: Joints in the order of observations and actions.
+        default_positions: Of the joints in [rad].
+        period: Between two steps of the policy in [s].
+        terms: Of the observation, in their order.
+        clip: The whole observation stays within plus and minus this; None for no limit.
+        history_layout: How steps lie in it.
+        newest: Where the newest step is.
+        history_start: What a history begins with.
+        action: What becomes of an answer.
+        recurrence: Inputs that are outputs of the step before.
+        commands: What it was trained for; None where nobody said.
+        gains: Of its training; None where nobody said.
+        robot: What it was trained for, for people.
+        kind: How it was made, for people.
+    """
+
+    joint_names: tuple[str, ...]
+    default_positions: tuple[float, ...]
+    period: float
+    terms: tuple[ObservationTerm, ...]
+    action: ActionContract
+    clip: float | None = None
+    history_layout: HistoryLayout = HistoryLayout.PER_TERM
+    newest: Newest = Newest.LAST
+    history_start: HistoryStart = HistoryStart.REPEAT
+    recurrence: tuple[RecurrentState, ...] = ()
+    commands: CommandRanges | None = None
+    gains: Gains | None = None
+    robot: str = ''
+    kind: str = ''
+
+    @property
+    def width(self) -> int:
+        """Numbers of the whole observation."""
+        return sum(term.width * term.history for term in self.terms)
+
+    def needs(self, source: Source) -> bool:
+        """Return whether a term is made of this."""
+        return any(term.source is source for term in self.terms)

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Contracts from rl_sar: ``config.yaml`` of a policy, with ``base.yaml`` of its robot.
+
+Each file has one key (``go2``, ``go2/himloco``) above all others. Observations are scaled, then
+clipped as a whole; actions are clipped before they are scaled, and remembered so. In
+``observations_history`` 0 is the newest step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .document import ContractDocument, document_of, Values
+from .model import Source
+from .terms import RL_SAR
+
+SCALES = {
+    'lin_vel': 'lin_vel_scale',
+    'ang_vel': 'ang_vel_scale',
+    'gravity_vec': 'gravity_vec_scale',
+    'commands': 'commands_scale',
+    'dof_pos': 'dof_pos_scale',
+    'dof_vel': 'dof_vel_scale',
+}
+LAYOUTS = {'time': 'frames', 'term': 'per_term'}
+
+
+def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
+    """Read a ``config.yaml`` or ``base.yaml``.
+
+    Args:
+        values: The file.
+        origin: Its name, for messages.
+    """
+    config: Mapping[str, Any] = values
+    robot = ''
+    if len(values) == 1:
+        robot, inner = next(iter(values.items()))
+        config = inner if isinstance(inner, Mapping) else {}
+    refusals: list[str] = []
+    contract: Values = {'robot': str(robot)} if robot else {}
+    if isinstance(config.get('dt'), (int, float)) and isinstance(config.get('decimation'), int):
+        contract['period'] = config['dt'] * config['decimation']
+    names, mapping = config.get('joint_names'), config.get('joint_mapping')
+    if isinstance(names, list):
+        contract['joints'] = names
+    if isinstance(names, list) and isinstance(mapping, list):
+        contract['joints'] = [names[index] for index in mapping]
+    if 'default_dof_pos' in config:
+        contract['default_positions'] = config['default_dof_pos']
+    if 'observations' in config:
+        contract['observation'] = _observation(config, origin, refusals)
+    if 'action_scale' in config:
+        contract['action'] = {'scale': config['action_scale']}
+        low, high = config.get('clip_actions_lower'), config.get('clip_actions_upper')
+        if low and high:
+            contract['action']['clip'] = [list(pair) for pair in zip(low, high, strict=True)]
+    gains = {
+        name: config[key]
+        for name, key in (('stiffness', 'rl_kp'), ('damping', 'rl_kd'))
+        if key in config
+    }
+    if gains:
+        contract['gains'] = gains
+    document = document_of(contract, origin)
+    return ContractDocument(document.values, document.origins, HINTS, tuple(refusals))
+
+
+HINTS = {
+    'joints': 'base.yaml of the robot has joint_names and joint_mapping',
+    'period': 'base.yaml of the robot has dt and decimation',
+}
+
+
+def _observation(config: Mapping[str, Any], origin: str, refusals: list[str]) -> Values:
+    history = config.get('observations_history') or [0]
+    terms = {name: _term(name, config, origin, refusals) for name in config['observations']}
+    observation: Values = {'terms': terms}
+    if 'clip_obs' in config:
+        observation['clip'] = config['clip_obs']
+    if len(history) > 1:
+        for term in terms.values():
+            term['history'] = len(history)
+        observation['history'] = _history(config, list(history), origin, refusals)
+    return observation
+
+
+def _term(name: str, config: Mapping[str, Any], origin: str, refusals: list[str]) -> Values:
+    term: Values = dict(RL_SAR.get(name, {}))
+    if SCALES.get(name) in config:
+        term['scale'] = config[SCALES[name]]
+    if term.get('source') == Source.ANGULAR_VELOCITY.value:
+        axis = config.get('ang_vel_axis', config.get('ang_vel_type'))
+        if axis is not None and str(axis).endswith('body'):
+            term['frame'] = 'base'
+        elif axis is not None:
+            refusals.append(f'{origin}: an angular velocity of {axis!r} cannot be run here')
+    return term
+
+
+def _history(
+    config: Mapping[str, Any], history: list[int], origin: str, refusals: list[str]
+) -> Values:
+    steps = list(range(len(history)))
+    contract: Values = {'start': 'zero'}
+    layout = LAYOUTS.get(config.get('observations_history_priority', ''))
+    if layout is not None:
+        contract['layout'] = layout
+    if history == steps:
+        contract['newest'] = 'first'
+    elif history == steps[::-1]:
+        contract['newest'] = 'last'
+    else:
+        refusals.append(
+            f'{origin}: observations_history {history} has gaps; all of {steps} are needed'
+        )
+    return contract

@@ -1,0 +1,283 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Contracts: policies of five tools answer as in their tool; what is open is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from quad_controller import Controller, GaitParameters, StateParameters
+from quad_controller.attach_contract import run
+from quad_controller.exceptions import PolicyError
+from quad_controller.gait.velocity import Velocity
+from quad_controller.policy.contract.build import build_contract
+from quad_controller.policy.contract.document import document_of, flatten, read_yaml
+from quad_controller.policy.contract.files import read_contract_file
+from quad_controller.policy.interface import PolicyInputs
+from quad_controller.policy.load import load_policy, LoadedPolicy
+from quad_controller.policy.options import GravitySource, PolicyOptions
+from quad_description import ImuSample, JointSample, RobotState
+from quad_description.rotations import normalized
+from quad_gait_policies import STAND
+from quad_gait_rig import ROBOT, UPRIGHT
+from quad_tool_policies import DEFAULTS, JOINTS, ReferencePolicy, Step, Tool, TOOLS, write_network
+
+pytestmark = pytest.mark.slow
+
+PERIOD = 0.02  # [s]
+OPTIONS = PolicyOptions(gravity_source=GravitySource.EULER, soft_limits=1.0)
+ORDER = [ROBOT.names.index(name) for name in JOINTS]
+
+
+def attached(tool: Tool, folder: Path, *, left_out: str = '') -> list[str]:
+    """Write a tool's files; return the arguments that attach its contract."""
+    arguments = [str(folder / 'policy.onnx')]
+    for name, text in tool.files.items():
+        (folder / name).write_text(text)
+        arguments.append(str(folder / name))
+    for key, value in tool.settings.items():
+        if key != left_out:
+            arguments += ['--set', f'{key}={yaml.safe_dump(value, default_flow_style=True)}']
+    return arguments
+
+
+def load(path: Path) -> LoadedPolicy:
+    """Load a policy for the test's robot."""
+    return load_policy(path, ROBOT, STAND, OPTIONS, PERIOD)
+
+
+@pytest.mark.parametrize('name', TOOLS)
+@pytest.mark.parametrize('external', [False, True], ids=['one_file', 'side_file'])
+def test_policies_answer_as_in_their_tool(name: str, external: bool, tmp_path: Path) -> None:
+    """A recorded run gives the targets of the tool's own observation code, to 1e-5 rad."""
+    tool = TOOLS[name]()
+    reference = ReferencePolicy(tool, *write_network(tool, tmp_path / 'policy.onnx',
+                                                     external=external))  # fmt: skip
+    assert run(attached(tool, tmp_path)) == 0
+    runner = load(tmp_path / 'policy.onnx').runner
+    runner.reset(STAND)
+    random = np.random.default_rng(3)
+    expected = DEFAULTS
+    for count in range(40):
+        inputs, step = recorded(random)
+        targets = runner.step(inputs, PERIOD).targets
+        if count % tool.decimation == 0:
+            expected = reference.step(step)
+        assert targets is not None
+        assert [targets[place] for place in ORDER] == pytest.approx(expected, abs=1e-5)
+
+
+def recorded(random: np.random.Generator) -> tuple[PolicyInputs, Step]:
+    """Return a step of a run, as the robot and as a tool sees it."""
+    positions = np.array(STAND) + random.uniform(-0.6, 0.6, 12)
+    velocities = random.uniform(-6.0, 6.0, 12)
+    linear, angular = random.uniform(-0.5, 0.5, 3), random.uniform(-2.0, 2.0, 3)
+    command = random.uniform(-0.5, 0.5, 3)
+    x, y, z, w = normalized((*random.uniform(-0.3, 0.3, 3).tolist(), 1.0))
+    # third row of the rotation of body to world, negative: gravity in the body
+    gravity = [-2 * (x * z - w * y), -2 * (y * z + w * x), -(1 - 2 * (x * x + y * y))]
+    inputs = PolicyInputs(
+        JointSample(tuple(positions.tolist()), tuple(velocities.tolist())),
+        ImuSample((x, y, z, w), tuple(angular.tolist()), None),
+        Velocity(*command.tolist()),
+        tuple(linear.tolist()),
+    )
+    measured = (linear, angular, gravity, command, positions[ORDER], velocities[ORDER])
+    step = Step(*(np.array(values, np.float32) for values in measured))
+    return inputs, step
+
+
+@pytest.mark.parametrize(
+    ('name', 'key'), [(name, key) for name in TOOLS for key in TOOLS[name]().settings]
+)
+def test_what_a_file_leaves_open_is_asked_for(
+    name: str, key: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without the setting nothing is written, and its key is named."""
+    tool = TOOLS[name]()
+    write_network(tool, tmp_path / 'policy.onnx')
+    before = (tmp_path / 'policy.onnx').read_bytes()
+    status = run(attached(tool, tmp_path, left_out=key))
+    if key == 'recurrence':  # no file knows whether an input is a state: its shape refuses it
+        with pytest.raises(PolicyError, match='input'):
+            load(tmp_path / 'policy.onnx')
+        return
+    assert status == 1
+    assert f'{key}: ' in capsys.readouterr().out.partition('open: ')[2]
+    assert (tmp_path / 'policy.onnx').read_bytes() == before
+
+
+def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
+    """Weights beside the file count; a name that leads elsewhere is refused."""
+    tool = TOOLS['rl_sar']()
+    path = tmp_path / 'policy.onnx'
+    write_network(tool, path, external=True)
+    assert run(attached(tool, tmp_path)) == 0
+    first = load(path).digest
+    side = tmp_path / 'policy.onnx.data'
+    data = bytearray(side.read_bytes())
+    data[8] ^= 1
+    side.write_bytes(data)
+    assert load(path).digest != first
+    path.write_bytes(path.read_bytes().replace(b'policy.onnx.data', b'../icy.onnx.data'))
+    with pytest.raises(PolicyError, match='outside of its folder'):
+        load(path)
+
+
+def test_the_table_has_values_and_origins(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each value with the file or setting that it is from."""
+    tool = TOOLS['rl_sar']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    assert run([*attached(tool, tmp_path), '--set', 'period=0.04']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for path, value, origin in (
+        ('period', '0.04', 'set as period'),
+        ('joints', '[fl_hip_joint,', 'base.yaml'),
+        ('observation.terms.ang_vel.scale', '0.25', 'config.yaml'),
+    ):
+        row = next(line.split() for line in lines if line.startswith(f'{path} '))
+        assert row[1] == value
+        assert ' '.join(row).endswith(origin)
+
+
+GOOD = {
+    'joints': list(ROBOT.names),
+    'default_positions': list(STAND),
+    'period': 0.02,
+    'observation': {
+        'terms': {
+            'gyro': {'source': 'angular_velocity', 'frame': 'base'},
+            'q': {'source': 'joint_positions', 'relative': True, 'history': 2},
+        },
+        'history': {'layout': 'per_term', 'newest': 'last'},
+    },
+    'action': {'scale': 0.25},
+}
+
+
+@pytest.mark.parametrize(
+    ('path', 'value', 'words'),
+    [
+        ('joints', None, 'open: joints: names'),
+        ('default_positions', [0.0], 'default_positions [0.0] must be a number or 12'),
+        ('period', 'soon', "period 'soon' must be a number"),
+        ('period', 20, 'within 0.0001 to 10'),
+        ('observation.terms', {}, 'open: observation.terms'),
+        ('observation.terms.gyro.source', 'gyroscope', 'must be one of'),
+        ('observation.terms.gyro.frame', None, 'observation.terms.gyro.frame: frame'),
+        ('observation.terms.gyro.scale', [1.0, 2.0], 'must be a number or 3'),
+        ('observation.terms.gyro.scale', float('nan'), 'must be a number'),
+        ('observation.terms.gyro.clip', [1.0, -1.0], 'lowest and highest'),
+        ('observation.terms.gyro.scal', 1.0, "gyro.scal; did you mean 'scale'"),
+        ('observation.terms.q.history', 2.5, 'a whole number'),
+        ('observation.terms.q.history', 0, 'within 1 to 200'),
+        ('observation.history.layout', None, 'observation.history.layout: per_term'),
+        ('observation.history.newest', 'middle', 'one of first, last'),
+        ('observation.history.layout', 'frames', 'the same history of all terms'),
+        ('observation.terms.feet', {'source': 'foot_contacts'}, 'nothing here senses'),
+        ('observation.terms.scan', {'source': 'height_scan', 'values': [0.0]}, 'scan.flat: true'),
+        ('observation.terms.scan', {'source': 'height_scan', 'values': 0.0, 'flat': False},
+         'flat False must be true'),
+        ('observation.terms.bias', {'source': 'constant'}, 'bias.values: what'),
+        ('action.scale', None, 'open: action.scale'),
+        ('action.clip', 'wide', 'two numbers'),
+        ('actions', {}, "unknown key actions; did you mean 'action'"),
+        ('gains', 'stiff', 'gains must be a mapping'),
+        ('commands', {'z': [0.0, 1.0]}, 'unknown key commands.z'),
+    ],
+)  # fmt: skip
+def test_a_senseless_contract_is_refused(path: str, value: object, words: str) -> None:
+    """With path, value, and what it should be."""
+    build_contract(document_of(GOOD, 'test'))
+    values = value
+    for key in reversed(path.split('.')):
+        values = {key: values}
+    changed = document_of(values, 'test').over(document_of(GOOD, 'test'))  # type: ignore[arg-type]
+    if path == 'observation.terms':
+        changed = document_of(GOOD | {'observation': {'terms': value}}, 'test')
+    with pytest.raises(PolicyError) as refusal:
+        build_contract(changed)
+    assert words in refusal.value.reason
+
+
+def test_all_that_is_open_is_named_at_once() -> None:
+    """A contract of nothing asks for everything it needs."""
+    with pytest.raises(PolicyError) as refusal:
+        build_contract(document_of({}, 'test'))
+    for key in ('joints', 'default_positions', 'period', 'observation.terms', 'action.scale'):
+        assert f'{key}: ' in refusal.value.reason
+
+
+def test_a_document_survives_yaml() -> None:
+    """Written and read again, values and their order are the same."""
+    document = document_of(GOOD, 'somewhere')
+    again = read_yaml(document.to_yaml(), 'again')
+    assert list(flatten(again.values)) == list(flatten(document.values))
+    assert build_contract(again) == build_contract(document)
+
+
+def test_a_file_of_no_tool_is_refused(tmp_path: Path) -> None:
+    """Its keys are named, and what is looked for."""
+    path = tmp_path / 'other.yaml'
+    for text, words in (('a: 1\nb: 2', 'its keys: a, b'), ('- 1', 'not a mapping'),
+                        ('a: [', 'not valid YAML')):  # fmt: skip
+        path.write_text(text)
+        with pytest.raises(PolicyError, match=words):
+            read_contract_file(path)
+
+
+def test_a_contract_beside_the_policy_counts(tmp_path: Path) -> None:
+    """The parameter names a file of any tool; it fills what the model does not have."""
+    tool = TOOLS['mjlab']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    side = tmp_path / 'contract.yaml'
+    side.write_text('period: 0.02\nobservation: {terms: {base_ang_vel: {frame: yawed}}}\n')
+    options = PolicyOptions(contract=side)
+    loaded = load_policy(tmp_path / 'policy.onnx', ROBOT, STAND, options, PERIOD)
+    assert loaded.contract.terms[0].frame.value == 'yawed'
+    assert 'observation.terms.base_ang_vel.frame: yawed  (contract.yaml)' in str(loaded)
+    assert np.allclose(loaded.contract.default_positions, DEFAULTS)
+
+
+def test_commands_stay_within_the_training(tmp_path: Path) -> None:
+    """What is faster than the policy was trained for is clamped, as its table says."""
+    tool = TOOLS['playground']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    ranges = ['--set', 'commands={x: [-0.1, 0.2]}']
+    assert run([*attached(tool, tmp_path), *ranges]) == 0
+    loaded = load(tmp_path / 'policy.onnx')
+    assert 'clamped to x -0.1 to 0.2' in str(loaded.report)
+    observed = loaded.runner.observe(standing(Velocity(0.5, 0.4, -0.3)))[0]
+    assert observed[-3:] == pytest.approx([0.2, 0.4, -0.3])
+
+
+def test_a_policy_needs_a_velocity_that_somebody_estimates(tmp_path: Path) -> None:
+    """The mode is refused while there is none, and while it is old."""
+    tool = TOOLS['playground']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    assert run(attached(tool, tmp_path)) == 0
+    policy = load(tmp_path / 'policy.onnx').runner
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    state = RobotState(JointSample(STAND, (0.0,) * 12), UPRIGHT, 0.9)
+    controller.step(state, PERIOD)
+    assert 'linear velocity' in controller.set_mode('policy').message
+    controller.step(replace(state, linear_velocity=(math.nan, 0.0, 0.0)), PERIOD)
+    assert not controller.set_mode('policy').accepted
+    controller.step(replace(state, linear_velocity=(0.1, 0.0, 0.0)), PERIOD)
+    assert controller.set_mode('policy').accepted
+    for _ in range(20):
+        controller.step(state, PERIOD)
+    assert not controller.set_mode('policy').accepted
+
+
+def standing(velocity: Velocity) -> PolicyInputs:
+    """Return what a robot that stands measures."""
+    return PolicyInputs(JointSample(STAND, (0.0,) * 12), UPRIGHT, velocity, (0.0, 0.0, 0.0))
