@@ -258,7 +258,7 @@ def test_torque_is_taken_and_given_by_service(rig: NodeRig) -> None:
 
 
 def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) -> None:
-    """Its targets are those of a robot that stood; a stream that begins anew is a new request."""
+    """Its targets are those of a robot that stood; after a stall, too, until they are near."""
     rig.stream(HOME, 0.5)
 
     def give(on: bool) -> SetBool.Response:
@@ -280,6 +280,9 @@ def test_a_controller_that_goes_on_moves_no_servo_that_was_let_go(rig: NodeRig) 
     assert targets == pytest.approx([20.0] * len(targets), abs=0.01)
     count = len(rig.peer.commands)
     rig.receive('/joint_states', 80)  # longer than the pause that ends a stream
+    rig.stream(HOME, 0.5)
+    assert len(rig.peer.commands) == count
+    rig.stream(list(rig.receive('/joint_states', 1).position), 0.5)
     rig.stream(HOME, 1.0)
     assert len(rig.peer.commands) > count
     assert rig.peer.angles[11] != pytest.approx(20.0, abs=1.0)

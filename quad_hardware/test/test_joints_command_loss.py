@@ -231,9 +231,12 @@ def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
     assert not line.commander.counters.loss
 
 
-@given(st.lists(st.sampled_from(['same', 'away', 'near']), min_size=1, max_size=30))
+@given(st.lists(st.sampled_from(['same', 'away', 'near', 'stall']), min_size=1, max_size=30))
 def test_a_stream_of_before_does_not_raise_a_robot_that_was_let_go(steps: list[str]) -> None:
-    """Whatever its targets do, nothing is sent before they were near the legs once."""
+    """Whatever its targets do, nothing is sent before they were near the legs once.
+
+    A stall is a pause that a stopped process or a busy machine makes: it is no new request.
+    """
     line = Line()
     now = line.walk(0.5)
     line.commander.let_go()
@@ -244,15 +247,14 @@ def test_a_stream_of_before_does_not_raise_a_robot_that_was_let_go(steps: list[s
         False,
     )
     for step in steps:
-        now += PERIOD
-        offset = {'same': offset, 'away': offset + 0.4, 'near': 0.2}[step]
+        now += 3.0 if step == 'stall' else PERIOD
+        offset = {'away': offset + 0.4, 'near': 0.2}.get(step, offset)
         is_back = is_back or offset < 0.3
         targets = [LYING[0] + offset, *LYING[1:]]
         assert (line.commander.take(targets, sunk, now) is not None) is is_back
     assert (len(line.sent) > before) is is_back
     if not is_back:
         assert f'{NAMES[0]} is {offset:.2f} rad from its target' in line.warned[-1]
-        assert line.commander.take(targets, sunk, now + 0.6) is not None, 'a stream that begins'
 
 
 @pytest.mark.parametrize('share', [0.1, 0.5, 0.9, 0.99])

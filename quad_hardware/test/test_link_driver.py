@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 import termios
+import threading
 import time
 from typing import Any
 
@@ -48,6 +49,13 @@ class Rig:
     def reach(self, state: LinkState) -> None:
         """Wait until the link is in a state."""
         wait_for(lambda: self.driver.status().state is state, f'{state} after {self.changes}')
+
+    def loses(self, count: int) -> None:
+        """Wait until the robot was lost so many times."""
+        wait_for(
+            lambda: [state for state, _ in self.changes].count(LinkState.CONNECTING) == count,
+            f'{count} losses',
+        )
 
     def reports(self, count: int) -> None:
         """Wait for more reports."""
@@ -149,6 +157,41 @@ def test_servos_let_go_and_hold_again(rig: Rig) -> None:
     rig.peer.unplug()
     rig.reach(LinkState.CONNECTING)
     assert not rig.driver.torque(on=False)
+
+
+def test_servos_whose_order_was_cut_short_do_not_count_as_holding(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half of an order to let go leaves; then one to hold is accepted and lost."""
+    shares = [0.5, 0.0]  # of the next writes after an order
+    ordered = threading.Event()
+    write = SerialPort.write
+
+    def cut(port: SerialPort, data: bytes) -> None:
+        if ordered.is_set() and shares:
+            ordered.clear()
+            write(port, data[: int(len(data) * shares.pop(0))])
+            raise LinkError('the line broke')
+        write(port, data)
+
+    for dialect in (V2Dialect, V1Dialect):
+        torque = dialect.torque
+
+        def order(self: Any, *, on: bool, torque: Any = torque) -> None:
+            ordered.set()
+            torque(self, on=on)
+
+        monkeypatch.setattr(dialect, 'torque', order)
+    monkeypatch.setattr(SerialPort, 'write', cut)
+    rig.reports(1)
+    for losses, on in ((1, False), (2, True)):
+        assert rig.driver.torque(on=on)
+        rig.loses(losses)
+        rig.reach(LinkState.RUNNING)
+        assert rig.driver.limp, 'nobody knows whether they hold'
+    assert not shares
+    assert rig.driver.torque(on=True)
+    wait_for(lambda: not rig.driver.limp, 'servos that hold')
 
 
 def test_silence_stops_the_commands(rig: Rig) -> None:

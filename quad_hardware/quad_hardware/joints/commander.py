@@ -80,8 +80,6 @@ class JointCommander:
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self._let_go = False
-        self._stream_timeout = limiter.stream_timeout
-        self._received_at = -math.inf
         self.timeout = self._loss.timeout
 
     @property
@@ -100,9 +98,10 @@ class JointCommander:
         self._descent.reset()
 
     def let_go(self) -> None:
-        """Let no stream go on that began before the servos were let go, or hold again.
+        """Send nothing more until a command begins where the legs are.
 
-        Its targets are where the legs were then: the robot would rise unasked.
+        What a controller streams is where they were: the robot would rise unasked. A pause of
+        the stream is no new request; a stalled process makes one, too.
         """
         self._forget()
         self._let_go = True
@@ -122,9 +121,7 @@ class JointCommander:
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
             now: Time [s].
         """
-        is_new = now - self._received_at > self._stream_timeout
-        self._received_at = now
-        if self._let_go and (is_new or self._farthest(positions, place)[0] <= LET_GO_BAND):
+        if self._let_go and self._farthest(positions, place)[0] <= LET_GO_BAND:
             self._let_go = False
         command = self._send(self._commanded, positions, place, now)
         if command is not None:
@@ -181,7 +178,7 @@ class JointCommander:
             distance, joint = self._farthest(positions, place)
             self._drop(
                 f'the servos were let go, and {joint} is {distance:.2f} rad from its target; set '
-                f'the mode relax, then stand, or pause the commands for {self._stream_timeout:g} s'
+                f'the mode relax, then stand (commands begin up to {LET_GO_BAND:g} rad off the legs)'
             )
             return None
         if not self._send_angles(self._joints.angles(command.targets)):

@@ -58,7 +58,7 @@ class Driver:
         self._mailbox = Mailbox()
         self._torque_unsent: bool | None = None  # taken from the mailbox, and not written yet
         self._released = False  # by the last change of torque that was accepted
-        self._limp = False  # by the last one that was sent
+        self._limp = False  # from the first byte of an order to let go to the last of one to hold
         self._state = LinkState.CONNECTING
         self._detail = 'not started'
         self._session: Session | None = None
@@ -255,6 +255,8 @@ class Driver:
         if orders.torque is not None:
             dialect.torque(on=orders.torque)
             self._torque_unsent = orders.torque
+            # half of it may leave before the line breaks
+            self._limp = self._limp or not orders.torque
 
     def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""
