@@ -1,0 +1,72 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C of a bring-up while the robot is on its way down: it is let go lying, not half-way."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING
+
+from nav_msgs.msg import Odometry
+from processes import RunningProcess
+import pytest
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from quad_bringup.demo.main import GROUND_TRUTH
+from quad_description import Pose, pose_positions
+from quad_msgs.srv import SetMode
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from isolation import Isolation
+
+pytestmark = pytest.mark.scenario
+
+STARTING = 60.0  # [s] until all is ready on a busy machine
+MOVING = 60.0  # [s] for a mode to be reached
+WAY_DOWN = 10.0  # [s]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """The controller ends lying, and an observer sees joints and body there; physics ends last."""
+    slow = tmp_path / 'slow.yaml'  # the bring-up takes a second or two to join ROS
+    slow.write_text(f'/controller_node:\n  ros__parameters:\n    blend_time: {WAY_DOWN}\n')
+    arguments = ['ros2', 'run', 'quad_bringup', 'bringup', '--simulate']
+    arguments += ['--ros-args', '--params-file', str(slow)]
+    with (
+        RosClient(isolation.domain_id) as client,
+        RunningProcess(arguments, isolation.env) as bringup,
+    ):
+        joints = client.listen(JointState, '/joint_states', qos_profile_sensor_data)
+        truth = client.listen(Odometry, GROUND_TRUTH, qos_profile_sensor_data)
+        states = client.listen(String, '/controller_node/state', LATCHED)
+
+        def height() -> float:
+            return truth[-1].pose.pose.position.z
+
+        def reach(state: str) -> None:
+            client.spin_until(lambda: states and states[-1].data == state, MOVING, state)
+
+        bringup.wait_for('all is ready', STARTING)
+        client.spin_until(lambda: bool(truth and joints), STARTING, 'robot')
+        low = height()
+        for mode in ('stand', 'lie'):
+            assert client.call(SetMode, '/set_mode', SetMode.Request(mode=mode)).success
+            reach('stand' if mode == 'stand' else 'to lie')
+        high = height()
+        client.spin_until(lambda: high - height() > 0.2 * (high - low), MOVING, 'way down')
+        assert states[-1].data == 'to lie'
+        bringup.signal(signal.SIGINT)
+        client.spin_until(lambda: not bringup.is_running(), MOVING, 'end')
+        assert bringup.wait() == 0, bringup.output
+        assert states[-1].data == 'lie', 'the controller was ended on the way'
+        lying = [pose_positions(Pose.LIE)[name] for name in joints[-1].name]
+        assert list(joints[-1].position) == pytest.approx(lying, abs=0.15)
+        assert height() == pytest.approx(low, abs=0.01)
