@@ -39,7 +39,7 @@ setup(
     version='0.1.0',
     python_requires='>=3.10',
     packages=find_packages(include=['arm_canopen', 'arm_canopen.*']),
-    package_data={'arm_canopen': ['py.typed', 'config/default_drive.eds']},
+    package_data={'arm_canopen': ['py.typed', 'config/resolve/default_drive.eds']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/arm_canopen']),
         ('share/arm_canopen', ['package.xml']),

@@ -62,7 +62,7 @@ def check_robot(robot: Robot) -> list[Finding]:
 
 def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
     """Return what is wrong with bus.yml, and the joints of its drives."""
-    from arm_canopen.config.checks import check_file
+    from arm_canopen.config import check_file
 
     report = check_file(robot.bus_config)
     findings = [

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from arm_canopen.config import load_eds
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig, SdoWrite
+from arm_canopen.config.model.master import MasterConfig
 from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.pdo import MappedObject

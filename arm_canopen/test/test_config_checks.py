@@ -14,9 +14,9 @@ from config_mutations import mutated
 from config_samples import DRIVE_ROWS, eds_text, Row, write_bus
 import pytest
 
-from arm_canopen.config import load_bus, load_eds, Problem
-from arm_canopen.config.check_drives import period_setting
-from arm_canopen.config.checks import check_bus, check_file, Report
+from arm_canopen.config import check_file, load_bus, load_eds, Problem
+from arm_canopen.config.model.checks import check_bus, Report
+from arm_canopen.config.model.checks.drives import period_setting
 
 HERE = '# <-'
 
@@ -508,7 +508,9 @@ def test_damaged_files_can_be_checked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     """Whatever is wrong with a file, the checks end, and every problem has words."""
-    monkeypatch.setattr('arm_canopen.config.eds_files.load_eds', cache(load_eds))  # it stays whole
+    monkeypatch.setattr(
+        'arm_canopen.config.resolve.eds_files.load_eds', cache(load_eds)
+    )  # it stays whole
     generator = random.Random(seed)
     snippets = [
         *('transmission: 252', 'sync_start: 9', '- {index: 0x1016, sub_index: 1}', '  1:'),

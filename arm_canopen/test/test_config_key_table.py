@@ -14,7 +14,16 @@ import pytest
 import yaml
 
 from arm_canopen.config import BusConfig
-from arm_canopen.config.section import SECTIONS
+from arm_canopen.config.read.device_keys import (
+    DEVICE_KEYS,
+    DRIVE_KEYS,
+    RPDO_KEYS,
+    SDO_KEYS,
+    TPDO_KEYS,
+)
+from arm_canopen.config.read.master_keys import MASTER_KEYS, OPTION_KEYS
+from arm_canopen.config.read.schema import Key, Kind, Use
+from arm_canopen.config.read.section import SECTIONS
 from arm_canopen.exceptions import ConfigError
 
 PAGE = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
@@ -120,3 +129,61 @@ def test_a_key_that_is_not_on_the_page_is_refused(tmp_path: Path, section: str) 
     names = problem.remedy.partition('known here: ')[2].split(', ')
     here = {row.key for row in key_rows() if row.section == section}
     assert set(names) == here
+
+
+TABLES = {
+    'options': OPTION_KEYS,
+    'master': MASTER_KEYS,
+    'device': DEVICE_KEYS + DRIVE_KEYS,
+    'tpdo': TPDO_KEYS,
+    'rpdo': RPDO_KEYS,
+    'sdo': SDO_KEYS,
+}
+SCALARS = [(name, key) for name, keys in TABLES.items() for key in keys if key.kind != Kind.BLOCK]
+OTHERS: dict[str, Any] = {
+    'driver': 'ros2_canopen::LifecycleMasterDriver',
+    'device.driver': 'ros2_canopen::ProxyDriver',
+    'namespace': 'left',
+    'dcf': 'other.eds',
+    'dcf_path': 'others',
+    'recovery': 'auto',
+    'quirks': 'some_drive',
+}
+"""What a text may be instead of its default."""
+
+
+def other_value(section: str, key: Key) -> Any:
+    """Return a value that a key may have, and that is neither its default nor its neutral one."""
+    if key.kind is Kind.TEXT:
+        return OTHERS.get(f'{section}.{key.name}', OTHERS.get(key.name, 'text'))
+    if key.kind is Kind.BOOLEAN:
+        defaults = {row.key: row.default for row in key_rows() if row.section == section}
+        return defaults.get(key.name) == 'false'
+    if key.choices is not None:
+        return min(key.choices)
+    low = 0 if key.low is None else key.low
+    return min(int(low) + 7, 7 if key.high is None else int(key.high))
+
+
+def bus_of(folder: Path, key: Key, section: str, **keys: Any) -> BusConfig | None:
+    """Load a bus, of a drive with heartbeat for a key of heartbeats; None where it is refused."""
+    bus = bus_with(section, **keys)
+    if key.name.startswith('heartbeat'):
+        bus['nodes']['joint1'].setdefault('heartbeat_producer', 100)
+    try:
+        return load(folder, bus)
+    except ConfigError:
+        return None
+
+
+KEY_IDS = [f'{section}-{key.name}' for section, key in SCALARS]
+
+
+@pytest.mark.parametrize(('section', 'key'), SCALARS, ids=KEY_IDS)
+def test_a_key_counts_or_is_said_to_be_ignored(tmp_path: Path, section: str, key: Key) -> None:
+    """No key is read and never used: another value makes another bus, or one that is refused."""
+    for file in (tmp_path / 'other.eds', tmp_path / 'others' / 'drive.eds'):
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(EDS)
+    changed = bus_of(tmp_path, key, section, **{key.name: other_value(section, key)})
+    assert (changed == bus_of(tmp_path, key, section)) == (key.use is Use.IGNORED)

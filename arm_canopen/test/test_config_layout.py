@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.config import load_bus, NodeConfig, Problem
-from arm_canopen.config.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.findings import Place
-from arm_canopen.config.merge import merge_device
+from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
+from arm_canopen.config.resolve.merge import merge_device
 
 OLD = """options: {dcf_path: "@BUS_CONFIG_PATH@"}
 master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}

@@ -23,13 +23,13 @@ from config_samples import (
 import pytest
 
 from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
-from arm_canopen.config.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, TPDO_KEYS
-from arm_canopen.config.drive_model import RecoveryPolicy
-from arm_canopen.config.eds import load_eds
-from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.master_model import MasterConfig
-from arm_canopen.config.schema import Key, Kind, Use
-from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
+from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config.model.master import MasterConfig
+from arm_canopen.config.read.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, TPDO_KEYS
+from arm_canopen.config.read.eds import load_eds
+from arm_canopen.config.read.master_keys import MASTER_KEYS, OPTION_KEYS
+from arm_canopen.config.read.schema import Key, Kind, Use
+from arm_canopen.config.resolve.settings import DeviceSettings, MasterSettings, Options
 from arm_canopen.exceptions import ConfigError
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState
@@ -319,7 +319,7 @@ def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         reads.append(path)
         return load_eds(path)
 
-    monkeypatch.setattr('arm_canopen.config.eds_files.load_eds', counted)
+    monkeypatch.setattr('arm_canopen.config.resolve.eds_files.load_eds', counted)
     text = BUS + ''.join(f'  joint{n}: {{node_id: {n + 1}}}\n' for n in range(2, 8))
     assert len(load_text(tmp_path, text).nodes) == 7
     assert len(reads) == 1

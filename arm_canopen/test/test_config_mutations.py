@@ -33,7 +33,7 @@ def test_damaged_files_are_read_or_refused(
 ) -> None:
     """A mutated bus.yml is a bus, or an error whose problems lie within the files."""
     # the EDS files are whole, and reading them takes longer than all the rest
-    monkeypatch.setattr('arm_canopen.config.eds_files.load_eds', cache(load_eds))
+    monkeypatch.setattr('arm_canopen.config.resolve.eds_files.load_eds', cache(load_eds))
     generator = random.Random(seed)
     original = TWO_JOINTS if seed % 2 else BUS
     for name in ('drive.eds', 'cia402_slave.eds'):

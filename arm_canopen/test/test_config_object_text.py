@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.config.object_text import BYTE_TYPES, bytes_from_text, text_from_bytes
+from arm_canopen.config.read.object_text import BYTE_TYPES, bytes_from_text, text_from_bytes
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.datatypes import byte_length, DataType, integer_range, REAL_FORMATS
 

@@ -19,9 +19,10 @@ from arm_canopen.cia402.modes import Mode
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
-from arm_canopen.config.checks import check_bus, check_file
-from arm_canopen.config.drive_model import DriveConfig
-from arm_canopen.config.drive_units import AxisUnits, UnitRule
+from arm_canopen.config import check_file
+from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config.model.checks.drive_units import AxisUnits, UnitRule
+from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import ConfigError, DriveError
 from arm_canopen.standard.drive import OperationMode
 

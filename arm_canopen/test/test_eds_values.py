@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.config.eds_values import EdsValue, parse_integer, parse_value
+from arm_canopen.config.read.eds_values import EdsValue, parse_integer, parse_value
 from arm_canopen.standard.datatypes import (
     DataType,
     integer_range,

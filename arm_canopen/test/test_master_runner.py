@@ -15,8 +15,8 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
+from arm_canopen.config.model.master import MasterConfig
 from arm_canopen.exceptions import BusError
 from arm_canopen.master import runner
 from arm_canopen.master.network import Network

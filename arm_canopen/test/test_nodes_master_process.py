@@ -16,8 +16,8 @@ import rclpy
 from rclpy.node import Node
 
 from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig
+from arm_canopen.config.model.master import MasterConfig
 from arm_canopen.exceptions import BusError, CanopenError, DriveError
 from arm_canopen.library.canopen_master import CanopenMaster
 from arm_canopen.master.events import Event, EventKind, Severity

@@ -15,7 +15,7 @@ import re
 
 PACKAGE = Path(__file__).parents[1]
 SOURCE = PACKAGE / 'eds' / 'cia402_drive.eds'
-TARGET = PACKAGE / 'arm_canopen' / 'config' / 'default_drive.eds'
+TARGET = PACKAGE / 'arm_canopen' / 'config' / 'resolve' / 'default_drive.eds'
 
 COMMUNICATION = {0x1003, 0x1005, 0x1008, 0x1009, 0x100A, 0x1014, 0x1017, 0x1029}
 OBJECT = re.compile(r'^\[([0-9A-F]{4})(?=sub|\])', re.MULTILINE)

@@ -14,17 +14,17 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from arm_canopen.config.device_keys import (
+from arm_canopen.config.model.drive import DriveConfig
+from arm_canopen.config.read.device_keys import (
     DEVICE_KEYS,
     DRIVE_KEYS,
     RPDO_KEYS,
     SDO_KEYS,
     TPDO_KEYS,
 )
-from arm_canopen.config.drive_model import DriveConfig
-from arm_canopen.config.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.schema import Key, Use
-from arm_canopen.config.settings import DeviceSettings, MasterSettings, Options
+from arm_canopen.config.read.master_keys import MASTER_KEYS, OPTION_KEYS
+from arm_canopen.config.read.schema import Key, Use
+from arm_canopen.config.resolve.settings import DeviceSettings, MasterSettings, Options
 
 TARGET = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
 UNITS = {1000.0: 'ms', 1_000_000.0: 'µs', 10_000.0: '100 µs', 0.001: 'kbit/s'}

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from arm_canopen.config.boot_plan import BootWrite, held_after_boot, HeldConsumers
 from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.config.model.boot_plan import BootWrite, held_after_boot, HeldConsumers
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.datatypes import DataType, encode
 from arm_canopen.standard.dictionary import ObjectDictionary

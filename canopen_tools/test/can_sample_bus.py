@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
+from arm_canopen.config.model.master import MasterConfig
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.pdo import MappedObject

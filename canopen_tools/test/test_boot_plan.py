@@ -11,7 +11,8 @@ from drive_samples import bus_config, drive_config, drive_dictionary, sdo_write,
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.boot_plan import (
+from arm_canopen.config.model import NodeConfig
+from arm_canopen.config.model.boot_plan import (
     boot_writes,
     BootWrite,
     consumer_to_read,
@@ -19,8 +20,7 @@ from arm_canopen.config.boot_plan import (
     HeldConsumers,
     WATCH_KEY,
 )
-from arm_canopen.config.identity import Identity
-from arm_canopen.config.model import NodeConfig
+from arm_canopen.config.model.identity import Identity
 from arm_canopen.master.configuration import Configurator, PDO_OBJECTS
 from canopen_tools.dcf.concise import device_writes
 from canopen_tools.expected import expected_defaults, expected_objects

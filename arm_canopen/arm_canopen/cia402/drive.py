@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.drive_model import DriveConfig
+from ..config.model.drive import DriveConfig
 from ..exceptions import CanopenError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.process_image import SentRpdo

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-from ..config.drive_model import DriveConfig
+from ..config.model.drive import DriveConfig
 from ..exceptions import CodecError, DriveError, SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.drive_model import DriveConfig
-from ..config.drive_units import is_coarse
+from ..config.model.checks.drive_units import is_coarse
+from ..config.model.drive import DriveConfig
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..config.drive_model import DriveConfig
-from ..config.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from ..config.model.drive import DriveConfig
+from ..config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
 from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode

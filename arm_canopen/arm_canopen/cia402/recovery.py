@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.drive_model import RecoveryPolicy
+from ..config.model.drive import RecoveryPolicy
 from ..exceptions import DriveError
 from ..master.events import Severity
 from ..master.scheduler import Promise, Scheduler

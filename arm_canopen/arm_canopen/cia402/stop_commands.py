@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ..config.drive_model import RecoveryPolicy
+from ..config.model.drive import RecoveryPolicy
 from ..exceptions import DriveError
 from ..standard.drive import DriveState
 from .drive import Drive

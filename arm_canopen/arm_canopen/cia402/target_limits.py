@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from ..config.drive_units import POSITION_TOLERANCE
+from ..config.model.checks.drive_units import POSITION_TOLERANCE
 from ..exceptions import DriveError
 from ..standard.drive import OperationMode
 from .modes import Mode

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from ..config.drive_model import DriveConfig
+from ..config.model.drive import DriveConfig
 from ..exceptions import DriveError
 
 INT16_MAX = 2**15 - 1

@@ -1,18 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""bus.yml and EDS/DCF files -> a typed, checked model of a bus.
+"""bus.yml and EDS/DCF files -> a typed, checked model of a bus, in three steps.
 
-``load_bus`` reads a whole bus, ``load_eds`` one device description. Both collect everything that
-is wrong and raise one ``ConfigError`` whose problems name file, line, key and remedy.
+- ``read``: what stands in the files, with the place of each value.
+- ``resolve``: which value counts, and the model that comes of it.
+- ``model``: typed values in SI units, their checks, and the boot plan.
+
+``load_bus`` goes all three for a bus, ``load_eds`` reads one device description. Both collect
+everything that is wrong and raise one ``ConfigError`` whose problems name file, line, key and
+remedy; ``check_file`` reports them, and what works and was probably meant otherwise.
 """
 
 from ..exceptions import Problem
-from .drive_model import DriveConfig
-from .eds import Eds, load_eds
-from .identity import Identity
-from .load import load_bus
-from .master_model import MasterConfig
-from .model import BusConfig, NodeConfig, PdoConfig, SdoWrite
+from .load import check_file, load_bus
+from .model import (
+    BusConfig,
+    DriveConfig,
+    Identity,
+    MasterConfig,
+    NodeConfig,
+    PdoConfig,
+    SdoWrite,
+)
+from .read.eds import Eds, load_eds
 
 __all__ = [
     'BusConfig',
@@ -24,6 +34,7 @@ __all__ = [
     'PdoConfig',
     'Problem',
     'SdoWrite',
+    'check_file',
     'load_bus',
     'load_eds',
 ]

@@ -1,29 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reading a whole bus from its bus.yml."""
+"""From a bus.yml to its model, in three steps: read, resolve, check."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
 import os
 from pathlib import Path
 
-from .cob_ids import assign_cob_ids
-from .device_reader import DeviceDraft, read_device
-from .device_timing import BusContext, finish_device
-from .document import Item, read_document, YamlMap
-from .eds_files import EdsFiles
-from .findings import Findings, Place
-from .layout import lay_out, Layout
-from .master import build_master
-from .master_model import MasterConfig
-from .model import BusConfig, SourceLocation
-from .pdo_direction import RPDO, TPDO
-from .settings import read_master_settings, read_options
-
-PDO_SECTIONS = (RPDO.name, TPDO.name)
-DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
+from ..exceptions import ConfigError
+from .findings import Findings
+from .model import BusConfig
+from .model.checks import check_bus, Report
+from .read.document import read_document
+from .resolve.bus import resolve_bus
 
 
 def load_bus(
@@ -36,130 +25,38 @@ def load_bus(
         bus_config_path: What ``@BUS_CONFIG_PATH@`` stands for; its own folder when None.
 
     Returns:
-        The bus, checked; oddities are among its warnings.
+        The bus; oddities are among its warnings.
 
     Raises:
         ConfigError: Something is wrong; the error lists every problem with file, line, key and
             remedy.
     """
-    config, findings = read_bus(path, bus_config_path=bus_config_path)
+    folder = None if bus_config_path is None else Path(bus_config_path)
+    config, findings = _read_and_resolve(Path(path), folder)
     findings.raise_errors()
     return config
 
 
-def read_bus(
-    path: str | os.PathLike[str], *, bus_config_path: str | os.PathLike[str] | None = None
-) -> tuple[BusConfig, Findings]:
-    """Read as much of a bus.yml as can be understood; arguments as with :func:`load_bus`.
+def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
+    """Read a bus.yml and report everything that is wrong with it and its EDS files at once.
 
-    Returns:
-        The bus without what is wrong, and everything that is wrong.
+    Args:
+        path: The bus.yml.
+        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
+    """
+    try:
+        config, findings = _read_and_resolve(Path(path), None)
+    except ConfigError as error:
+        return Report(error.problems, ())
+    return check_bus(config, bitrate, findings)
+
+
+def _read_and_resolve(file: Path, bus_config_path: Path | None) -> tuple[BusConfig, Findings]:
+    """Make as much of a bus as can be understood, and collect everything that is wrong.
 
     Raises:
         ConfigError: The file cannot be read at all.
     """
-    file = Path(path)
     findings = Findings()
-    layout = lay_out(read_document(file, findings), findings)
-    options = read_options(layout.options, findings)
-    settings = read_master_settings(layout.master, findings)
-    beside = file.parent.absolute()
-    folder = beside if bus_config_path is None else Path(bus_config_path)
-    eds_files = EdsFiles(folder, beside)
-    drafts = [
-        read_device(name, section, options, eds_files, findings)
-        for name, section in layout.devices.items()
-    ]
-    periods = [draft.settings.poll_period for draft in drafts]
-    master = build_master(layout.master, settings, options, periods, findings)
-    unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
-    _check_axis_names(unique, findings)
-    _check_lifecycle(master, drafts, findings)
-    context = BusContext(options, settings, master)
-    nodes = tuple(
-        finish_device(draft, draft.config, context, findings)
-        for draft in _with_cob_ids(unique, findings)
-        if draft.config is not None
-    )
-    return BusConfig(file, master, nodes, findings.warnings, _locations(layout)), findings
-
-
-def _locations(layout: Layout) -> dict[tuple[str, ...], SourceLocation]:
-    """Say where each key stands, by the names that lead to it."""
-    sections = {'master': layout.master, **layout.devices}
-    return {
-        names: SourceLocation(item.place.line, item.place.key)
-        for name, section in sections.items()
-        for names, item in _walk((name,), section)
-    }
-
-
-def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Item]]:
-    yield names, item
-    if not isinstance(item, YamlMap) or len(names) > DEPTH_MAX:
-        return
-    for name, child in item.entries.items():
-        if len(names) == 1 or names[1] in PDO_SECTIONS:
-            yield from _walk((*names, name), child)
-
-
-def _check_lifecycle(
-    master: MasterConfig, drafts: Sequence[DeviceDraft], findings: Findings
-) -> None:
-    """Refuse a mixture of managed and plain nodes, which nobody could bring up in order."""
-    for draft in drafts:
-        if draft.config is None or draft.config.is_lifecycle == master.is_lifecycle:
-            continue
-        kinds = ('a lifecycle driver', 'a plain one')
-        mine, others = kinds if draft.config.is_lifecycle else kinds[::-1]
-        findings.error(
-            draft.place_of('driver'),
-            f'{draft.config.driver} is {mine}, but the master has {others} ({master.driver})',
-            'take lifecycle drivers for all or for none',
-        )
-
-
-def _check_node_ids(
-    master: YamlMap, master_id: int | None, drafts: Sequence[DeviceDraft], findings: Findings
-) -> list[DeviceDraft]:
-    """Refuse doubled node ids; returns the devices that have one of their own."""
-    owners: dict[int, tuple[str, Place]] = {}
-    if master_id is not None:
-        owners[master_id] = ('the master', master.entries['node_id'].place)
-    unique = []
-    for draft in drafts:
-        if draft.config is None:
-            continue
-        node_id = draft.config.node_id
-        name, place = owners.setdefault(node_id, (draft.config.name, draft.place_of('node_id')))
-        if name == draft.config.name:
-            unique.append(draft)
-            continue
-        findings.error(
-            draft.place_of('node_id'),
-            f'node id {node_id} of {draft.config.name} is also that of {name} (line {place.line})',
-            'give each device an id of its own',
-        )
-    return unique
-
-
-def _check_axis_names(drafts: Sequence[DeviceDraft], findings: Findings) -> None:
-    """Refuse an axis that has the name of another device's axis: each is a joint of its own."""
-    owners: dict[str, str] = {}
-    for draft in drafts:
-        if draft.config is None:
-            continue
-        for axis in draft.config.axes:
-            owner = owners.setdefault(axis.name, draft.config.name)
-            if owner != draft.config.name:
-                findings.error(
-                    draft.place_of('channel_names'),
-                    f'{draft.config.name} and {owner} both have an axis {axis.name!r}',
-                    'give each a name of its own',
-                )
-
-
-def _with_cob_ids(drafts: Sequence[DeviceDraft], findings: Findings) -> list[DeviceDraft]:
-    """Give the PDOs of all devices their final COB-IDs."""
-    assigned = iter(assign_cob_ids([pdo for draft in drafts for pdo in draft.pdos], findings))
-    return [replace(draft, pdos=[next(assigned) for _ in draft.pdos]) for draft in drafts]
+    document = read_document(file, findings)
+    return resolve_bus(document, file, bus_config_path, findings), findings

@@ -19,8 +19,8 @@ from ..can import open_bus
 from ..can.bus import Bus
 from ..cia402.motion import MotionSource
 from ..config import load_bus
-from ..config.checks import check_bus
 from ..config.model import BusConfig
+from ..config.model.checks import check_bus
 from ..exceptions import BootError, BusError, DriveError
 from ..master.events import Event, EventKind, Report, Severity
 from ..master.runner import OWNER

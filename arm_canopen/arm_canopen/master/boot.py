@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..config.identity import Identity
 from ..config.model import BusConfig, SdoWrite
+from ..config.model.identity import Identity
 from ..exceptions import BootError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index

@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..config.boot_plan import (
+from ..config.model import BusConfig, SdoWrite
+from ..config.model.boot_plan import (
     boot_writes,
     BootWrite,
     consumer_to_read,
@@ -16,7 +17,6 @@ from ..config.boot_plan import (
     WATCH_KEY,
     watch_word,
 )
-from ..config.model import BusConfig, SdoWrite
 from ..exceptions import SdoAbortError, SdoError
 from ..standard.dictionary import object_address
 from ..standard.objects import Index, PDO_COUNT_MAX

@@ -14,7 +14,7 @@ from typing import Protocol, TypeAlias
 
 from ..can.frame import Frame
 from ..config.model import PdoConfig
-from ..config.tpdo_freshness import longest_silence, loss_unnoticed
+from ..config.model.tpdo_freshness import longest_silence, loss_unnoticed
 from ..exceptions import CodecError
 from ..standard.datatypes import DataType, integer_range
 from ..standard.dictionary import object_address

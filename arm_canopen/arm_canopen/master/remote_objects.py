@@ -10,7 +10,7 @@ import math
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
-from ..config.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
+from ..config.model.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
 from ..exceptions import CodecError, DriveError, SdoError
 from ..standard.datatypes import DataType, decode, encode, Value
 from ..standard.dictionary import object_address, ObjectEntry

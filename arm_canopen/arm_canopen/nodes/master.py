@@ -27,8 +27,8 @@ from node_runner import (
 from ..can import open_bus
 from ..can.bus import Bus
 from ..config import load_bus
-from ..config.checks import check_bus
 from ..config.model import BusConfig
+from ..config.model.checks import check_bus
 from ..exceptions import CanopenError
 from ..library.bus_master import THREAD_PRIORITY
 from .managed_bus import MANAGER

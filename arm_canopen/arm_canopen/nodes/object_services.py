@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from arm_msgs.srv import ReadObject, WriteObject
 
-from ..config.object_text import bytes_from_text, text_from_bytes
+from ..config.read.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread

@@ -158,6 +158,14 @@ class ObjectDictionary:
         """Return all entries of one index, ascending."""
         return [entry for entry in self if entry.index == index]
 
+    def is_configured(self, *indices: int) -> bool:
+        """Return whether a DCF gives any writable sub-index of some objects its own value."""
+        return any(
+            entry.configured and entry.access.writable
+            for index in indices
+            for entry in self.subindices(index)
+        )
+
     def for_node(self, node_id: int) -> ObjectDictionary:
         """Return a copy whose node-relative defaults are resolved for a node id."""
         return ObjectDictionary((_resolved(entry, node_id) for entry in self), source=self.source)

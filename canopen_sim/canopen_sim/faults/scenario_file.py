@@ -29,7 +29,8 @@ from collections.abc import Callable, Mapping
 import os
 from typing import TypeVar
 
-from arm_canopen.config.document import (
+from arm_canopen.config.findings import Findings, RefusedError
+from arm_canopen.config.read.document import (
     DocumentKind,
     Item,
     read_document,
@@ -37,8 +38,7 @@ from arm_canopen.config.document import (
     YamlList,
     YamlMap,
 )
-from arm_canopen.config.findings import Findings, RefusedError
-from arm_canopen.config.scalars import describe, integer, number, scalar
+from arm_canopen.config.read.scalars import describe, integer, number, scalar
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtState
 

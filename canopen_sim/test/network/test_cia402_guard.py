@@ -15,7 +15,7 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.motion import AxisFeedback
 from arm_canopen.cia402.refusal import Refusal, RefusalCause
 from arm_canopen.cia402.units import Units
-from arm_canopen.config.drive_model import DriveConfig
+from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode

@@ -13,7 +13,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config.drive_model import RecoveryPolicy
+from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import Controlword, DriveState, OperationMode, Statusword

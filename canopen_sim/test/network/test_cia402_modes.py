@@ -27,8 +27,8 @@ from virtual_network import VirtualNetwork
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
-from arm_canopen.config.drive_model import DriveConfig, RecoveryPolicy
 from arm_canopen.config.model import NodeConfig
+from arm_canopen.config.model.drive import DriveConfig, RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode

@@ -11,7 +11,7 @@ import pytest
 from virtual_network import VirtualNetwork
 
 from arm_canopen.config import load_eds
-from arm_canopen.config.eds_files import DEFAULT_DRIVE
+from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.dictionary import ObjectDictionary

@@ -11,7 +11,7 @@ import pytest
 from virtual_network import VirtualNetwork
 
 from arm_canopen.cia402.motion import Setpoint
-from arm_canopen.config.drive_model import DriveConfig
+from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import OperationMode

@@ -28,7 +28,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import Refusal, RefusalCause
 from arm_canopen.can.frame import Frame
-from arm_canopen.config.identity import Identity
+from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode

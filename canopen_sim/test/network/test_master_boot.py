@@ -12,8 +12,8 @@ import pytest
 from scripted_device import PRE_OPERATIONAL, RESET_COMMUNICATION, ScriptedDevice, START
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.identity import Identity
 from arm_canopen.config.model import NodeConfig
+from arm_canopen.config.model.identity import Identity
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.remote_node import BootPhase, RemoteNode
 from arm_canopen.standard.dictionary import AccessType, ObjectDictionary

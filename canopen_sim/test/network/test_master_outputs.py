@@ -21,8 +21,8 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import NodeConfig
+from arm_canopen.config.model.checks import check_bus
 from arm_canopen.exceptions import CanopenError, CodecError
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand

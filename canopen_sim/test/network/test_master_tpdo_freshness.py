@@ -15,10 +15,10 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import RefusalCause
 from arm_canopen.config import load_bus
-from arm_canopen.config.boot_plan import boot_writes
-from arm_canopen.config.checks import check_bus
 from arm_canopen.config.model import BusConfig, NodeConfig, SourceLocation
-from arm_canopen.config.tpdo_freshness import with_event_timer
+from arm_canopen.config.model.boot_plan import boot_writes
+from arm_canopen.config.model.checks import check_bus
+from arm_canopen.config.model.tpdo_freshness import with_event_timer
 from arm_canopen.master.events import Severity
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
 from arm_canopen.standard.dictionary import ObjectDictionary

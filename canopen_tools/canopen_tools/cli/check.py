@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
-from arm_canopen.config.checks import check_file
-from arm_canopen.config.drive_units import AxisUnits
-from arm_canopen.config.traffic import LoadEstimate, Traffic
+from arm_canopen.config import check_file
+from arm_canopen.config.model.checks.drive_units import AxisUnits
+from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
 
 from .arguments import bitrate, SubParsers
 from .output import counted, print_line, print_problem, print_table, RED, YELLOW

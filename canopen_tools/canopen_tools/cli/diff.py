@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.boot_plan import BootWrite, consumer_to_read, HeldConsumers
+from arm_canopen.config.model.boot_plan import BootWrite, consumer_to_read, HeldConsumers
 from arm_canopen.exceptions import SdoAbortError
 from arm_canopen.standard.objects import Index
 from arm_canopen.standard.sdo_abort import abort_text

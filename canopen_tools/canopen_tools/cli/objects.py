@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.object_text import bytes_from_text, text_from_bytes
+from arm_canopen.config.read.object_text import bytes_from_text, text_from_bytes
 from arm_canopen.exceptions import CodecError, SdoAbortError
 from arm_canopen.standard.datatypes import byte_length, DataType
 from arm_canopen.standard.dictionary import ObjectEntry

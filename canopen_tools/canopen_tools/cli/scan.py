@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 
 from arm_canopen.can import Frame, open_bus
 from arm_canopen.config import load_bus
-from arm_canopen.config.identity import Identity
 from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import SdoError
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.nmt import NmtState

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cache
 
 from arm_canopen.config import load_bus, load_eds
-from arm_canopen.config.eds_files import DEFAULT_DRIVE
 from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.exceptions import ObjectError
 from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.datatypes import DataType

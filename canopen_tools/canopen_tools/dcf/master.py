@@ -12,16 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
-from arm_canopen.config.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.shared_keys import (
-    HUNDRED_MICROSECONDS,
-    KILOBIT,
-    MICROSECONDS,
-    MILLISECONDS,
-    U16_MAX,
-)
+from arm_canopen.config.model.master import MasterConfig
+from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
+from arm_canopen.config.read.shared_keys import U16_MAX
+from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
 from arm_canopen.standard.datatypes import DataType

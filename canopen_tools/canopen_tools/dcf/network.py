@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from arm_canopen.config.master_model import MasterConfig
 from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.config.shared_keys import MILLISECONDS
+from arm_canopen.config.model.master import MasterConfig
+from arm_canopen.config.units import MILLISECONDS
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import AccessType, ObjectCode
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
-from arm_canopen.config.eds import Eds, load_eds, read_eds_text
-from arm_canopen.config.eds_ini import IniFile, IniSection, read_ini
 from arm_canopen.config.findings import Findings, Place
+from arm_canopen.config.read.eds import Eds, load_eds, read_eds_text
+from arm_canopen.config.read.eds_ini import IniFile, IniSection, read_ini
 from arm_canopen.exceptions import ConfigError, Problem
 from arm_canopen.standard.datatypes import bit_length
 from arm_canopen.standard.device_profile import is_drive

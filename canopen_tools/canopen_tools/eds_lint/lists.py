@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from arm_canopen.config.eds_ini import IniFile, IniSection
-from arm_canopen.config.eds_values import parse_integer
 from arm_canopen.config.findings import Findings, Place
-from arm_canopen.config.pdo_direction import Direction, RPDO, TPDO
+from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
+from arm_canopen.config.read.eds_ini import IniFile, IniSection
+from arm_canopen.config.read.eds_values import parse_integer
 from arm_canopen.standard.dictionary import object_address, ObjectDictionary
 from arm_canopen.standard.objects import Index
 

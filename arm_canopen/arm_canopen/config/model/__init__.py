@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The typed model of a bus in SI units: what the master runs, the checks look at and boot writes.
+
+It is made of plain values, and imports nothing that reads files.
+"""
+
+from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
+from .drive import DriveConfig, RecoveryPolicy
+from .identity import Identity
+from .master import MasterConfig
+
+__all__ = [
+    'BusConfig',
+    'DriveConfig',
+    'Identity',
+    'MasterConfig',
+    'NodeConfig',
+    'PdoConfig',
+    'RecoveryPolicy',
+    'SdoWrite',
+    'SourceLocation',
+]

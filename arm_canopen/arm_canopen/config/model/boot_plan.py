@@ -1,0 +1,386 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is written to a device at boot, and what it holds then: the one list of all that need it.
+
+Boot downloads :func:`boot_writes`, and a DCF holds them; take-over and ``canopen diff`` compare
+:func:`held_after_boot`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ...standard.datatypes import DataType, encode
+from ...standard.dictionary import object_address
+from ...standard.nmt import ConsumerHeartbeatTime
+from ...standard.objects import Index, PDO_COUNT_MAX
+from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
+from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
+from .pdo_direction import Direction, RPDO, TPDO
+from .tpdo_freshness import EVENT_TIMER_SUBINDEX
+
+COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
+"""Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
+BEFORE_PDOS = (Index.TIME_COB_ID, Index.ERROR_BEHAVIOUR)
+"""Objects whose keys of their own are written before the PDOs, as dcfgen does."""
+ERROR_CONTROL = (
+    (Index.PRODUCER_HEARTBEAT, DataType.UNSIGNED16, 'heartbeat_producer'),
+    (Index.GUARD_TIME, DataType.UNSIGNED16, 'guard_time'),
+    (Index.LIFE_TIME_FACTOR, DataType.UNSIGNED8, 'life_time_factor'),
+)
+WATCH_KEY = 'heartbeat_consumer'
+TIMER_KEY = 'event_timer'
+HeldConsumers = Mapping[int, int | None]
+"""What a device holds in its entries of 0x1016, by sub-index; None where it refuses to be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class BootWrite:
+    """An object that is written to a device at boot.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: Its value as an SDO carries it.
+        key: Key of bus.yml, or file, that it comes from.
+        requested: bus.yml has it; a refusal of other writes is no error.
+        mask: Bits that count, None for all; the device keeps the others.
+        temporary: It makes room for the writes that follow, and does not stay.
+        unless_default: An exported DCF leaves it out where the EDS has it as default.
+        fixed: The device has it for good, so it is not written.
+    """
+
+    index: int
+    subindex: int
+    data: bytes
+    key: str
+    requested: bool = True
+    mask: int | None = None
+    temporary: bool = False
+    unless_default: bool = False
+    fixed: bool = False
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Index and sub-index."""
+        return self.index, self.subindex
+
+    @property
+    def place(self) -> str:
+        """The object, for messages."""
+        return object_address(self.index, self.subindex)
+
+    @property
+    def is_own_timer(self) -> bool:
+        """Whether it sets the event timer of a TPDO without a request of bus.yml."""
+        number = self.index - TPDO.communication
+        is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
+        return is_timer and not self.requested
+
+    def text(self, held: bytes | None = None) -> str:
+        """Write the bits that count as a hexadecimal number: its own, or those of a device."""
+        data = self.data if held is None else held
+        value = int.from_bytes(data, 'little') & (self.mask if self.mask is not None else -1)
+        return f'0x{value:0{2 * len(self.data)}X}'
+
+    def over(self, present: int) -> bytes:
+        """Return the data with the bits that do not count as they are in a present value."""
+        if self.mask is None:
+            return self.data
+        value = present & ~self.mask | int.from_bytes(self.data, 'little') & self.mask
+        return value.to_bytes(len(self.data), 'little')
+
+    def fits(self, held: bytes) -> bool:
+        """Return whether a value of the device is what is wanted; padding does not matter."""
+        if len(self.data) <= 4 and len(held) == 4:
+            held = held[: len(self.data)]
+        if self.mask is None or len(held) != len(self.data):
+            return held == self.data
+        return self.over(int.from_bytes(held, 'little')) == held
+
+
+def boot_writes(
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
+) -> list[BootWrite]:
+    """Return everything that is written to a device at boot, in this order.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        consumers: What the device holds in 0x1016, read while :func:`consumer_to_read` names an
+            entry; None: as in its EDS.
+    """
+    return list(_Plan(bus, node, consumers).writes())
+
+
+def held_after_boot(
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
+) -> list[BootWrite]:
+    """Return what the device holds after its boot: what was written, and mappings that it has.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        consumers: As with :func:`boot_writes`.
+    """
+    writes = [*_fixed_mappings(node), *boot_writes(bus, node, consumers)]
+    return list({write.address: write for write in writes}.values())  # the last one counts
+
+
+def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
+    """Return whether bus.yml has a key of a device; a bus that was built by a program has all."""
+    return not bus.locations or (node.name, *keys) in bus.locations
+
+
+def consumer_to_read(bus: BusConfig, node: NodeConfig, held: HeldConsumers) -> int | None:
+    """Return the entry of 0x1016 that has to be read next; None when the master's is known.
+
+    Args:
+        bus: The bus.
+        node: The device.
+        held: What was read so far.
+    """
+    for subindex in _watch_slots(bus, node):
+        if subindex not in held:
+            return subindex
+        if held[subindex] is None or _is_free(held, subindex, bus.master.node_id):
+            return None  # entries behind one that cannot be read are promised by the EDS only
+    return None
+
+
+def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
+    """Return the entries of 0x1016 that may be the master's: no file has another use for them."""
+    others = {w.subindex for w in node.sdo_writes if w.index == Index.CONSUMER_HEARTBEAT}
+    for subindex, word in _consumers_of_dcf(node).items():
+        if not _is_free_word(word, bus.master.node_id):
+            others.add(subindex)
+    return [
+        entry.subindex
+        for entry in node.dictionary.subindices(Index.CONSUMER_HEARTBEAT)
+        if entry.subindex and entry.access.writable and entry.subindex not in others
+    ]
+
+
+def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
+    """Return whether the master may use an entry of 0x1016 of a device.
+
+    The first entry counts as free where it cannot be read.
+    """
+    word = held.get(subindex)
+    return subindex == 1 if word is None else _is_free_word(word, master_id)
+
+
+def _is_free_word(word: int, master_id: int) -> bool:
+    """Return whether an entry of 0x1016 is unused, or the master's."""
+    entry = ConsumerHeartbeatTime.parse(word)
+    return entry.node_id == master_id or not entry.used
+
+
+def watch_word(bus: BusConfig, node: NodeConfig) -> int:
+    """Return what the entry of 0x1016 for the master shall hold; 0 for not to watch it."""
+    time = round(bus.master.heartbeat_timeout * MILLISECONDS)
+    watched = node.heartbeat_consumer and time
+    return ConsumerHeartbeatTime(bus.master.node_id, time).word if watched else 0
+
+
+class _Plan:
+    """Lists the writes for one device."""
+
+    def __init__(self, bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None) -> None:
+        self._bus = bus
+        self._node = node
+        self._consumers = _eds_consumers(bus, node) if consumers is None else consumers
+
+    def writes(self) -> Iterator[BootWrite]:
+        node = self._node
+        yield from map(_written, node.parameter_writes)
+        yield from self._watch()
+        yield from self._error_control()
+        leading = 0
+        while leading < len(node.sdo_writes) and node.sdo_writes[leading].index in BEFORE_PDOS:
+            leading += 1
+        for write in node.sdo_writes[:leading]:
+            yield _written(write, unless_default=True)
+        for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+            for pdo in pdos:
+                if pdo.configured:
+                    yield from self._pdo(direction, pdo)
+                elif pdo.event_time is not None:
+                    yield from self._event_timer(direction, pdo)
+        yield from map(_written, node.sdo_writes[leading:])
+
+    def _watch(self) -> Iterator[BootWrite]:
+        """Have the device watch the master, or no longer, in the first entry that is free."""
+        master_id = self._bus.master.node_id
+        entries = {**self._consumers, **_consumers_of_dcf(self._node)}  # which was written before
+        slots = [sub for sub in _watch_slots(self._bus, self._node) if sub in entries]
+        slot = next((sub for sub in slots if _is_free(entries, sub, master_id)), 0)
+        word = watch_word(self._bus, self._node)
+        own = ConsumerHeartbeatTime.parse(entries.get(slot) or 0).node_id == master_id
+        if slot and (word or own):
+            yield _number(
+                (Index.CONSUMER_HEARTBEAT, slot),
+                word,
+                DataType.UNSIGNED32,
+                WATCH_KEY,
+                requested=is_requested(self._bus, self._node, WATCH_KEY),
+            )
+
+    def _error_control(self) -> Iterator[BootWrite]:
+        """Set the heartbeat of the device, and node guarding (CiA 301, 7.2.8)."""
+        node = self._node
+        values = {
+            Index.PRODUCER_HEARTBEAT: round(node.heartbeat_producer * MILLISECONDS),
+            Index.GUARD_TIME: round(node.guard_time * MILLISECONDS),
+            Index.LIFE_TIME_FACTOR: node.life_time_factor,
+        }
+        for index, data_type, key in ERROR_CONTROL:
+            entry = node.dictionary.get(index)
+            if entry is None or not entry.access.writable:
+                continue
+            heartbeat = index is Index.PRODUCER_HEARTBEAT
+            if heartbeat or node.uses_node_guarding or values[index] != (entry.default or 0):
+                yield _number(
+                    (index, 0),
+                    values[index],
+                    data_type,
+                    key,
+                    requested=is_requested(self._bus, node, key),
+                    unless_default=True,
+                )
+
+    def _pdo(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        """Configure a PDO: disable, parameters, mapping, enable (CiA 301, 7.5.2.36)."""
+        cob_id = (direction.communication + pdo.number - 1, 1)
+        key = f'{direction.name}.{pdo.number}'
+        unsigned = DataType.UNSIGNED32
+        is_given = self._is_given(direction, pdo, 'cob_id')
+        yield _number(
+            cob_id,
+            pdo.cob_id | COB_ID_INVALID,
+            unsigned,
+            f'{key}.cob_id' if pdo.enabled else f'{key}.enabled',
+            requested=is_given or not pdo.enabled,
+            mask=COB_ID_INVALID,
+            temporary=pdo.enabled,
+            unless_default=True,
+        )
+        if not pdo.enabled:
+            return
+        yield from self._parameters(direction, pdo)
+        if not pdo.fixed_mapping:
+            yield from self._mapping(direction, pdo)
+        yield _number(
+            cob_id, pdo.cob_id, unsigned, f'{key}.cob_id', requested=is_given, mask=COB_ID_BITS
+        )
+
+    def _event_timer(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        """Set the event timer alone of a TPDO that is otherwise left as the device has it."""
+        for write in self._parameters(direction, pdo):
+            if write.subindex == EVENT_TIMER_SUBINDEX:
+                yield write
+
+    def _parameters(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        index = direction.communication + pdo.number - 1
+        deadline = TIMER_KEY if direction is TPDO else 'event_deadline'
+        event_time = _units(pdo.event_time, MILLISECONDS)
+        for subindex, name, data_type, value in (
+            (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
+            (3, 'inhibit_time', DataType.UNSIGNED16, _units(pdo.inhibit_time)),
+            (EVENT_TIMER_SUBINDEX, deadline, DataType.UNSIGNED16, event_time),
+            (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
+        ):
+            if value is not None:
+                yield _number(
+                    (index, subindex),
+                    value,
+                    data_type,
+                    f'{direction.name}.{pdo.number}.{name}',
+                    requested=self._is_given(direction, pdo, name),
+                    unless_default=True,
+                )
+
+    def _mapping(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+        index = direction.mapping + pdo.number - 1
+        key = f'{direction.name}.{pdo.number}.mapping'
+        given = self._is_given(direction, pdo, 'mapping')
+        count, unsigned = len(pdo.mapping), DataType.UNSIGNED32
+        yield _number((index, 0), 0, DataType.UNSIGNED8, key, requested=given, temporary=count > 0)
+        for subindex, mapped in enumerate(pdo.mapping, start=1):
+            yield _number((index, subindex), mapped.word, unsigned, key, requested=given)
+        if count:
+            yield _number((index, 0), count, DataType.UNSIGNED8, key, requested=given)
+
+    def _is_given(self, direction: Direction, pdo: PdoConfig, key: str) -> bool:
+        """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
+        if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
+            return True
+        if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
+            index = direction.communication + pdo.number - 1
+            entry = self._node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
+            return entry is not None and entry.configured
+        objects = direction.mapping if key == 'mapping' else direction.communication
+        return self._node.dictionary.is_configured(objects + pdo.number - 1)
+
+
+def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
+    """Return the entries of 0x1016 that are written from a DCF, before that for the master."""
+    return {
+        write.subindex: int.from_bytes(write.data, 'little')
+        for write in node.parameter_writes
+        if write.index == Index.CONSUMER_HEARTBEAT
+    }
+
+
+def _eds_consumers(bus: BusConfig, node: NodeConfig) -> dict[int, int]:
+    entries = {
+        subindex: node.dictionary.get(Index.CONSUMER_HEARTBEAT, subindex)
+        for subindex in _watch_slots(bus, node)
+    }
+    return {
+        subindex: entry.default if entry is not None and isinstance(entry.default, int) else 0
+        for subindex, entry in entries.items()
+    }
+
+
+def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
+    """Yield the mappings that a device has for good, which are not written."""
+    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+        for pdo in pdos:
+            if pdo.configured and pdo.enabled and pdo.fixed_mapping:
+                index, key = direction.mapping + pdo.number - 1, f'{direction.name}.{pdo.number}'
+                yield _number((index, 0), len(pdo.mapping), DataType.UNSIGNED8, key, fixed=True)
+                for subindex, mapped in enumerate(pdo.mapping, start=1):
+                    address, word = (index, subindex), mapped.word
+                    yield _number(address, word, DataType.UNSIGNED32, key, fixed=True)
+
+
+def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:
+    key = _key(write.location)
+    return BootWrite(write.index, write.subindex, write.data, key, unless_default=unless_default)
+
+
+def _key(location: SourceLocation) -> str:
+    return f'{location.key} (line {location.line})' if location.line else location.key or 'bus.yml'
+
+
+def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:
+    return None if time is None else round(time * per_second)
+
+
+def _number(  # the fields of a record
+    address: tuple[int, int],
+    value: int,
+    data_type: DataType,
+    key: str,
+    *,
+    requested: bool = True,
+    mask: int | None = None,
+    temporary: bool = False,
+    unless_default: bool = False,
+    fixed: bool = False,
+) -> BootWrite:
+    data = encode(data_type, value)
+    return BootWrite(*address, data, key, requested, mask, temporary, unless_default, fixed)

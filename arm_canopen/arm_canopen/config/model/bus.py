@@ -1,0 +1,262 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The typed model of a bus: bus.yml and the EDS files, checked and in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ...exceptions import CodecError, Problem
+from ...standard.datatypes import DataType, decode, Value
+from ...standard.dictionary import object_address, ObjectDictionary
+from ...standard.objects import AXIS_OFFSET, COMMANDS
+from ...standard.pdo import MappedObject
+from .drive import DriveConfig
+from .identity import ANY_DEVICE, Identity
+from .master import MasterConfig
+
+SDO_TIMEOUT = 0.2  # [s] not the 20 ms of ros2_canopen, which many devices exceed
+BOOT_TIMEOUT = 1.0  # [s]
+POLL_PERIOD = 0.01  # [s]
+RETRY_FACTOR = 3
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLocation:
+    """Where something stands in bus.yml.
+
+    Attributes:
+        line: Line, from 1; 0 when it is not known.
+        key: Path of the key, such as ``defaults.tpdo.1.mapping``.
+    """
+
+    line: int = 0
+    key: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class PdoConfig:
+    """One PDO of a device, named from the device's side.
+
+    Attributes:
+        number: 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on.
+        enabled: The PDO exists (bit 31 of its COB-ID is clear).
+        cob_id: Its 11-bit CAN identifier; 0 when it is disabled and has none.
+        transmission: Transmission type 0 to 255 (CiA 301, tables 69 and 71).
+        inhibit_time: Shortest time between two transmissions in [s]; None leaves the device's.
+        event_time: Event timer of a TPDO, deadline of an RPDO in [s]; None leaves the device's.
+        sync_start: SYNC counter value at which it starts; None leaves the device's.
+        mapping: The mapped objects.
+        configured: bus.yml names this PDO, so the master writes it at boot.
+        fixed_mapping: The device's mapping is read-only (and equal to ``mapping``).
+    """
+
+    number: int
+    enabled: bool
+    cob_id: int
+    transmission: int
+    inhibit_time: float | None = None
+    event_time: float | None = None
+    sync_start: int | None = None
+    mapping: tuple[MappedObject, ...] = ()
+    configured: bool = False
+    fixed_mapping: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SdoWrite:
+    """An object to be written at boot.
+
+    Attributes:
+        index: Object index.
+        subindex: Sub-index.
+        data: The value as it is sent.
+        location: Where bus.yml has it.
+    """
+
+    index: int
+    subindex: int
+    data: bytes
+    location: SourceLocation = field(default=SourceLocation(), compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class NodeConfig:
+    """A device of the bus.
+
+    Attributes:
+        name: Key in bus.yml; also the name of its ROS node.
+        node_id: CANopen node id, 1 to 127.
+        driver: Driver class as bus.yml names it, e.g. ``ros2_canopen::Cia402Driver``.
+        namespace: ROS namespace, empty for none.
+        remappings: ROS remappings, from name to name.
+        eds: The EDS or DCF file.
+        dictionary: Its objects, defaults resolved for this node id.
+        identity: Expected identity.
+        heartbeat_producer: Period of the device's heartbeat in [s], as bus.yml or else the EDS
+            says; 0 for none.
+        heartbeat_timeout: How long the master waits for a heartbeat in [s]; 0 for no supervision.
+        heartbeat_consumer: The device shall watch the master's heartbeat; it then has 0x1016 and
+            the master sends one.
+        guard_time: Period of node guarding in [s]; 0 for none.
+        life_time_factor: Guard times after which either side takes the other for lost.
+        retry_factor: Missing answers after which a guarded device counts as lost.
+        boot: The master checks and configures the device; false leaves it alone, and it is taken
+            as it is.
+        mandatory: The network is not operational without it.
+        reset_communication: The device may be reset at boot; false keeps a running one alive.
+        restore_configuration: Sub-index of 0x1011 by which defaults are restored at boot, 0 for
+            none.
+        sdo_timeout: How long an SDO answer may take in [s].
+        boot_timeout: How long one boot attempt waits for the device in [s].
+        poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
+        tpdos: All TPDOs of the device, by ascending number.
+        rpdos: All RPDOs of the device, by ascending number.
+        sdo_writes: ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the
+            order of writing.
+        parameter_writes: What its DCF wants written before all else: ParameterValues that are
+            not the defaults.
+        axes: The axes of a CiA 402 drive, by ascending channel.
+        line: Line of bus.yml at which the node begins.
+    """
+
+    name: str
+    node_id: int
+    driver: str
+    eds: Path
+    dictionary: ObjectDictionary
+    namespace: str = ''
+    remappings: dict[str, str] = field(default_factory=dict)
+    identity: Identity = ANY_DEVICE
+    heartbeat_producer: float = 0.0
+    heartbeat_timeout: float = 0.0
+    heartbeat_consumer: bool = False
+    guard_time: float = 0.0
+    life_time_factor: int = 0
+    retry_factor: int = RETRY_FACTOR
+    boot: bool = True
+    mandatory: bool = False
+    reset_communication: bool = True
+    restore_configuration: int = 0
+    sdo_timeout: float = SDO_TIMEOUT
+    boot_timeout: float = BOOT_TIMEOUT
+    poll_period: float = POLL_PERIOD
+    tpdos: tuple[PdoConfig, ...] = ()
+    rpdos: tuple[PdoConfig, ...] = ()
+    sdo_writes: tuple[SdoWrite, ...] = ()
+    parameter_writes: tuple[SdoWrite, ...] = ()
+    axes: tuple[DriveConfig, ...] = (DriveConfig(),)
+    line: int = 0
+
+    def write_of(self, index: int, subindex: int) -> SdoWrite | None:
+        """Return the last write of an object in bus.yml."""
+        for write in reversed(self.sdo_writes):
+            if (write.index, write.subindex) == (index, subindex):
+                return write
+        return None
+
+    def value_after_boot(
+        self, index: int, subindex: int = 0, data_type: DataType | None = None
+    ) -> Value | None:
+        """Return what an object holds after boot by the files; None where no file has it.
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            data_type: Its type where the EDS does not have it.
+
+        Raises:
+            CodecError: What is written to it at boot does not fit its type.
+        """
+        entry = self.dictionary.get(index, subindex)
+        write = self.write_of(index, subindex)
+        known_type = entry.data_type if entry is not None else data_type
+        if write is not None and known_type is not None:
+            try:
+                return decode(known_type, write.data)
+            except CodecError as error:
+                place = object_address(index, subindex)
+                raise CodecError(f'{self.name}: the write of {place} at boot: {error}') from None
+        return None if entry is None else entry.default
+
+    @property
+    def uses_node_guarding(self) -> bool:
+        """The master requests its NMT state; never together with a heartbeat (CiA 301)."""
+        return self.guard_time > 0.0 and not self.heartbeat_producer
+
+    @property
+    def drive(self) -> DriveConfig:
+        """The first axis, which is the only one of most drives."""
+        return self.axes[0]
+
+    @property
+    def is_lifecycle(self) -> bool:
+        """Its node is a lifecycle node."""
+        return 'Lifecycle' in self.driver
+
+    @property
+    def commanded_indices(self) -> frozenset[int]:
+        """Objects that the driver of the device writes in each cycle."""
+        if not self.is_drive:
+            return frozenset()
+        return frozenset(
+            index + AXIS_OFFSET * axis.channel for axis in self.axes for index in COMMANDS
+        )
+
+    @property
+    def is_drive(self) -> bool:
+        """The device is driven by the CiA 402 driver."""
+        return 'Cia402' in self.driver
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that it drives: its own, or those of its channels."""
+        return tuple(axis.name for axis in self.axes) if self.is_drive else ()
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """A whole bus.
+
+    Attributes:
+        file: The bus.yml that it was read from.
+        master: The master.
+        nodes: The devices in the order of the file.
+        warnings: What was odd but could be understood.
+        locations: Where each key stands, by the names that lead to it: ``('master', 'node_id')``,
+            ``('joint1', 'tpdo', '1', 'mapping')``; defaults belong to every device.
+    """
+
+    file: Path
+    master: MasterConfig
+    nodes: tuple[NodeConfig, ...]
+    warnings: tuple[Problem, ...] = ()
+    locations: Mapping[tuple[str, ...], SourceLocation] = field(
+        default_factory=dict, compare=False
+    )
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all joints that its drives have, in the order of the file."""
+        return tuple(joint for node in self.nodes for joint in node.joints)
+
+    def place_of(self, *names: str) -> SourceLocation:
+        """Return where a key stands, or else the nearest thing around it that does."""
+        for length in range(len(names), 0, -1):
+            if (location := self.locations.get(names[:length])) is not None:
+                return location
+        return SourceLocation()
+
+    def node(self, name: str) -> NodeConfig:
+        """Return a device by name.
+
+        Raises:
+            KeyError: No such device; the message lists those that exist.
+        """
+        for node in self.nodes:
+            if node.name == name:
+                return node
+        names = ', '.join(node.name for node in self.nodes)
+        raise KeyError(f'no device {name!r} in {self.file}; it has: {names}')

@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What 1.0 of a target means for each drive, and by which rule; and units that move nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+
+from ....standard.dictionary import object_address
+from ....standard.drive import OperationMode
+from ....standard.objects import AXIS_OFFSET, Index
+from ...findings import Findings
+from ..boot_plan import is_requested
+from ..bus import BusConfig, NodeConfig
+from ..drive import DriveConfig
+from ..factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from .subject import Subject
+
+POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
+FACTOR_KEY = 'scale_from_factor_group'
+POSITION_TOLERANCE = 0.01
+"""User units (rad, m) by which a position may miss its target because increments are whole."""
+COARSE_SCALE = 1.0
+"""Device units per user unit of velocity below which more than half a user unit becomes 0."""
+POSITION_MAX = 2**31 - 1  # [inc] of 0x6064, an INTEGER32
+SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
+
+
+class UnitRule(Enum):
+    """Where the scale of an axis comes from; the value is how a person reads it."""
+
+    BUS_YML = f'{POSITION_KEY} of bus.yml'
+    UPSTREAM = f'default of ros2_canopen (no {POSITION_KEY})'
+    FACTOR_GROUP = 'factor group of the EDS (0x608F, 0x6091, 0x6092)'
+
+
+@dataclass(frozen=True, slots=True)
+class AxisUnits:
+    """What 1.0 means for an axis.
+
+    Attributes:
+        name: Name of the axis.
+        rule: Where its scale comes from.
+        increments: Position increments of 1.0; 0 when it is unknown.
+        velocity: Device velocity units of 1.0 per second.
+        radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
+            does not have it.
+    """
+
+    name: str
+    rule: UnitRule
+    increments: float
+    velocity: float
+    radians: float | None
+
+
+def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
+    """Return what 1.0 means for an axis of a drive."""
+    factors = _factor_group(subject, axis)
+    rule, increments, velocity = UnitRule.BUS_YML, axis.scale_pos_to_dev, axis.scale_vel_to_dev
+    if axis.scale_from_factor_group:
+        rule = UnitRule.FACTOR_GROUP
+        increments, velocity = factors.position_scale, factors.velocity_scale
+    elif increments == DriveConfig().scale_pos_to_dev and not (
+        subject.bus.locations and is_requested(subject.bus, subject.node, POSITION_KEY)
+    ):
+        rule = UnitRule.UPSTREAM
+    per_radian = factors.position_scale
+    radians = increments / per_radian if per_radian else None
+    return AxisUnits(axis.name or subject.node.name, rule, increments, velocity, radians)
+
+
+def reported_increments(
+    bus: BusConfig, node: NodeConfig, axis: DriveConfig, position: float
+) -> int:
+    """Return what an axis reports in 0x6064 at a position, in [inc].
+
+    Args:
+        bus: The bus.
+        node: A drive on it.
+        axis: One of its axes.
+        position: A position in user units.
+
+    Raises:
+        ValueError: It is not a number, or does not fit 0x6064 (INTEGER32).
+    """
+    per_increment = axis.scale_pos_from_dev
+    if axis.scale_from_factor_group:
+        per_increment = 1.0 / axis_units(Subject(bus, node, Findings()), axis).increments
+    scaled = (position - axis.offset_pos_from_dev) / per_increment
+    if not -POSITION_MAX - 1 <= scaled <= POSITION_MAX:
+        raise ValueError(
+            f'{axis.name}: position {position:g} is {scaled:g} increments, and 0x6064 is an '
+            'INTEGER32'
+        )
+    return round(scaled)
+
+
+def check_units(subject: Subject) -> None:
+    """Warn of units by which targets move nothing, or another distance than was meant."""
+    for axis in subject.node.axes if subject.node.is_drive else ():
+        units = axis_units(subject, axis)
+        if units.rule is UnitRule.FACTOR_GROUP and not units.increments:
+            subject.findings.error(
+                subject.place(FACTOR_KEY),
+                'the EDS has no factor group: neither 0x6092 (feed constant) nor 0x608F (encoder '
+                'resolution) says how far an increment is',
+                f'write {POSITION_KEY} and the other scales instead',
+            )
+            continue
+        _check_coarse(subject, units)
+        _check_against_factors(subject, units)
+        _check_profile_velocity(subject, axis)
+
+
+def _check_coarse(subject: Subject, units: AxisUnits) -> None:
+    for key, scale, what, refused in (
+        (POSITION_KEY, units.increments, 'position', 'targets between them are refused'),
+        (VELOCITY_KEY, units.velocity, 'velocity', 'targets below half of that are refused'),
+    ):
+        coarse = is_coarse(scale) if key == POSITION_KEY else abs(scale) < COARSE_SCALE
+        if coarse:
+            subject.findings.warning(
+                subject.place(key),
+                f'{units.name}: 1.0 is {scale:g} device units of {what}, so one of them is '
+                f'{1 / abs(scale):g} user units: {refused}',
+                f'correct {key}: it is device units per user unit (ros2_canopen has 1000), the '
+                'inverse of the one from the device',
+            )
+
+
+def is_coarse(scale: float) -> bool:
+    """Whether whole increments miss positions by more than the tolerance.
+
+    Args:
+        scale: Increments per user unit.
+    """
+    return 0.5 / abs(scale) > POSITION_TOLERANCE
+
+
+def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
+    """Say when the default of ros2_canopen is not what the drive takes for a radian."""
+    if units.rule is UnitRule.UPSTREAM and units.radians is not None:
+        if math.isclose(units.radians, 1.0, rel_tol=SAME_SCALE):
+            return
+        subject.findings.warning(
+            subject.place(POSITION_KEY),
+            f'{units.name}: without {POSITION_KEY} 1.0 is {units.increments:g} increments, as '
+            f'with ros2_canopen; by the factor group of the EDS they are {units.radians:.4g} rad',
+            f"write {POSITION_KEY} and the other scales, or '{FACTOR_KEY}: true' for radians",
+        )
+
+
+def _check_profile_velocity(subject: Subject, axis: DriveConfig) -> None:
+    index = Index.PROFILE_VELOCITY + AXIS_OFFSET * axis.channel
+    written = subject.node.write_of(index, 0) is not None
+    is_used = axis.position_mode == OperationMode.PROFILE_POSITION
+    if subject.value(index) == 0 and (is_used or (written and axis.position_mode is None)):
+        subject.findings.warning(
+            subject.object_place(index, 0),
+            f'{object_address(index)} (profile velocity) is 0: in mode 1 the drive would not '
+            'move, so its targets are refused',
+            'write the speed of its moves, in velocity units of the drive',
+        )
+
+
+def _factor_group(subject: Subject, axis: DriveConfig) -> FactorGroup:
+    offset = AXIS_OFFSET * axis.channel
+    return FactorGroup(
+        **{
+            name: ratio(subject.value(index + offset, 1), subject.value(index + offset, 2))
+            for name, index in FACTOR_OBJECTS.items()
+        }
+    )

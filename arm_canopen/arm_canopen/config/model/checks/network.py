@@ -1,0 +1,271 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of what devices and master expect of each other: heartbeats, SYNC, identifiers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+import math
+
+from ....standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
+from ....standard.dictionary import object_address
+from ....standard.nmt import ConsumerHeartbeatTime
+from ....standard.objects import Index
+from ...findings import Findings, Place
+from ...units import MICROSECONDS, MILLISECONDS
+from ..boot_plan import boot_writes, WATCH_KEY
+from ..bus import BusConfig
+from .subject import Subject
+
+LATE_FACTOR = 1.5  # heartbeat periods that a consumer has to wait at least
+CONSUMER_ENTRIES = range(1, 128)
+SDO_CHANNELS = range(1, 128)  # further SDO servers, 0x1201 to 0x127F
+
+
+def check_master(config: BusConfig, findings: Findings) -> None:
+    """Check the heartbeat of the master."""
+    master = config.master
+    producer, cycle = master.heartbeat_producer, master.cycle_period
+    if not producer:
+        findings.warning(
+            _master_place(config, 'heartbeat_producer'),
+            'the master sends no heartbeat: no device notices when it dies',
+            'write heartbeat_producer: 200',
+        )
+        return
+    real = math.ceil(producer / cycle - 1e-9) * cycle
+    if master.heartbeat_timeout < LATE_FACTOR * real:
+        findings.warning(
+            _master_place(config, 'heartbeat_producer'),
+            f'devices wait {master.heartbeat_timeout * 1e3:g} ms for the heartbeat of the master, '
+            f'which comes every {real * 1e3:g} ms (with a cycle): one that is late is a fault',
+            'take a larger heartbeat_multiplier, 3 is usual',
+        )
+
+
+def check_heartbeats(subject: Subject) -> None:
+    """Check who watches a device, and whom it watches."""
+    node = subject.node
+    producer = node.heartbeat_producer
+    if not producer and not node.uses_node_guarding:
+        subject.findings.warning(
+            subject.place('heartbeat_producer'),
+            'the device sends no heartbeat, and has no guard_time: nobody notices its loss',
+            'write heartbeat_producer: 100',
+        )
+    elif producer and not node.heartbeat_timeout:
+        subject.findings.warning(
+            _master_place(subject.bus, 'heartbeat_consumer'),
+            'the master does not watch the heartbeats of the devices',
+            'remove heartbeat_consumer: false',
+        )
+    elif producer and node.heartbeat_timeout < LATE_FACTOR * producer:
+        subject.findings.warning(
+            subject.place('heartbeat_multiplier'),
+            f'the master waits {node.heartbeat_timeout * 1e3:g} ms for a heartbeat that comes '
+            f'every {producer * 1e3:g} ms: one that is late counts as a loss',
+            'take a larger heartbeat_multiplier, 3 is usual',
+        )
+    _check_watches_master(subject)
+    _check_consumer_limit(subject)
+    _check_consumers(subject)
+
+
+def _check_watches_master(subject: Subject) -> None:
+    node = subject.node
+    if node.is_drive and subject.bus.master.heartbeat_producer and not node.heartbeat_consumer:
+        if node.dictionary.get(Index.CONSUMER_HEARTBEAT, 1) is None:
+            remedy = 'its EDS has no 0x1016:01; have an emergency stop that needs no bus'
+        elif node.reset_communication:
+            remedy = 'remove heartbeat_consumer: false'
+        else:  # reset_communication: false demands that
+            remedy = 'it waits for the next one to take it over; have an emergency stop'
+        what = 'the drive does not watch the master, and goes on when that dies'
+        subject.findings.warning(subject.place('heartbeat_consumer'), what, remedy)
+    elif node.is_drive and node.heartbeat_consumer and not node.reset_communication:
+        subject.findings.warning(
+            subject.place('reset_communication'),
+            'the drive shall be taken over as it runs, but watches the master: should that die, '
+            'it stops by itself, and there is nothing to take over',
+            'write heartbeat_consumer: false, or remove reset_communication: false',
+        )
+
+
+def _check_consumer_limit(subject: Subject) -> None:
+    """Compare what boot writes to 0x1016 with what the EDS says that the device takes."""
+    node = subject.node
+    for write in boot_writes(subject.bus, node):
+        entry = node.dictionary.get(*write.address)
+        value = int.from_bytes(write.data, 'little')
+        highest = entry.high_limit if entry is not None else None
+        if write.key == WATCH_KEY and highest is not None and value > highest:
+            subject.findings.warning(
+                subject.place(WATCH_KEY),
+                f'the device will refuse to watch the master: {write.place} takes at most '
+                f'0x{int(highest):X} by its EDS, and 0x{value:X} is written (node id in bits 16 '
+                'to 23, time in ms in bits 0 to 15)',
+                'make heartbeat_producer or heartbeat_multiplier of the master smaller, or write '
+                'heartbeat_consumer: false',
+            )
+
+
+def _check_consumers(subject: Subject) -> None:
+    """Check the entries of 0x1016 beside the first, which the master writes."""
+    bus = subject.bus
+    producers = {node.node_id: node.heartbeat_producer for node in bus.nodes}
+    producers[bus.master.node_id] = bus.master.heartbeat_producer
+    for subindex in CONSUMER_ENTRIES:
+        entry = subject.value(Index.CONSUMER_HEARTBEAT, subindex)
+        if not entry or (
+            subindex == 1 and subject.node.write_of(Index.CONSUMER_HEARTBEAT, 1) is None
+        ):
+            continue
+        consumer = ConsumerHeartbeatTime.parse(entry)
+        if not consumer.used:
+            continue
+        node_id, time = consumer.node_id, consumer.time_ms / MILLISECONDS
+        period = producers.get(node_id, 0.0)
+        if time >= LATE_FACTOR * period > 0:
+            continue
+        if node_id not in producers:
+            what = f'node {node_id}, which bus.yml does not have'
+        elif not period:
+            what = f'node {node_id}, which sends no heartbeat'
+        else:
+            what = f'node {node_id}, whose heartbeat comes every {period * 1e3:g} ms'
+        subject.findings.warning(
+            subject.object_place(Index.CONSUMER_HEARTBEAT, subindex),
+            f'the device waits {time * 1e3:g} ms for the heartbeat of {what}: it will take it for '
+            'lost',
+            'correct node id (bits 16 to 23) and time (bits 0 to 15, in ms), or remove the entry',
+        )
+
+
+def check_sync(subject: Subject) -> None:
+    """Check that device and master mean the same SYNC."""
+    master = subject.bus.master
+    sync = subject.value(Index.SYNC_COB_ID)
+    if sync is not None and sync & SYNC_PRODUCER:
+        subject.findings.error(
+            subject.object_place(Index.SYNC_COB_ID, 0),
+            f'the device sends SYNC itself (0x1005 is 0x{sync:08X}), the master does, too',
+            'write 0x80 to 0x1005',
+        )
+    elif sync is not None and sync & CAN_ID_MASK != CobId.SYNC:
+        subject.findings.warning(
+            subject.object_place(Index.SYNC_COB_ID, 0),
+            f'the device waits for SYNC on 0x{sync & CAN_ID_MASK:03X}, the master sends 0x080',
+            'write 0x80 to 0x1005',
+        )
+    if not master.sync_period:
+        return
+    period = subject.value(Index.CYCLE_PERIOD)
+    wanted = round(master.sync_period * MICROSECONDS)
+    if period and period != wanted:
+        subject.findings.warning(
+            subject.object_place(Index.CYCLE_PERIOD, 0),
+            f'the device expects SYNC every {period} us (0x1006), it comes every {wanted} us',
+            f'write {wanted} to 0x1006',
+        )
+    window = subject.value(Index.SYNC_WINDOW)
+    if window and window >= wanted:
+        subject.findings.warning(
+            subject.object_place(Index.SYNC_WINDOW, 0),
+            f'the synchronous window of {window} us (0x1007) is as long as the SYNC period',
+            f'take less than {wanted}',
+        )
+    overflow = subject.value(Index.SYNC_OVERFLOW)
+    if overflow is not None and overflow != master.sync_overflow:
+        subject.findings.warning(
+            subject.object_place(Index.SYNC_OVERFLOW, 0),
+            f'the device expects the SYNC counter to end at {overflow} (0x1019), the master '
+            f'counts to {master.sync_overflow}; 0 is a SYNC without counter',
+            f'write {master.sync_overflow} to 0x1019',
+        )
+
+
+def check_writes(subject: Subject) -> None:
+    """Warn about objects that are written twice with different values."""
+    last = {(w.index, w.subindex): w for w in subject.node.sdo_writes}
+    for write in subject.node.sdo_writes:
+        kept = last[write.index, write.subindex]
+        if write.data != kept.data and write.location.line:
+            subject.findings.warning(
+                Place(subject.bus.file, write.location.line, key=write.location.key),
+                f'{object_address(write.index, write.subindex)} is written again in line '
+                f'{kept.location.line} with another value',
+                'keep one of them, unless the device needs both in this order',
+            )
+
+
+def check_identifiers(subjects: Sequence[Subject]) -> None:
+    """Refuse identifiers that two services have, and services where the master does not look."""
+    owners: dict[int, tuple[str, Place]] = {}
+    for subject in subjects:
+        for direction, pdo in subject.pdos():
+            title = f'{direction.title} {pdo.number} of {subject.node.name}'
+            owners.setdefault(pdo.cob_id, (title, subject.pdo_place(direction, pdo, 'cob_id')))
+    for subject in subjects:
+        _check_emergency(subject)
+        _check_sdo_server(subject)
+        for cob_id, title, place in _services(subject):
+            other, where = owners.setdefault(cob_id, (title, place))
+            if other != title:
+                subject.findings.error(
+                    place,
+                    f'COB-ID 0x{cob_id:03X} of {title} is also that of {other} '
+                    f'(line {where.line})',
+                    'give each an identifier of its own',
+                )
+
+
+def _services(subject: Subject) -> Iterator[tuple[int, str, Place]]:
+    """Yield the services beside PDOs that bus.yml gives an identifier."""
+    name = subject.node.name
+    for index, subindex, title in (
+        (Index.EMCY_COB_ID, 0, f'EMCY of {name}'),
+        *(
+            (Index.SDO_SERVER + channel, part, f'SDO channel {channel + 1} of {name}')
+            for channel in SDO_CHANNELS
+            for part in (1, 2)
+        ),
+    ):
+        write = subject.node.write_of(index, subindex)
+        value = subject.value(index, subindex)
+        if write is not None and value is not None and not value & COB_ID_INVALID:
+            yield value & CAN_ID_MASK, title, subject.object_place(index, subindex)
+
+
+def _check_emergency(subject: Subject) -> None:
+    value = subject.value(Index.EMCY_COB_ID)
+    expected = CobId.EMCY + subject.node.node_id
+    # EDS files often leave out $NODEID, the device adds it
+    given = subject.node.write_of(Index.EMCY_COB_ID, 0) is not None
+    if value is None or value & CAN_ID_MASK == expected:
+        return
+    if given or value & CAN_ID_MASK not in (0, CobId.EMCY):
+        subject.findings.warning(
+            subject.object_place(Index.EMCY_COB_ID, 0),
+            f'the emergency messages of the device have COB-ID 0x{value & CAN_ID_MASK:03X} '
+            f'(0x1014), the master listens at 0x{expected:03X}',
+            f'write 0x{expected:X} to 0x1014',
+        )
+
+
+def _check_sdo_server(subject: Subject) -> None:
+    node_id = subject.node.node_id
+    bases = ((1, CobId.SDO_REQUEST), (2, CobId.SDO_RESPONSE))
+    for subindex, base in bases:
+        value = subject.value(Index.SDO_SERVER, subindex)
+        if value is not None and value & CAN_ID_MASK not in (0, base, base + node_id):
+            subject.findings.warning(
+                subject.object_place(Index.SDO_SERVER, subindex),
+                f'the SDO server has COB-ID 0x{value & CAN_ID_MASK:03X} by the EDS, the master '
+                f'takes 0x{base + node_id:03X}',
+                'correct 0x1200 in the EDS; devices have the pre-defined identifiers',
+            )
+
+
+def _master_place(config: BusConfig, key: str) -> Place:
+    location = config.place_of('master', key)
+    return Place(config.file, location.line, key=location.key)

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a bus will carry: every frame of a configuration with its rate, and the load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ....can.frame import PAYLOAD_MAX
+from ....can.load import frame_bits, stuff_bits_mean, stuff_bits_worst
+from ....standard.cob_id import CAN_ID_MASK, CobId
+from ....standard.pdo import SYNCHRONOUS_MAX
+from ...findings import Findings
+from ..bus import BusConfig, NodeConfig, PdoConfig
+from ..pdo_direction import Direction, TPDO
+from .subject import Subject
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Frames of one service.
+
+    Attributes:
+        device: Name of the device whose service it is, or of the master.
+        service: What they are: ``TPDO 1``, ``SYNC``, ``heartbeat``.
+        cob_id: Their identifier.
+        size: Length of the payload in [byte].
+        rate: Frames in [1/s].
+        reason: Why so many.
+    """
+
+    device: str
+    service: str
+    cob_id: int
+    size: int
+    rate: float
+    reason: str
+
+    @property
+    def bits(self) -> float:
+        """Bits on the bus in [bit/s], with the stuffing of random content."""
+        return self.rate * (frame_bits(self.size) + stuff_bits_mean(self.size))
+
+    @property
+    def bits_worst(self) -> float:
+        """Bits on the bus in [bit/s], with the most stuffing that is possible."""
+        return self.rate * (frame_bits(self.size) + stuff_bits_worst(self.size))
+
+
+@dataclass(frozen=True, slots=True)
+class LoadEstimate:
+    """What a bus will carry when every device is operational.
+
+    SDO, EMCY and NMT come on top; they are rare, and let everything cyclic pass.
+
+    Attributes:
+        bitrate: Bit rate in [bit/s].
+        traffic: All services with a rate.
+    """
+
+    bitrate: int
+    traffic: tuple[Traffic, ...]
+
+    @property
+    def frames_per_second(self) -> float:
+        """All frames in [1/s]."""
+        return sum(item.rate for item in self.traffic)
+
+    @property
+    def load(self) -> float:
+        """Share of the time that the bus is busy, with the stuffing of random content."""
+        return sum(item.bits for item in self.traffic) / self.bitrate
+
+    @property
+    def load_worst(self) -> float:
+        """The same with the most stuffing that is possible."""
+        return sum(item.bits_worst for item in self.traffic) / self.bitrate
+
+
+def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate:
+    """Estimate the load of a bus.
+
+    Args:
+        config: The bus.
+        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
+    """
+    traffic = [*_master_traffic(config)]
+    for node in config.nodes:
+        subject = Subject(config, node, Findings())
+        if node.heartbeat_producer > 0:
+            period = node.heartbeat_producer
+            cob_id = CobId.HEARTBEAT + node.node_id
+            reason = f'every {period * 1e3:g} ms'
+            traffic.append(Traffic(node.name, 'heartbeat', cob_id, 1, 1 / period, reason))
+        traffic += [_pdo_traffic(subject, direction, pdo) for direction, pdo in subject.pdos()]
+        traffic += _guarding(node)
+    return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
+
+
+def _master_traffic(config: BusConfig) -> Iterator[Traffic]:
+    master = config.master
+    if master.sync_period > 0:
+        size = 1 if master.sync_overflow else 0
+        reason = f'every {master.sync_period * 1e3:g} ms'
+        yield Traffic(master.name, 'SYNC', CobId.SYNC, size, 1 / master.sync_period, reason)
+    if master.heartbeat_producer > 0:
+        cob_id = CobId.HEARTBEAT + master.node_id
+        period = master.heartbeat_producer
+        reason = f'every {period * 1e3:g} ms'
+        yield Traffic(master.name, 'heartbeat', cob_id, 1, 1 / period, reason)
+    if master.time_period > 0:
+        reason = f'every {master.time_period * 1e3:g} ms'
+        cob_id = master.time_cob_id & CAN_ID_MASK
+        yield Traffic(master.name, 'TIME', cob_id, 6, 1 / master.time_period, reason)
+
+
+def _guarding(node: NodeConfig) -> Iterator[Traffic]:
+    """Yield question and answer of node guarding (CiA 301, 7.2.8.2.2)."""
+    if node.uses_node_guarding:
+        cob_id, reason = CobId.HEARTBEAT + node.node_id, f'every {node.guard_time * 1e3:g} ms'
+        yield Traffic(node.name, 'guarding', cob_id, 0, 1 / node.guard_time, reason)
+        yield Traffic(node.name, 'guarding', cob_id, 1, 1 / node.guard_time, reason)
+
+
+def _pdo_traffic(subject: Subject, direction: Direction, pdo: PdoConfig) -> Traffic:
+    size = min((sum(mapped.bits for mapped in pdo.mapping) + 7) // 8, PAYLOAD_MAX)
+    rate, reason = _rate(subject, direction, pdo)
+    service = f'{direction.title} {pdo.number}'
+    return Traffic(subject.node.name, service, pdo.cob_id, size, rate, reason)
+
+
+def _rate(subject: Subject, direction: Direction, pdo: PdoConfig) -> tuple[float, str]:
+    """Return how often a PDO is sent in [1/s], and why."""
+    master = subject.bus.master
+    if direction is not TPDO:
+        if not subject.node.is_drive:
+            return 0.0, 'when a value is sent'
+        return 1 / master.cycle_period, 'every cycle'
+    if pdo.transmission <= SYNCHRONOUS_MAX:
+        if not master.sync_period:
+            return 0.0, 'never, there is no SYNC'
+        divisor = max(pdo.transmission, 1)
+        reason = 'every SYNC' if divisor == 1 else f'every {divisor}th SYNC'
+        return 1 / (master.sync_period * divisor), reason if pdo.transmission else (
+            'with SYNC on change, taken as every SYNC'
+        )
+    if pdo.transmission < 254:
+        return 0.0, 'on remote frames, which nobody sends'
+    return _event_rate(subject, pdo)
+
+
+def _event_rate(subject: Subject, pdo: PdoConfig) -> tuple[float, str]:
+    """On change is taken as once a cycle, as far as the inhibit time allows."""
+    inhibit, timer = subject.inhibit_time(pdo), subject.event_time(pdo)
+    on_change = max(subject.bus.master.cycle_period, inhibit)
+    if timer and timer <= on_change:
+        return 1 / timer, f'event timer {timer * 1e3:g} ms'
+    return 1 / on_change, f'on change, taken as every {on_change * 1e3:g} ms'

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What differs between TPDOs and RPDOs: objects, identifiers, and what may be mapped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ...standard.cob_id import rpdo_default, tpdo_default
+from ...standard.dictionary import ObjectDictionary, ObjectEntry
+from ...standard.objects import Index, PDO_COUNT_MAX
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """One of the two directions, seen from the device.
+
+    Attributes:
+        name: Key in bus.yml.
+        communication: Index of the first communication parameter.
+        mapping: Index of the first mapping parameter.
+        default_cob_id: Pre-defined COB-ID of PDO 1 to 4 by number and node id.
+        mappable: Whether an object may be mapped in this direction.
+    """
+
+    name: str
+    communication: int
+    mapping: int
+    default_cob_id: Callable[[int, int], int]
+    mappable: Callable[[ObjectEntry], bool]
+
+    @property
+    def title(self) -> str:
+        """Name as people write it."""
+        return self.name.upper()
+
+    def numbers(self, dictionary: ObjectDictionary) -> list[int]:
+        """Return the numbers of the PDOs that a device has, ascending."""
+        first = self.communication
+        indices = {entry.index for entry in dictionary}
+        return sorted(
+            index - first + 1 for index in indices if first <= index < first + PDO_COUNT_MAX
+        )
+
+
+TPDO = Direction(
+    'tpdo',
+    Index.TPDO_COMMUNICATION,
+    Index.TPDO_MAPPING,
+    tpdo_default,
+    lambda entry: entry.tpdo_mappable,
+)
+RPDO = Direction(
+    'rpdo',
+    Index.RPDO_COMMUNICATION,
+    Index.RPDO_MAPPING,
+    rpdo_default,
+    lambda entry: entry.rpdo_mappable,
+)

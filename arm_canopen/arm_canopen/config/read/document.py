@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A YAML document whose values know their line and their key path.
+
+PyYAML composes the nodes; nothing is constructed from tags, so a file cannot run code. Anchors,
+aliases and merge keys (``<<``) work; a value that is used in several places keeps the place at
+which it is written. Duplicate keys are refused: YAML forbids them, loaders let the last one win.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+import os
+from pathlib import Path
+from typing import TypeAlias
+
+import yaml
+
+from ..findings import Findings, Place
+
+TAG_PREFIX = 'tag:yaml.org,2002:'
+MERGE_TAG = TAG_PREFIX + 'merge'
+INTEGER_TAG = TAG_PREFIX + 'int'
+TEXT_TAGS = (TAG_PREFIX + 'timestamp', TAG_PREFIX + 'value', MERGE_TAG)  # dates, '=' and '<<'
+SLIPPED_TAG = 'slipped'  # of a mapping that was put together by `reindent`
+NUMBERED = ('tpdo', 'rpdo')  # whose keys are numbers
+SIZE_MAX = 4 * 1024 * 1024  # [byte]
+
+
+class ScalarKind(Enum):
+    """What YAML 1.1 takes a scalar for."""
+
+    NULL = 'null'
+    BOOLEAN = 'bool'
+    INTEGER = 'int'
+    FLOAT = 'float'
+    TEXT = 'str'
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """A single value.
+
+    Attributes:
+        place: Where it is written.
+        text: Its text, without quotes.
+        kind: What YAML takes it for.
+        quoted: It is written in quotes or as a block.
+    """
+
+    place: Place
+    text: str
+    kind: ScalarKind
+    quoted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class YamlList:
+    """A sequence."""
+
+    place: Place
+    items: tuple[Item, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class YamlMap:
+    """A mapping, merge keys resolved.
+
+    Attributes:
+        place: Place of the key that it belongs to.
+        entries: Values by the text of their key; whole numbers as keys are written in decimal.
+    """
+
+    place: Place
+    entries: dict[str, Item] = field(default_factory=dict)
+
+
+Item: TypeAlias = Scalar | YamlList | YamlMap
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentKind:
+    """The messages for a kind of file that is wrong as a whole.
+
+    Attributes:
+        name: What it is called.
+        beginning: What its top level is to look like.
+    """
+
+    name: str
+    beginning: str
+
+
+BUS_YML = DocumentKind(
+    'bus.yml',
+    "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
+)
+
+
+def read_document(
+    path: str | os.PathLike[str], findings: Findings, kind: DocumentKind = BUS_YML
+) -> YamlMap:
+    """Read a YAML file whose top level is a mapping.
+
+    Args:
+        path: The file.
+        findings: Gets duplicate keys and the like.
+        kind: What the file is meant to be.
+
+    Raises:
+        ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
+    """
+    file = Path(path)
+    item = _read(file, findings, kind)
+    if isinstance(item, YamlMap):
+        return item
+    findings.error(
+        Place(file),
+        'the file is empty' if item is None else 'the top level is not a mapping',
+        kind.beginning,
+    )
+    findings.raise_errors()
+    return YamlMap(Place(file))
+
+
+def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
+    item: Item | None = None
+    try:
+        root = yaml.compose(_read_text(file), Loader=yaml.SafeLoader)
+        if root is not None:
+            item = _Converter(file, findings).convert(root, Place(file))
+    except OSError as error:
+        remedy = f'correct the path of the {kind.name}'
+        findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
+    except RecursionError:
+        findings.error(Place(file), 'nested too deeply', f'a {kind.name} needs five levels')
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
+        said = ', '.join(text for text in (error.context, error.problem) if text)
+        findings.error(
+            place, f'not YAML: {said}', 'check indentation, colons, brackets and quotes'
+        )
+    except (yaml.YAMLError, ValueError) as error:
+        findings.error(Place(file), f'not YAML: {error}', 'save the file as UTF-8 text')
+    else:
+        return item
+    findings.raise_errors()
+    return None
+
+
+def _read_text(file: Path) -> str:
+    if file.exists() and not file.is_file():
+        raise OSError('not a file')
+    if file.stat().st_size > SIZE_MAX:
+        raise ValueError('larger than 4 MiB')
+    return file.read_text(encoding='utf-8-sig')
+
+
+class _Converter:
+    """Turns composed nodes into items, each node once however often it is used."""
+
+    def __init__(self, file: Path, findings: Findings) -> None:
+        self._file = file
+        self._findings = findings
+        self._done: dict[int, Item] = {}
+        self._open: set[int] = set()
+        self._kept: list[object] = []  # nodes of our own, so that no identity is given twice
+
+    def convert(self, node: yaml.Node, place: Place) -> Item:
+        """Convert a node that is written at a place."""
+        identity = id(node)
+        if identity in self._done:
+            return self._done[identity]
+        if identity in self._open:
+            self._findings.error(
+                place, 'an alias refers to what it is part of', 'write the value out'
+            )
+            return Scalar(place, '', ScalarKind.NULL)
+        self._open.add(identity)
+        item = self._convert(node, place)
+        self._open.discard(identity)
+        self._done[identity] = item
+        return item
+
+    def _convert(self, node: yaml.Node, place: Place) -> Item:
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, place)
+        if isinstance(node, yaml.SequenceNode):
+            return self._listing(node, place)
+        if isinstance(node, yaml.ScalarNode):
+            return self._scalar(node, place)
+        raise TypeError(f'unknown kind of YAML node {node!r}')
+
+    def _listing(self, node: yaml.SequenceNode, place: Place) -> YamlList:
+        items = (
+            self.convert(child, self._place(child, f'{place.key}[{number}]'))
+            for number, child in enumerate(node.value)
+        )
+        return YamlList(place, tuple(items))
+
+    def _scalar(self, node: yaml.ScalarNode, place: Place) -> Scalar:
+        known = {TAG_PREFIX + kind.value: kind for kind in ScalarKind}
+        if node.tag not in known and node.tag not in TEXT_TAGS:
+            self._findings.error(place, f'the tag {node.tag!r} has no meaning here', 'remove it')
+        kind = known.get(node.tag, ScalarKind.TEXT)
+        return Scalar(place, str(node.value), kind, quoted=node.style is not None)
+
+    def _mapping(self, node: yaml.MappingNode, place: Place) -> YamlMap:
+        own: dict[str, Item] = {}
+        merged: dict[str, Item] = {}
+        pairs = node.value
+        if place.key.rpartition('.')[2] in NUMBERED:
+            pairs = reindent(pairs, lambda key: self._report_slip(key, place))
+            self._kept.append(pairs)
+        for key, value in pairs:
+            if key.tag == MERGE_TAG:
+                self._merge(value, place, merged)
+            else:
+                self._entry(key, value, place, own)
+        return YamlMap(place, merged | own)
+
+    def _report_slip(self, key: yaml.Node, place: Place) -> None:
+        self._findings.warning(
+            self._place(key, f'{place.key}.{key.value}'),
+            f'the keys after {key.value!r} are not indented below it; taken as if they were',
+            'indent them by two more spaces',
+        )
+
+    def _entry(self, key: yaml.Node, value: yaml.Node, place: Place, own: dict[str, Item]) -> None:
+        if not isinstance(key, yaml.ScalarNode):
+            where = self._place(key, place.key)
+            self._findings.error(where, 'a key must be a single word', 'write it as text')
+            return
+        name = _key_text(key)
+        where = self._place(key, f'{place.key}.{name}' if place.key else name)
+        if name in own:
+            self._findings.error(
+                where,
+                f'the key {name!r} appears twice, first in line {own[name].place.line}',
+                'keep one of them',
+            )
+            return
+        own[name] = self.convert(value, where)
+
+    def _merge(self, value: yaml.Node, place: Place, merged: dict[str, Item]) -> None:
+        """Take over a merge key's mappings; of a list the earlier one counts."""
+        sources = value.value if isinstance(value, yaml.SequenceNode) else [value]
+        for source in sources:
+            where = self._place(source, f'{place.key}.<<')
+            item = self.convert(source, where)
+            if not isinstance(item, YamlMap):
+                self._findings.error(
+                    where, "'<<' takes a mapping", "write '<<: *name' for an anchor '&name'"
+                )
+                continue
+            for name, entry in item.entries.items():
+                merged.setdefault(name, entry)
+
+    def _place(self, node: yaml.Node, key: str) -> Place:
+        mark = node.start_mark
+        return Place(self._file, mark.line + 1, mark.column + 1, key)
+
+
+def reindent(
+    pairs: list[tuple[yaml.Node, yaml.Node]], report: Callable[[yaml.Node], None]
+) -> list[tuple[yaml.Node, yaml.Node]]:
+    """Put keys below the number that they follow, where a listing has lost their indentation.
+
+    A number without a value that is followed by words can mean nothing else.
+
+    Args:
+        pairs: Keys and values of a mapping as they are written.
+        report: Called with each number to which keys were put.
+    """
+    result: list[tuple[yaml.Node, yaml.Node]] = []
+    for key, value in pairs:
+        above = result[-1] if result else None
+        if above is None or key.tag == INTEGER_TAG or above[0].tag != INTEGER_TAG:
+            result.append((key, value))
+        elif isinstance(above[1], yaml.MappingNode) and above[1].tag == SLIPPED_TAG:
+            above[1].value.append((key, value))
+        elif _is_empty(above[1]):
+            report(above[0])
+            slipped = yaml.MappingNode(SLIPPED_TAG, [(key, value)], key.start_mark)
+            result[-1] = (above[0], slipped)
+        else:
+            result.append((key, value))
+    return result
+
+
+def _is_empty(node: yaml.Node) -> bool:
+    return isinstance(node, yaml.ScalarNode) and node.value == ''
+
+
+def _key_text(key: yaml.ScalarNode) -> str:
+    """Return a key's text, so that ``on`` stays ``on``, and PDO numbers in decimal."""
+    text = str(key.value)
+    if key.tag == INTEGER_TAG:
+        try:
+            return str(int(text, 0))
+        except ValueError:  # '010' or '1:30', reported where the number is used
+            return text
+    return text

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reading EDS and DCF files (CiA 306-1), tolerant of what vendors ship."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+
+from ...exceptions import Problem
+from ...standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from ...standard.dictionary import ObjectDictionary
+from ..findings import Findings, Place
+from .eds_ini import decode_text, IniFile, read_ini
+from .eds_objects import ObjectReader
+from .eds_values import parse_integer
+
+SIZE_MAX = 16 * 1024 * 1024  # [byte] larger files are no EDS
+DUMMY_TYPES = range(0x0002, 0x0008)  # INTEGER8 to UNSIGNED32 (CiA 301, 7.4.7.1)
+COMMISSIONING = ('devicecomissioning', 'devicecommissioning')  # the standard misspells it
+TOLERATED = 'the file is read all the same; correct it when a value is missing'
+
+
+@dataclass(frozen=True, slots=True)
+class Eds:
+    """The content of an EDS or DCF.
+
+    Attributes:
+        path: The file.
+        dictionary: Its objects; defaults with ``$NODEID`` are still node-relative.
+        node_id: Node id of a DCF, None in an EDS.
+        dummy_types: Data types that may stand in an RPDO as a gap.
+        warnings: What was odd but could be understood.
+    """
+
+    path: Path
+    dictionary: ObjectDictionary
+    node_id: int | None = None
+    dummy_types: frozenset[int] = frozenset(DUMMY_TYPES)
+    warnings: tuple[Problem, ...] = ()
+
+
+def load_eds(path: str | os.PathLike[str]) -> Eds:
+    """Read an EDS or DCF file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its objects and all oddities as warnings.
+
+    Raises:
+        ConfigError: The file is missing, unreadable or has no objects.
+    """
+    path = Path(path)
+    findings = Findings()
+    ini = read_ini(read_eds_text(path, findings))
+    objects = ObjectReader(ini)
+    dictionary = ObjectDictionary(objects.entries(), source=str(path))
+    if not len(dictionary):
+        findings.error(Place(path), 'no object in this file', 'name an EDS or DCF file of CiA 306')
+        findings.raise_errors()
+    for line, message in ini.oddities:
+        findings.warning(Place(path, line), message, TOLERATED)
+    for line, key, message in objects.oddities:
+        findings.warning(Place(path, line, key=key), message, TOLERATED)
+    return Eds(path, dictionary, _node_id(ini), _dummy_types(ini), findings.warnings)
+
+
+def read_eds_text(path: Path, findings: Findings) -> str:
+    """Return the text of an EDS or DCF.
+
+    Raises:
+        ConfigError: The file is missing, unreadable or too large to be one.
+    """
+    try:
+        if not path.is_file():
+            findings.error(Place(path), 'there is no such file', 'correct the path of the EDS')
+        elif path.stat().st_size > SIZE_MAX:
+            findings.error(Place(path), 'larger than 16 MiB', 'name an EDS or DCF file')
+        else:
+            return decode_text(path.read_bytes())
+    except (OSError, ValueError) as error:
+        findings.error(Place(path), f'cannot be read: {error}', 'correct its path or permissions')
+    findings.raise_errors()
+    return ''
+
+
+def _node_id(ini: IniFile) -> int | None:
+    for name in COMMISSIONING:
+        if name in ini.sections:
+            try:
+                node_id = parse_integer(ini.sections[name].text('nodeid'))
+            except ValueError:
+                continue
+            if NODE_ID_MIN <= node_id <= NODE_ID_MAX:
+                return node_id
+    return None
+
+
+def _dummy_types(ini: IniFile) -> frozenset[int]:
+    """Read [DummyUsage]; files without it are taken to allow all (many just leave it out)."""
+    section = ini.sections.get('dummyusage')
+    if section is None:
+        return frozenset(DUMMY_TYPES)
+    texts = {number: section.text(f'dummy{number:04x}') for number in DUMMY_TYPES}
+    return frozenset(number for number, text in texts.items() if text not in ('', '0', '0x0'))

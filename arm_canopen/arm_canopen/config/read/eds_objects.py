@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Turning the sections of an EDS or DCF into object dictionary entries (CiA 306-1, 4.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import re
+
+from ...standard.datatypes import DataType, integer_range, REAL_FORMATS, Value
+from ...standard.dictionary import AccessType, object_address, ObjectCode, ObjectEntry
+from .eds_ini import IniFile, IniSection
+from .eds_values import EdsValue, parse_integer, parse_value
+
+OBJECT_SECTION = re.compile(r'([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2}))?')
+LISTS = ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects')
+COMPACT_SUBINDICES_MAX = 254
+COLLECTIONS = (ObjectCode.ARRAY, ObjectCode.RECORD, ObjectCode.DEFSTRUCT)
+
+
+class ObjectReader:
+    """Reads all objects of one file.
+
+    Attributes:
+        oddities: Line, key and description of everything that had to be skipped or guessed.
+    """
+
+    def __init__(self, ini: IniFile) -> None:
+        """Sort the sections into objects and their sub-indices."""
+        self.oddities: list[tuple[int, str, str]] = []
+        self._ini = ini
+        self._objects: dict[int, IniSection] = {}
+        self._parts: dict[int, dict[int, IniSection]] = {}
+        for name, section in ini.sections.items():
+            if match := OBJECT_SECTION.fullmatch(name):
+                index = int(match[1], 16)
+                if match[2] is None:
+                    self._objects[index] = section
+                else:
+                    self._parts.setdefault(index, {})[int(match[2], 16)] = section
+
+    def entries(self) -> Iterator[ObjectEntry]:
+        """Yield all entries; what cannot be understood is in ``oddities``."""
+        self._check_lists()
+        for index, section in self._objects.items():
+            yield from self._object(index, section)
+        for index in self._parts.keys() - self._objects.keys():
+            for subindex, part in self._parts[index].items():
+                self._odd(part, '', f'sub-index without the section [{index:04X}] of its object')
+                yield self._entry(index, subindex, part)
+
+    def _object(self, index: int, section: IniSection) -> Iterator[ObjectEntry]:
+        parts = self._parts.get(index, {})
+        code = self._object_code(section)
+        compact = self._number(section, 'compactsubobj', 0)
+        if compact:
+            yield from self._compact(index, section, compact)
+        for subindex, part in parts.items():
+            yield self._entry(index, subindex, part)
+        if compact:
+            return
+        if code not in COLLECTIONS:
+            if 0 not in parts:
+                yield self._entry(index, 0, section, code)
+        elif not parts:
+            self._odd(section, '', f'{code.name} without sub-indices')
+        else:
+            self._check_count(section, parts)
+
+    def _check_count(self, section: IniSection, parts: dict[int, IniSection]) -> None:
+        count = self._number(section, 'subnumber', len(parts))
+        if count != len(parts):
+            self._odd(
+                section,
+                'subnumber',
+                f'SubNumber is {count}, but {len(parts)} sub-indices are defined',
+            )
+
+    def _object_code(self, section: IniSection) -> ObjectCode:
+        number = self._number(section, 'objecttype', ObjectCode.VAR)
+        try:
+            return ObjectCode(number)
+        except ValueError:
+            self._odd(section, 'objecttype', f'unknown ObjectType {number}, taken as VAR')
+            return ObjectCode.VAR
+
+    def _compact(self, index: int, section: IniSection, count: int) -> Iterator[ObjectEntry]:
+        """Write out an array that CompactSubObj abbreviates (CiA 306-1, 4.6.3.2)."""
+        if not 0 < count <= COMPACT_SUBINDICES_MAX:
+            self._odd(section, 'compactsubobj', f'CompactSubObj {count} is not 1 to 254')
+            return
+        line = section.line
+        count_type = DataType.UNSIGNED8
+        yield ObjectEntry(
+            index, 0, 'NrOfObjects', count_type, AccessType.READ_ONLY, default=count, line=line
+        )
+        names = self._ini.sections.get(f'{index:x}name') or IniSection('', line)
+        values = self._ini.sections.get(f'{index:x}value') or IniSection('', line)
+        title = section.text('parametername')
+        for subindex in range(1, count + 1):
+            part = IniSection(section.title, line, dict(section.values))
+            if own := values.values.get(str(subindex)):
+                part.values['parametervalue'] = own
+            name = names.text(str(subindex)) or f'{title}{subindex}'
+            yield self._entry(index, subindex, part, name=name)
+
+    def _entry(
+        self,
+        index: int,
+        subindex: int,
+        section: IniSection,
+        code: ObjectCode = ObjectCode.VAR,
+        *,
+        name: str = '',
+    ) -> ObjectEntry:
+        data_type = self._data_type(section, code)
+        initial, configured = self._initial(section, data_type)
+        low, high = self._limits(section, data_type)
+        whole = self._objects.get(index, section)
+        return ObjectEntry(
+            index,
+            subindex,
+            name or section.text('parametername'),
+            data_type,
+            self._access(section),
+            default=initial.value if initial else None,
+            node_relative=initial.node_relative if initial else False,
+            low_limit=low,
+            high_limit=high,
+            pdo_mappable=bool(self._number(section, 'pdomapping', 0)),
+            line=section.line,
+            record=whole.text('parametername') if whole.title != section.title else '',
+            configured=configured,
+        )
+
+    def _data_type(self, section: IniSection, code: ObjectCode) -> DataType:
+        missing = DataType.DOMAIN
+        number = self._number(section, 'datatype', missing if code is ObjectCode.DOMAIN else 0)
+        # CANFestival's editor defines limited types of its own whose sub-index 1 is the real one
+        if derived := self._parts.get(number, {}).get(1):
+            number = self._number(derived, 'defaultvalue', number)
+        try:
+            return DataType(number)
+        except ValueError:
+            what = f'unknown DataType 0x{number:04X}' if number else 'no DataType'
+            self._odd(section, 'datatype', f'{what}, taken as DOMAIN (bytes)')
+            return missing
+
+    def _access(self, section: IniSection) -> AccessType:
+        text = section.text('accesstype').partition(';')[0].strip().lower()
+        try:
+            return AccessType(text)
+        except ValueError:
+            what = f'unknown AccessType {text[:20]!r}' if text else 'no AccessType'
+            self._odd(section, 'accesstype', f'{what}, taken as rw')
+            return AccessType.READ_WRITE
+
+    def _initial(self, section: IniSection, data_type: DataType) -> tuple[EdsValue | None, bool]:
+        """Read the value of the device, and whether it differs from the one after a reset."""
+        default = self._value(section, 'defaultvalue', data_type)
+        own = self._value(section, 'parametervalue', data_type)
+        return (default, False) if own is None else (own, own != default)
+
+    def _limits(
+        self, section: IniSection, data_type: DataType
+    ) -> tuple[int | float | None, int | float | None]:
+        if data_type not in REAL_FORMATS and integer_range(data_type) is None:
+            return None, None
+        low = _plain_number(self._value(section, 'lowlimit', data_type))
+        high = _plain_number(self._value(section, 'highlimit', data_type))
+        if low is not None and high is not None and low > high:
+            self._odd(section, 'lowlimit', f'LowLimit {low} is above HighLimit {high}; ignored')
+            return None, None
+        return low, high
+
+    def _value(self, section: IniSection, key: str, data_type: DataType) -> EdsValue | None:
+        text = section.text(key)
+        try:
+            return parse_value(data_type, text)
+        except ValueError as error:
+            self._odd(section, key, f'{error}; ignored')
+            return None
+
+    def _number(self, section: IniSection, key: str, default: int) -> int:
+        text = section.text(key)
+        if not text:
+            return default
+        try:
+            return parse_integer(text)
+        except ValueError as error:
+            self._odd(section, key, f'{error}; ignored')
+            return default
+
+    def _check_lists(self) -> None:
+        """Compare the three lists of objects with the sections that there are."""
+        listed: set[int] = set()
+        for name in LISTS:
+            section = self._ini.sections.get(name)
+            if section is not None:
+                listed |= self._listed(section)
+        missing = sorted(listed - self._objects.keys())
+        unlisted = sorted(self._objects.keys() - listed)
+        if missing:
+            self.oddities.append(
+                (0, '', f'listed, but without a section: {_hexadecimal(missing)}')
+            )
+        if unlisted and listed:
+            self.oddities.append((0, '', f'in no list of objects: {_hexadecimal(unlisted)}'))
+
+    def _listed(self, section: IniSection) -> set[int]:
+        keys = [key for key in section.values if key != 'supportedobjects']
+        count = self._number(section, 'supportedobjects', len(keys))
+        if count != len(keys):
+            message = f'SupportedObjects is {count}, but {len(keys)} are listed'
+            self._odd(section, 'supportedobjects', message)
+        return {self._number(section, key, 0) for key in keys} - {0}
+
+    def _odd(self, section: IniSection, key: str, message: str) -> None:
+        self.oddities.append((section.line_of(key), f'[{section.title}]', message))
+
+
+def _plain_number(value: EdsValue | None) -> int | float | None:
+    number: Value | None = value.value if value is not None else None
+    return number if isinstance(number, (int, float)) else None
+
+
+def _hexadecimal(indices: list[int]) -> str:
+    shown = ', '.join(object_address(index) for index in indices[:8])
+    return shown if len(indices) <= 8 else f'{shown} and {len(indices) - 8} more'

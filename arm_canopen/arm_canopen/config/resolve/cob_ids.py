@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""COB-IDs of all PDOs of a bus: giving out free ones, refusing reserved and doubled ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ...standard.cob_id import CAN_ID_MASK
+from ..findings import Findings
+from .pdos import PdoDraft
+
+FREE_RANGE = range(0x680, 0x6E0)
+"""Where dcfgen, too, puts the PDOs from the fifth on; no pre-defined service lies there."""
+
+RESERVED: tuple[tuple[range, str], ...] = (
+    (range(0x001), 'NMT'),
+    (range(0x001, 0x080), 'reserved'),
+    (range(0x080, 0x081), 'SYNC'),
+    (range(0x081, 0x100), 'emergency messages'),
+    (range(0x100, 0x101), 'TIME'),
+    (range(0x101, 0x181), 'reserved'),
+    (range(0x581, 0x600), 'SDO answers'),
+    (range(0x601, 0x680), 'SDO requests'),
+    (range(0x6E0, 0x701), 'reserved'),
+    (range(0x701, 0x780), 'heartbeats'),
+    (range(0x780, CAN_ID_MASK + 1), 'reserved'),
+)
+"""Identifiers that no PDO may have (CiA 301, tables 38 to 40)."""
+
+
+def assign_cob_ids(drafts: Sequence[PdoDraft], findings: Findings) -> list[PdoDraft]:
+    """Give every PDO its final COB-ID.
+
+    Args:
+        drafts: All PDOs of the bus in the order of the file.
+        findings: Gets reserved and doubled identifiers. When only EDS defaults are concerned,
+            these are warnings: many EDS files leave out ``$NODEID``.
+
+    Returns:
+        The PDOs in the same order.
+    """
+    used = {draft.config.cob_id for draft in drafts if draft.config.enabled and not draft.auto}
+    free = iter([cob_id for cob_id in FREE_RANGE if cob_id not in used])
+    result = [
+        _assigned(draft, next(free, 0), findings) if draft.auto else draft for draft in drafts
+    ]
+    _check(result, findings)
+    return result
+
+
+def _assigned(draft: PdoDraft, cob_id: int, findings: Findings) -> PdoDraft:
+    if not cob_id:
+        findings.error(
+            draft.place,
+            f'no free COB-ID is left for {draft.title} between 0x680 and 0x6DF',
+            'write a COB-ID that the bus does not use',
+        )
+    return replace(draft, config=replace(draft.config, cob_id=cob_id))
+
+
+def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
+    owners: dict[int, PdoDraft] = {}
+    for draft in drafts:
+        cob_id = draft.config.cob_id
+        if not draft.config.enabled or not cob_id:
+            continue
+        if purpose := reserved_for(cob_id):
+            _report(
+                findings,
+                [draft],
+                f'COB-ID 0x{cob_id:03X} of {draft.title} is not for PDOs ({purpose})',
+            )
+        owner = owners.setdefault(cob_id, draft)
+        if owner is not draft:
+            _report(
+                findings,
+                [draft, owner],
+                f'COB-ID 0x{cob_id:03X} of {draft.title} is also that of {owner.title} '
+                f'(line {owner.place.line})',
+            )
+
+
+def reserved_for(cob_id: int) -> str:
+    """Say what an identifier is reserved for, empty when a PDO may have it."""
+    return next((purpose for ids, purpose in RESERVED if cob_id in ids), '')
+
+
+def _report(findings: Findings, drafts: list[PdoDraft], message: str) -> None:
+    if any(draft.config.configured for draft in drafts):
+        findings.error(drafts[0].place, message, "write 'cob_id: auto', or 'enabled: false'")
+    else:
+        remedy = 'name the PDO in bus.yml if the device does not add its node id to the default'
+        findings.warning(drafts[0].place, message, remedy)

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Finding the EDS of a device, and reading each file once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ...exceptions import ConfigError
+from ..findings import Findings
+from ..read.document import Item
+from ..read.eds import Eds, load_eds
+
+DEFAULT_DRIVE = Path(__file__).with_name('default_drive.eds')
+PATH_VARIABLE = '@BUS_CONFIG_PATH@'
+
+
+class EdsFiles:
+    """The EDS files of a bus. Devices that share a file share what was read from it.
+
+    Attributes:
+        folder: What ``@BUS_CONFIG_PATH@`` stands for.
+        beside: Folder of the bus.yml, where a file is looked for that is not in ``dcf_path``.
+    """
+
+    def __init__(self, folder: Path, beside: Path) -> None:
+        """Begin with no file read."""
+        self.folder = folder
+        self.beside = beside
+        self._read: dict[Path, Eds | None] = {}
+
+    def find(self, dcf: str, dcf_path: str, item: Item, findings: Findings) -> Eds | None:
+        """Find and read a file.
+
+        Args:
+            dcf: File name as bus.yml gives it.
+            dcf_path: Folder as bus.yml gives it, empty for none.
+            item: What names the file, for messages.
+            findings: Gets a missing file and the file's own warnings.
+
+        Returns:
+            Its content, None when that cannot be had.
+        """
+        candidates = self._candidates(dcf, dcf_path)
+        for path in candidates:
+            if _exists(path):
+                return self._load(path, findings)
+        tried = ' and '.join(str(path) for path in dict.fromkeys(candidates))
+        findings.error(
+            item.place,
+            f'there is no EDS {dcf!r}; looked for {tried}',
+            _remedy(tried, candidates),
+        )
+        return None
+
+    def default_drive(self, item: Item, findings: Findings) -> Eds | None:
+        """Return what any CiA 402 drive has, for a drive without a file of its own.
+
+        Args:
+            item: The section of the device, for messages.
+            findings: Gets a warning.
+        """
+        findings.warning(
+            item.place,
+            "no 'dcf': it is taken for a CiA 402 drive as the standard has it; which device "
+            'it is, is not checked, and of its PDOs only those exist that bus.yml names',
+            'write dcf: with the EDS of the drive',
+        )
+        return self._load(DEFAULT_DRIVE, findings)
+
+    def _candidates(self, dcf: str, dcf_path: str) -> list[Path]:
+        name = self._expand(dcf)
+        folder = self._expand(dcf_path)
+        beside = self.beside / name
+        return [self.beside / folder / name, beside] if folder else [beside]
+
+    def _expand(self, text: str) -> str:
+        return os.path.expandvars(text.replace(PATH_VARIABLE, str(self.folder)))
+
+    def _load(self, path: Path, findings: Findings) -> Eds | None:
+        if path not in self._read:
+            try:
+                self._read[path] = load_eds(path)
+            except ConfigError as error:
+                findings.extend_errors(error.problems)
+                self._read[path] = None
+        eds = self._read[path]
+        if eds is not None:
+            findings.extend_warnings(eds.warnings)
+        return eds
+
+
+def _remedy(tried: str, candidates: list[Path]) -> str:
+    if '$' in tried:
+        return 'set the environment variable'
+    for path in candidates:
+        if path.is_symlink():
+            return f'{path} is a link to {path.readlink()}, which is not there; copy the file'
+    return 'put the file there, or correct dcf or dcf_path'
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that is too long, or has a NUL in it
+        return False

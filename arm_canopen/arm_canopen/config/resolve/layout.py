@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The two formats of bus.yml, brought to one.
+
+New: ``options``, ``master``, ``defaults`` and ``nodes``. Old (dcfgen's own): ``options``,
+``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of
+the new one. Top-level keys that begin with a dot are templates for anchors, ignored in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+import difflib
+
+from ..findings import Findings
+from ..read.document import Item, YamlList, YamlMap
+from ..read.scalars import describe
+from ..read.section import block, TOP_LEVEL
+from .merge import merge_device
+
+NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The sections of a bus.yml.
+
+    Attributes:
+        options: The section ``options``, empty when absent.
+        master: The section ``master``, empty when absent.
+        devices: Each device with the ``defaults`` below its own values, in the order of the file.
+    """
+
+    options: YamlMap
+    master: YamlMap
+    devices: dict[str, YamlMap] = field(default_factory=dict)
+
+
+def lay_out(root: YamlMap, findings: Findings) -> Layout:
+    """Find the sections of either format."""
+    root = _lifted(root, findings)
+    new = 'nodes' in root.entries or 'defaults' in root.entries
+    devices = _new_devices(root, findings) if new else _old_devices(root, findings)
+    if 'master' not in root.entries:
+        findings.error(root.place, "no section 'master'", "write 'master:' and its node_id below")
+    empty = YamlMap(root.place)
+    return Layout(
+        block(root, 'options', findings) or empty,
+        block(root, 'master', findings) or empty,
+        devices,
+    )
+
+
+def _lifted(root: YamlMap, findings: Findings) -> YamlMap:
+    """Take sections that are indented below ``options`` as sections of their own."""
+    options = root.entries.get('options')
+    if not isinstance(options, YamlMap):
+        return root
+    sections = {
+        name: item
+        for name, item in options.entries.items()
+        if name in TOP_LEVEL and name not in root.entries
+    }
+    if not sections:
+        return root
+    for name, item in sections.items():
+        findings.warning(
+            item.place,
+            f"{name!r} is indented below 'options'; taken as a section of its own",
+            'indent it less',
+        )
+    rest = {name: item for name, item in options.entries.items() if name not in sections}
+    entries = root.entries | {'options': YamlMap(options.place, rest)} | sections
+    return YamlMap(root.place, entries)
+
+
+def _new_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
+    for name, item in root.entries.items():
+        if name not in TOP_LEVEL and not name.startswith('.'):
+            findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
+    defaults = _with_dcf(block(root, 'defaults', findings) or YamlMap(root.place), findings)
+    nodes = root.entries.get('nodes')
+    if nodes is None:
+        findings.error(root.place, "there are 'defaults' but no 'nodes'", NODES_REMEDY)
+    elif isinstance(nodes, YamlList):
+        findings.error(nodes.place, "'nodes' is a list", NODES_REMEDY)
+    elif not isinstance(nodes, YamlMap) or not nodes.entries:
+        findings.error(nodes.place, 'there are no devices', NODES_REMEDY)
+    else:
+        return _devices(nodes, defaults, findings)
+    return {}
+
+
+def _old_devices(root: YamlMap, findings: Findings) -> dict[str, YamlMap]:
+    sections: dict[str, Item] = {}
+    for name, item in root.entries.items():
+        if _is_misspelt(name, item):
+            findings.error(item.place, f'unknown section {name!r}', _section_remedy(name, item))
+        elif name not in TOP_LEVEL:
+            sections[name] = item
+    if not any(not name.startswith('.') for name in sections):
+        findings.error(root.place, 'there are no devices', NODES_REMEDY)
+    return _devices(YamlMap(root.place, sections), YamlMap(root.place), findings)
+
+
+def _is_misspelt(name: str, item: Item) -> bool:
+    """Distinguish a section with a typing error from a device, which has an EDS in this format."""
+    is_device = isinstance(item, YamlMap) and bool({'dcf', 'eds'} & item.entries.keys())
+    return name not in TOP_LEVEL and not is_device and bool(_close_section(name))
+
+
+def _close_section(name: str) -> list[str]:
+    return difflib.get_close_matches(name, TOP_LEVEL, n=1, cutoff=0.75)
+
+
+def _devices(nodes: YamlMap, defaults: YamlMap, findings: Findings) -> dict[str, YamlMap]:
+    result: dict[str, YamlMap] = {}
+    for name, item in nodes.entries.items():
+        if name.startswith('.'):
+            continue
+        if isinstance(item, YamlMap):
+            result[name] = merge_device(defaults, _with_dcf(item, findings))
+        else:
+            findings.error(
+                item.place,
+                f'expected a device with its keys, got {describe(item)}',
+                _section_remedy(name, item),
+            )
+    return result
+
+
+def _with_dcf(section: YamlMap, findings: Findings) -> YamlMap:
+    """Take ``eds`` for ``dcf``, as many people write it; ros2_canopen knows the latter only."""
+    item = section.entries.get('eds')
+    if item is None:
+        return section
+    if 'dcf' in section.entries:
+        findings.error(item.place, "there are 'eds' and 'dcf'", "remove one; 'dcf' is the key")
+    else:
+        findings.warning(
+            item.place, "'eds' is taken for 'dcf'", "write 'dcf', as ros2_canopen does"
+        )
+    entries = {
+        ('dcf' if name == 'eds' else name): value for name, value in section.entries.items()
+    }
+    return YamlMap(section.place, entries)
+
+
+def _section_remedy(name: str, item: Item) -> str:
+    if close := _close_section(name):
+        return f'did you mean {close[0]!r}?'
+    if isinstance(item, YamlMap) and 'node_id' in item.entries:
+        return "move the device below 'nodes:'"
+    return "a device needs at least 'node_id:' below its name; begin a template's name with a dot"

@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""PDO mappings: of the EDS, and of bus.yml (CiA 301, 7.5.2.36 and 7.5.2.38)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...standard.datatypes import bit_length, DataType, SIGNED_BITS
+from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
+from ...standard.objects import Index, is_signed, PDO_BITS_MAX
+from ...standard.pdo import MappedObject
+from ..findings import Findings, Place, RefusedError
+from ..model.pdo_direction import Direction, RPDO
+from ..read.device_keys import MAPPING_KEYS
+from ..read.document import YamlList
+from ..read.eds import DUMMY_TYPES, Eds
+from .sdo_list import find_entry, read_address
+
+SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}
+UNSIGNED_BY_BITS = {
+    1: DataType.BOOLEAN,
+    8: DataType.UNSIGNED8,
+    16: DataType.UNSIGNED16,
+    24: DataType.UNSIGNED24,
+    32: DataType.UNSIGNED32,
+    40: DataType.UNSIGNED40,
+    48: DataType.UNSIGNED48,
+    56: DataType.UNSIGNED56,
+    64: DataType.UNSIGNED64,
+}
+"""How bits are read whose object the EDS does not describe."""
+
+EDS_REMEDY = 'name its mapping in bus.yml, or correct the EDS'
+
+
+def mapping_slots(direction: Direction, number: int, dictionary: ObjectDictionary) -> int:
+    """Return how many objects the EDS lets a PDO map."""
+    return sum(
+        1 for entry in dictionary.subindices(direction.mapping + number - 1) if entry.subindex
+    )
+
+
+def is_fixed(direction: Direction, number: int, dictionary: ObjectDictionary) -> bool:
+    """Return whether the mapping cannot be written."""
+    entry = dictionary.get(direction.mapping + number - 1, 0)
+    return entry is None or not entry.access.writable
+
+
+def eds_mapping(
+    direction: Direction, number: int, eds: Eds, findings: Findings
+) -> tuple[MappedObject, ...]:
+    """Return the mapping that a PDO has by the EDS.
+
+    Args:
+        direction: TPDO or RPDO.
+        number: Number of the PDO.
+        eds: The device.
+        findings: Gets warnings about objects that the EDS does not have, or not of this length.
+
+    Returns:
+        The mapping, empty when it cannot be understood.
+    """
+    entries = eds.dictionary.subindices(direction.mapping + number - 1)
+    count = entries[0].default if entries and entries[0].subindex == 0 else 0
+    used = entries[1 : 1 + count] if isinstance(count, int) else []
+    mapping: list[MappedObject] = []
+    for entry in used:
+        if not isinstance(entry.default, int) or entry.default == 0:
+            continue
+        place = Place(eds.path, entry.line, key=f'[{entry.index:04X}sub{entry.subindex:X}]')
+        mapped = _from_word(entry.default, eds.dictionary, place, findings)
+        if mapped is None:
+            return ()
+        mapping.append(mapped)
+    if sum(mapped.bits for mapped in mapping) > PDO_BITS_MAX:
+        place = Place(eds.path, entries[0].line, key=f'[{entries[0].index:04X}]')
+        findings.warning(place, 'the default mapping is longer than 64 bits', EDS_REMEDY)
+        return ()
+    return tuple(mapping)
+
+
+def _from_word(
+    word: int, dictionary: ObjectDictionary, place: Place, findings: Findings
+) -> MappedObject | None:
+    index, subindex, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
+    if index in DUMMY_TYPES and subindex == 0:
+        return MappedObject(index, subindex, DataType(index))
+    entry = dictionary.get(index, subindex)
+    if entry is not None and bit_length(entry.data_type) == bits:
+        return MappedObject(index, subindex, entry.data_type)
+    name = object_address(index, subindex)
+    what = f'{name}, which is not there' if entry is None else f'{entry} with {bits} bits'
+    # an object of a drive whose sign the standard knows is not read without it
+    signed = is_signed(index, subindex) and dictionary.has_index(Index.CONTROLWORD)
+    data_type = (SIGNED_BY_BITS if signed else UNSIGNED_BY_BITS).get(bits)
+    result = 'the PDO is ignored' if data_type is None else f'taken as {data_type.name}'
+    findings.warning(place, f'maps {what}; {result}', EDS_REMEDY)
+    return None if data_type is None else MappedObject(index, subindex, data_type)
+
+
+def read_mapping(
+    direction: Direction, number: int, entries: YamlList, eds: Eds, findings: Findings
+) -> tuple[MappedObject, ...]:
+    """Read the mapping that bus.yml gives a PDO.
+
+    Args:
+        direction: TPDO or RPDO.
+        number: Number of the PDO.
+        entries: The list ``mapping``.
+        eds: The device.
+        findings: Gets objects that cannot be mapped, and mappings that are too long.
+    """
+    mapping = tuple(_mapped_objects(direction, entries, eds, findings))
+    bits = sum(mapped.bits for mapped in mapping)
+    slots = mapping_slots(direction, number, eds.dictionary)
+    if bits > PDO_BITS_MAX:
+        findings.error(
+            entries.place,
+            f'the mapped objects have {bits} bits together, a PDO carries at most {PDO_BITS_MAX}',
+            'move objects to another PDO',
+        )
+    elif len(mapping) > slots:
+        findings.error(
+            entries.place,
+            f'{len(mapping)} objects are mapped, {direction.title} {number} of this device takes '
+            f'at most {slots}',
+            'move objects to another PDO',
+        )
+    return mapping
+
+
+def _mapped_objects(
+    direction: Direction, entries: YamlList, eds: Eds, findings: Findings
+) -> Iterator[MappedObject]:
+    for item in entries.items:
+        address = read_address(item, MAPPING_KEYS, findings)
+        mapped = _checked(direction, address, eds, item.place, findings) if address else None
+        if mapped is not None:
+            yield mapped
+
+
+def _checked(
+    direction: Direction, address: tuple[int, int], eds: Eds, place: Place, findings: Findings
+) -> MappedObject | None:
+    try:
+        return _mapped_object(direction, *address, eds)
+    except RefusedError as reason:
+        findings.refuse(place, reason)
+        return None
+
+
+def _mapped_object(direction: Direction, index: int, subindex: int, eds: Eds) -> MappedObject:
+    if index in DUMMY_TYPES and subindex == 0:
+        return _dummy(direction, index, eds)
+    entry = find_entry(eds.dictionary, index, subindex)
+    _check_mappable(direction, entry)
+    return MappedObject(index, subindex, entry.data_type)
+
+
+def _dummy(direction: Direction, index: int, eds: Eds) -> MappedObject:
+    """Map a gap: a data type in place of an object (CiA 301, 7.4.7.1)."""
+    name = DataType(index).name
+    if direction is not RPDO:
+        raise RefusedError(
+            f'the gap {object_address(index)} ({name}) is for RPDOs only', 'remove the entry'
+        )
+    if index not in eds.dummy_types:
+        raise RefusedError(
+            f'the device does not take the gap {object_address(index)} ({name}; DummyUsage in '
+            'its EDS)',
+            'take another type',
+        )
+    return MappedObject(index, 0, DataType(index))
+
+
+def _check_mappable(direction: Direction, entry: ObjectEntry) -> None:
+    if bit_length(entry.data_type) is None:
+        raise RefusedError(
+            f'{entry} has no fixed length ({entry.data_type.name})', 'read and write it by SDO'
+        )
+    if direction.mappable(entry):
+        return
+    flag = 'yes' if entry.pdo_mappable else 'no'
+    raise RefusedError(
+        f'{entry} cannot be mapped into a {direction.title} (EDS: PDO mapping {flag}, '
+        f'access {entry.access.value})',
+        'map another object, or correct PDOMapping in the EDS if the manual allows it',
+    )

@@ -1,0 +1,244 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The PDOs of a device: those of its EDS, changed by bus.yml."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ...standard.dictionary import object_address
+from ...standard.objects import PDO_COUNT_MAX
+from ...standard.pdo import SYNCHRONOUS_MAX
+from ..findings import Findings, Place, RefusedError
+from ..model.bus import PdoConfig
+from ..model.pdo_direction import Direction, RPDO, TPDO
+from ..read.device_keys import RPDO_KEYS, TPDO_KEYS
+from ..read.document import Item, Scalar, YamlList, YamlMap
+from ..read.eds import Eds
+from ..read.scalars import describe, integer, key_number
+from ..read.section import block, listing, read_section
+from .pdo_mapping import eds_mapping, is_fixed, read_mapping
+
+PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}
+"""The keys of one PDO."""
+AUTO = 'auto'
+PREDEFINED_MAX = 4  # PDOs with a pre-defined COB-ID (CiA 301, 7.3.3)
+TRANSMISSION_DEFAULT = 255
+EVENT_TYPES = (254, 255)
+SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
+"""Sub-indices of the communication parameter that not every device has (CiA 301, 7.5.2.37)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PdoDraft:
+    """A PDO before the COB-IDs of the whole bus are known.
+
+    Attributes:
+        config: What is known.
+        direction: TPDO or RPDO.
+        device: Name of the device.
+        place: Where to complain: its COB-ID in bus.yml, else the PDO or the device.
+        auto: It wants a COB-ID from the free range.
+    """
+
+    config: PdoConfig
+    direction: Direction
+    device: str
+    place: Place
+    auto: bool = False
+
+    @property
+    def title(self) -> str:
+        """Name as people write it: ``TPDO 1 of joint1``."""
+        return f'{self.direction.title} {self.config.number} of {self.device}'
+
+
+class PdoReader:
+    """Reads the PDOs of one device."""
+
+    def __init__(
+        self, name: str, device: YamlMap, eds: Eds, node_id: int, *, findings: Findings
+    ) -> None:
+        """Keep what the device is.
+
+        Args:
+            name: Its name.
+            device: Its section, defaults merged.
+            eds: Its EDS, node-relative defaults resolved.
+            node_id: Its node id.
+            findings: Gets PDOs that the device does not have, and everything wrong with one.
+        """
+        self._name = name
+        self._device = device
+        self._eds = eds
+        self._node_id = node_id
+        self._findings = findings
+
+    def read(self, direction: Direction) -> list[PdoDraft]:
+        """Return all PDOs of a direction by ascending number."""
+        numbers = direction.numbers(self._eds.dictionary)
+        wanted = dict(self._wanted(direction, numbers))
+        drafts = []
+        for number in numbers:
+            draft = self._default(direction, number)
+            if number in wanted:
+                draft = self._configured(draft, wanted[number])
+            elif draft.config.enabled:
+                # the warnings of this mapping matter, as the PDO is in use
+                eds_mapping(direction, number, self._eds, self._findings)
+            drafts.append(draft)
+        return drafts
+
+    def _wanted(self, direction: Direction, numbers: list[int]) -> Iterator[tuple[int, YamlMap]]:
+        section = block(self._device, direction.name, self._findings)
+        for name, item in section.entries.items() if section else ():
+            number = key_number(name, PDO_COUNT_MAX)
+            if number not in numbers:
+                self._findings.refuse(item.place, _no_such_pdo(direction, name, number, numbers))
+            elif isinstance(item, YamlMap):
+                yield number, item
+            else:
+                self._findings.error(
+                    item.place,
+                    f'expected the keys of a PDO, got {describe(item)}',
+                    f"indent them below '{name}:'",
+                )
+
+    def _default(self, direction: Direction, number: int) -> PdoDraft:
+        """Describe a PDO as its EDS does."""
+        cob_id = self._parameter(direction, number, 1)
+        transmission = self._parameter(direction, number, 2)
+        if cob_id is None:
+            cob_id = COB_ID_INVALID
+        enabled = not cob_id & (COB_ID_INVALID | COB_ID_EXTENDED) and bool(cob_id & CAN_ID_MASK)
+        communication = direction.communication + number - 1
+        mapping = direction.mapping + number - 1
+        config = PdoConfig(
+            number,
+            enabled,
+            cob_id & CAN_ID_MASK,
+            TRANSMISSION_DEFAULT if transmission is None else transmission & 0xFF,
+            mapping=eds_mapping(direction, number, self._eds, Findings()),
+            configured=self._eds.dictionary.is_configured(communication, mapping),
+            fixed_mapping=is_fixed(direction, number, self._eds.dictionary),
+            **self._times(direction, communication),
+        )
+        return PdoDraft(config, direction, self._name, self._device.place)
+
+    def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
+        """Return the times that a DCF gives a PDO; others are left to the device."""
+        found = {}
+        for key in PDO_KEYS[direction.name]:
+            subindex = SUBINDICES.get(key.field, 0)
+            entry = self._eds.dictionary.get(communication, subindex) if subindex else None
+            if entry is not None and entry.configured and isinstance(entry.default, int):
+                found[key.field] = key.to_model(entry.default)
+        return found
+
+    def _parameter(self, direction: Direction, number: int, subindex: int) -> int | None:
+        entry = self._eds.dictionary.get(direction.communication + number - 1, subindex)
+        return entry.default if entry is not None and isinstance(entry.default, int) else None
+
+    def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
+        """Lay the values of bus.yml over a PDO of the EDS."""
+        values = read_section(section, PDO_KEYS[draft.direction.name], self._findings)
+        self._check_parameters(draft, section, values)
+        config = replace(draft.config, configured=True, **values)
+        draft = replace(draft, config=config, place=section.place)
+        entries = listing(section, 'mapping', self._findings)
+        if entries is not None:
+            draft = self._with_mapping(draft, entries)
+        if config.enabled and not (draft.config.mapping or (entries and entries.items)):
+            self._findings.error(
+                section.place,
+                f'{draft.title} is enabled, but maps nothing',
+                "write its mapping, or 'enabled: false'",
+            )
+        return self._with_cob_id(draft, section.entries.get('cob_id'))
+
+    def _with_mapping(self, draft: PdoDraft, entries: YamlList) -> PdoDraft:
+        config = draft.config
+        mapping = read_mapping(draft.direction, config.number, entries, self._eds, self._findings)
+        if config.fixed_mapping and mapping != config.mapping:
+            self._findings.error(
+                entries.place,
+                f'the mapping of {draft.title} is fixed (read-only in the EDS)',
+                'remove it, the mapping of the EDS counts',
+            )
+        return replace(draft, config=replace(config, mapping=mapping))
+
+    def _check_parameters(
+        self, draft: PdoDraft, section: YamlMap, values: dict[str, object]
+    ) -> None:
+        """Refuse what the device has no sub-index for, and transmission types without use."""
+        communication = draft.direction.communication + draft.config.number - 1
+        for key in PDO_KEYS[draft.direction.name]:
+            subindex = SUBINDICES.get(key.field)
+            if subindex is None or key.field not in values:
+                continue
+            if (communication, subindex) not in self._eds.dictionary:
+                self._findings.error(
+                    section.entries[key.name].place,
+                    f'the device cannot do this: {object_address(communication, subindex)} is not '
+                    'in its EDS',
+                    'remove the key',
+                )
+        transmission = values.get('transmission')
+        if isinstance(transmission, int) and SYNCHRONOUS_MAX < transmission < EVENT_TYPES[0]:
+            self._findings.error(
+                section.entries['transmission'].place,
+                f'transmission type {transmission} is reserved or requires remote frames',
+                'take 0 to 240 (with SYNC), or 254 or 255 (on events)',
+            )
+
+    def _with_cob_id(self, draft: PdoDraft, item: Item | None) -> PdoDraft:
+        """Add the COB-ID: a number, ``auto`` or the EDS's own."""
+        config = draft.config
+        if item is None:
+            if config.enabled and not config.cob_id:
+                self._findings.error(
+                    draft.place, f'{draft.title} has no COB-ID in the EDS', "write 'cob_id: auto'"
+                )
+            return draft
+        draft = replace(draft, place=item.place)
+        if isinstance(item, Scalar) and item.text.lower() == AUTO:
+            if config.number > PREDEFINED_MAX:
+                return replace(draft, auto=config.enabled)
+            cob_id = draft.direction.default_cob_id(config.number, self._node_id)
+            return replace(draft, config=replace(config, cob_id=cob_id))
+        try:
+            return replace(draft, config=replace(config, cob_id=_explicit(item)))
+        except RefusedError as reason:
+            self._findings.refuse(item.place, reason)
+            return draft
+
+
+def _no_such_pdo(
+    direction: Direction, name: str, number: int | None, numbers: list[int]
+) -> RefusedError:
+    """Say why a key below ``tpdo`` or ``rpdo`` is no PDO of the device."""
+    if any(key.name == name for key in PDO_KEYS[direction.name]):
+        return RefusedError(
+            f'{name!r} is no PDO number', f"indent {name!r} below a PDO number, such as '1:'"
+        )
+    if not number:
+        return RefusedError(f'{name!r} is no PDO number', f'PDO numbers are 1 to {PDO_COUNT_MAX}')
+    known = ', '.join(str(known) for known in numbers) or 'none'
+    index = direction.communication + number - 1
+    return RefusedError(
+        f'{direction.title} {number} ({object_address(index)}) is not in the EDS',
+        f'take one that the device has: {known}',
+    )
+
+
+def _explicit(item: Item) -> int:
+    cob_id = integer(item)
+    if not 0 < cob_id <= CAN_ID_MASK:
+        raise RefusedError(
+            f'{describe(item)} is no 11-bit identifier',
+            "take 0x181 to 0x6DF or 'auto'; a PDO is switched off with 'enabled: false'",
+        )
+    return cob_id
