@@ -25,7 +25,7 @@ setup(
     version='0.1.0',
     python_requires='>=3.10',
     packages=find_packages(include=['arm_model', 'arm_model.*']),
-    package_data={'arm_model': ['py.typed']},
+    package_data={'arm_model': ['py.typed', 'panda/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/arm_model']),
         ('share/arm_model', ['package.xml']),

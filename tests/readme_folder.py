@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The files and the robot that the examples of the READMEs are written for."""
+"""Runs the examples of a README where and beside what they are written for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 
-from arm_bringup.description import expand_xacro
+from arm_model import example_files
 
 CHECKOUT = Path(__file__).parents[1]
 READMES = (
@@ -29,7 +29,7 @@ READMES = (
     'robot_viewer',
 )
 """Packages that are libraries without ROS, too."""
-PANDA = CHECKOUT / 'arm_bringup' / 'robots' / 'panda'
+BESIDE_A_PANDA = ('arm_planning', 'arm_servo', 'robot_viewer')
 PORT = '/dev/ttyAMA0'  # of the robot, in the READMEs
 TIMEOUT = 120.0  # [s]
 
@@ -37,17 +37,17 @@ TIMEOUT = 120.0  # [s]
 def run_examples(
     package: str, folder: Path, python: str | Path, env: Mapping[str, str]
 ) -> subprocess.CompletedProcess[str]:
-    """Run the examples of a README in a folder with the files of an arm, beside a simulated XGO.
+    """Run the examples of a README at the top of the checkout, beside a simulated XGO.
 
     Args:
         package: The package.
-        folder: An empty folder.
+        folder: An empty folder; those of :data:`BESIDE_A_PANDA` run in it, with its files.
         python: The interpreter whose packages are used.
         env: Environment of the processes; its ROS domain chooses the CAN bus.
     """
-    for file in ('bus.yml', 'cia402_slave.eds', 'panda.srdf', 'limits.yaml'):
-        shutil.copy(PANDA / file, folder)
-    (folder / 'panda.urdf').write_text(expand_xacro(PANDA / 'panda.urdf.xacro'))
+    if package in BESIDE_A_PANDA:
+        for file in example_files():
+            shutil.copy(file, folder)
     text = (CHECKOUT / package / 'README.md').read_text()
     readme, port = folder / 'README.md', folder / 'xgo'
     readme.write_text(text.replace(PORT, str(port)))
@@ -60,7 +60,7 @@ def run_examples(
             assert process.stdout.readline()  # it is there
         return subprocess.run(
             [python, Path(__file__).with_name('readme_examples.py'), readme],
-            cwd=folder,
+            cwd=folder if package in BESIDE_A_PANDA else CHECKOUT,
             env=env,
             capture_output=True,
             text=True,

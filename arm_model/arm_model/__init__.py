@@ -10,6 +10,7 @@ move; a :class:`PlanningScene` holds what may collide, :class:`Clearances` measu
 from __future__ import annotations
 
 from .arrays import Array, checked, frozen, Mask, Native, Places
+from .example import ArmFiles, example_files
 from .exceptions import (
     ArmError,
     CommandError,
@@ -39,6 +40,7 @@ __all__ = [
     'ORIGIN',
     'AllowedCollisionMatrix',
     'ArmError',
+    'ArmFiles',
     'ArmNames',
     'Array',
     'AttachedBody',
@@ -75,6 +77,7 @@ __all__ = [
     'Sphere',
     'checked',
     'combined',
+    'example_files',
     'frozen',
     'inverse',
     'load_limits',

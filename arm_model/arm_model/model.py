@@ -18,7 +18,7 @@ from urdf_reader import EndEffector, find_group, KinematicTree, Pair, parse_srdf
 from .arrays import Array, frozen, Native
 from .exceptions import CommandError, description_refused, ModelError, SceneError
 from .kinematics import Kinematics
-from .limits import JointLimits, merge_limits
+from .limits import JointLimits, load_limits, merge_limits
 from .pose import Pose, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, LeastClearance, Proximity
@@ -129,6 +129,30 @@ class RobotModel:
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
         self.reach = self._reach()
+
+    @classmethod
+    def from_files(
+        cls,
+        urdf: Path | str,
+        srdf: Path | str,
+        limits: Path | str,
+        group: str | None = None,
+        tip: str | None = None,
+    ) -> RobotModel:
+        """Build an arm from its files; meshes with relative names lie beside the URDF.
+
+        Args:
+            urdf: Robot description.
+            srdf: Semantic description.
+            limits: Limits of the joints, as MoveIt's joint_limits.yaml has them.
+            group: As in the constructor.
+            tip: As in the constructor.
+
+        Raises:
+            ModelError: A file cannot be read, or the three do not fit together.
+        """
+        table, folder = load_limits(limits), Path(urdf).parent
+        return cls(_text(Path(urdf)), _text(Path(srdf)), table, group, tip, folder=folder)
 
     def __len__(self) -> int:
         """Return the number of joints."""
@@ -415,3 +439,10 @@ def _poses(
             continue
         found[name] = values
     return found
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f'{path}: {error}') from error

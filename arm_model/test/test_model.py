@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import combinations
 import math
+from pathlib import Path
 from typing import Any
 
 from hypothesis import given, settings
@@ -16,7 +17,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from arm_model import Array, CommandError, load_limits, ModelError, Pose, RobotModel
+from arm_model import (
+    Array,
+    CommandError,
+    example_files,
+    load_limits,
+    ModelError,
+    Pose,
+    RobotModel,
+)
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
 
@@ -312,3 +321,13 @@ def test_links_that_can_meet_are_checked(name: str, pair: tuple[str, str]) -> No
     """Though their distance is seldom small; the pose to start from is clear."""
     assert frozenset(pair) in set(map(frozenset, robot(name).pairs))
     assert robot(name).clearance(ready(name)) > 0.01
+
+
+def test_files_are_read(tmp_path: Path) -> None:
+    """As the constructor takes their texts; one that is not there is named."""
+    files = example_files()
+    urdf, srdf = files.urdf.read_text(), files.srdf.read_text()
+    one, same = RobotModel.from_files(*files), RobotModel(urdf, srdf, load_limits(files.limits))
+    assert (one.name, one.joints, one.tip) == (same.name, same.joints, same.tip)
+    with pytest.raises(ModelError, match=r'none\.srdf'):
+        RobotModel.from_files(files.urdf, tmp_path / 'none.srdf', files.limits)
