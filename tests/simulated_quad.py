@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from processes import RunningProcess
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos import qos_profile_sensor_data
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from serial_tap import SerialTap
 from std_msgs.msg import String
 
+from node_runner import LATCHED
 from process_supervisor import find_executable, write_parameters
 from quad_bringup.demo.main import GROUND_TRUTH
 from quad_bringup.demo.segments import Velocity
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 AHEAD = Velocity(forward=0.2)
 """The demo's velocity."""
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TIMEOUT = 20.0
 """Longest time in [s] for a mode to be accepted."""
 ANSWER = 1.0

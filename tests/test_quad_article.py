@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from processes import RunningProcess
 import psutil
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_client import RosClient
 from tf2_msgs.msg import TFMessage
 
+from node_runner import LATCHED
 from quad_description import LEGS
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ pytestmark = pytest.mark.scenario
 
 STARTING = 60.0
 """Longest time in [s] until all is ready on a busy machine."""
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 SET_MODE = ('service', 'call', '/set_mode', 'quad_msgs/srv/SetMode')
 
 

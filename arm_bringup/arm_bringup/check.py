@@ -39,7 +39,7 @@ def check_robot(robot: Robot) -> list[Finding]:
         urdf = read_description(robot)
         tree = read_urdf(urdf)
     except (DescriptionError, urdf_reader.DescriptionError) as problem:
-        return [*findings, error(robot.description.name, str(problem), 'mend the description')]
+        return [*findings, error(robot.description.name, str(problem), 'correct the description')]
     if drives:
         findings += _names(robot, drives, tree)
     if robot.lacking:

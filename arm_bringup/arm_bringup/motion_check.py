@@ -79,7 +79,7 @@ def check_motion(
             findings.append(error(robot.limits.name, str(problem), _limits_remedy(robot)))
             continue
         except ModelError as problem:
-            remedy = 'choose another group or tip_link, or mend the file'
+            remedy = 'choose another group or tip_link, or correct the file'
             place = f'{robot.semantic.name} with {robot.description.name}'
             findings.append(error(place, str(problem), remedy))
             continue
@@ -106,7 +106,7 @@ def _note(robot: Robot, note: str) -> tuple[str, str, str]:
     if 'disable_collisions' in note:
         return robot.semantic.name, note, 'add disable_collisions for these pairs'
     if 'SRDF' in note:
-        return robot.semantic.name, note, 'mend the pose, or leave it out'
+        return robot.semantic.name, note, 'correct the pose, or leave it out'
     if 'is not installed' in note:
         remedy = f'or give the folder of the package in {SETTINGS} (packages: {{NAME: FOLDER}})'
         return robot.description.name, note, remedy
@@ -135,7 +135,7 @@ def _found_start(robot: Robot, model: RobotModel) -> Finding:
     try:
         start = start_pose(model)
     except ModelError as refused:
-        return error(robot.semantic.name, f'{problem}; {refused}', 'mend it, then add the pose')
+        return error(robot.semantic.name, f'{problem}; {refused}', 'correct it, then add the pose')
     joints = ' '.join(
         f'<joint name="{name}" value="{place:g}"/>'
         for name, place in zip(model.joints, start, strict=True)
@@ -226,5 +226,5 @@ def _controllers(
                     f'joints: {", ".join(models[group].joints)}',
                 )
     for node, reason in refused:
-        remedy = 'mend it: the node would end with these words; README of arm_servo has them all'
+        remedy = 'correct it: the node would end with these words; see the README of arm_servo'
         yield error(f'{place}, {node}', reason, remedy)

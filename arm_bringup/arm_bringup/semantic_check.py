@@ -40,7 +40,7 @@ def check_semantic(
     try:
         semantic = parse_srdf(read_semantic(robot))
     except (DescriptionError, urdf_reader.DescriptionError) as problem:
-        return [error(place, str(problem), 'mend it: the arm has no group without')], None
+        return [error(place, str(problem), 'correct it: the arm has no group without')], None
     wrong = [
         finding
         for group in semantic.groups.values()

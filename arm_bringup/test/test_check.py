@@ -116,7 +116,7 @@ def test_each_mistake_is_found(
 def test_the_remedy_is_for_the_file_that_is_the_matter(
     robot: Robot, file: str, old: str, new: str, remedy: str
 ) -> None:
-    """A person is sent to the file to be mended."""
+    """A person is sent to the file to correct."""
     replace(robot.folder / file, old, new)
     (found,) = check_robot(robot)
     assert found.place.startswith(file)

@@ -236,7 +236,7 @@ def test_an_adapter_that_is_plugged_in_again_is_used_again(vcan: str) -> None:
 
 @pytest.mark.vcan
 def test_a_short_transmit_queue_is_warned_of(vcan: str, caplog: pytest.LogCaptureFixture) -> None:
-    """A queue shorter than one cycle of an arm is reported with the command that mends it."""
+    """A queue shorter than one cycle of an arm is reported with the command that corrects it."""
     ip_link('set', vcan, 'up', 'txqueuelen', '10')
     with caplog.at_level(logging.WARNING), open_bus(vcan):
         pass

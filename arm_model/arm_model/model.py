@@ -80,7 +80,7 @@ class RobotModel:
                 they move against each other are not checked, until a scene says where they are.
 
         Raises:
-            ModelError: The three do not fit together; the message names what to mend.
+            ModelError: The three do not fit together; the message names what to correct.
         """
         tree, semantic = read_urdf(urdf), parse_srdf(srdf)
         chosen = find_group(tree, semantic, group, tip)

@@ -255,7 +255,7 @@ def test_a_target_goes_at_the_overridden_speed() -> None:
     assert fastest == pytest.approx(0.2 * 1.57, rel=1e-3)
 
 
-def test_a_nudge_goes_at_its_own_speed() -> None:
+def test_a_displacement_goes_at_its_own_speed() -> None:
     """As fast as it was given and no faster, also with the speed override on top."""
     for speed in (1.0, 0.5):
         core = core_of('prbt')

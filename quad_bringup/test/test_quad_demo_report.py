@@ -38,7 +38,7 @@ GOOD = Figures(
     periods=PeriodFigures(50.0, 0.0001, 0.0009),
     battery=87.0,
 )
-STRETCHES = [
+SEGMENTS = [
     Measured(WALK, Velocity(0.196, 0.002, -0.01), Velocity(0.19, 0.0, 0.0)),
     Measured(TURN, Velocity(0.01, 0.0, 0.84), Velocity(0.0, 0.0, 0.8)),
 ]
@@ -48,8 +48,8 @@ STATUS = DemoStatus(12.34, 'walk', (), ('ros2 topic hz /joint_command',))
 
 def test_a_robot_that_moves_as_commanded_is_no_problem() -> None:
     """The summary has commanded, measured, odometry, tilt and jitter."""
-    assert problems(GOOD, STRETCHES) == []
-    lines = summary_lines(GOOD, STRETCHES)
+    assert problems(GOOD, SEGMENTS) == []
+    lines = summary_lines(GOOD, SEGMENTS)
     assert max(map(len, lines)) < 80
     text = '\n'.join(lines)
     for words in ('+0.200', '+0.196', '+0.190', '+0.84', '2.5°', '50.0 Hz', '0.10/0.90 ms'):
@@ -102,11 +102,11 @@ def test_odometry_counts_where_there_is_no_ground_truth() -> None:
 )
 def test_what_else_can_go_wrong_is_reported(change: dict[str, object], words: str) -> None:
     """One sentence each."""
-    (text,) = problems(replace(GOOD, **change), STRETCHES)  # type: ignore[arg-type]
+    (text,) = problems(replace(GOOD, **change), SEGMENTS)  # type: ignore[arg-type]
     assert words in text
 
 
-def test_progress_says_state_speeds_tilt_and_rhythm() -> None:
+def test_progress_says_state_speeds_tilt_and_periods() -> None:
     """In one line, with or without a robot."""
     text = progress_line(GOOD)
     for words in ('walk', 'commanded +0.200', 'measured +0.196', 'tilt 1.0°', '50.0 Hz'):

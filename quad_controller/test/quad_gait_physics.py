@@ -23,7 +23,7 @@ MODEL = quadruped(robot_urdf())
 
 @dataclass(frozen=True)
 class Travel:
-    """How the robot went; means over a stretch of time, in its own frame.
+    """How the robot went; means over some time, in its own frame.
 
     Attributes:
         x: Forward in [m/s].

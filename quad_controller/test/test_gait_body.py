@@ -50,7 +50,7 @@ def test_moving_the_body_is_rigid(pose: BodyPose) -> None:
 
 
 def test_a_body_that_hangs_to_the_right_is_lifted_there() -> None:
-    """Levelling stretches the legs of the side that hangs."""
+    """Levelling extends the legs of the side that hangs."""
     leveller = Leveller(gain=0.5)
     for _ in range(100):
         pose = leveller.step((0.1, 0.0, 0.0), UPRIGHT, 0.02)  # roll: left side up, right side down

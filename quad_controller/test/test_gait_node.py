@@ -25,9 +25,9 @@ from ros_client import RosClient
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
-from node_runner import ParameterError
+from node_runner import LATCHED, ParameterError
 from quad_controller.exceptions import QuadControllerError
-from quad_controller.nodes.controller_node import ControllerNode, LATCHED_QOS
+from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
 from quad_gait_policies import metadata, write_policy
 from quad_msgs.msg import JointCommand
@@ -70,7 +70,7 @@ class Robot:
         self.stamped = node.create_publisher(TwistStamped, 'cmd_vel_stamped', 1)
         self.commands: list[Any] = []
         node.create_subscription(JointCommand, 'joint_command', self._follow, 1)
-        self.states = client.listen(String, 'controller_node/state', LATCHED_QOS)
+        self.states = client.listen(String, 'controller_node/state', LATCHED)
         self.diagnostics = client.listen(DiagnosticArray, '/diagnostics', 50)
 
     def begin(self) -> None:
@@ -186,7 +186,7 @@ def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> 
         client = stack.enter_context(RosClient(isolation.domain_id))
         process.wait_for('waiting for joint_states')
         robot = Robot(client, process)
-        reports = client.listen(String, 'controller_node/policy', LATCHED_QOS)
+        reports = client.listen(String, 'controller_node/policy', LATCHED)
         shadows = client.listen(JointCommand, 'joint_command_shadow', 1)
         robot.begin()
         client.spin_until(lambda: bool(shadows and reports), 20.0, 'shadow commands')

@@ -8,12 +8,11 @@ import sys
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from node_runner import destroyed_when_refused, ParameterReader, refuse_misspelt, run_node
+from node_runner import destroyed_when_refused, LATCHED, ParameterReader, refuse_misspelt, run_node
 
 from .exceptions import DescriptionError
 from .kinematics.quadruped import quadruped
@@ -51,8 +50,7 @@ class Display(Node):
         self._robot, self._joints = quadruped(urdf), movable_joints(urdf)
         self._moves = motion == SWEEP
         self._rest = pose_positions(Pose.STAND if self._moves else Pose(motion), arm)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._description = self.create_publisher(String, 'robot_description', latched)
+        self._description = self.create_publisher(String, 'robot_description', LATCHED)
         self._description.publish(String(data=urdf))
         self._states = self.create_publisher(JointState, 'joint_states', 10)
         self._tf = self.create_publisher(TFMessage, '/tf', 10)

@@ -19,11 +19,11 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from node_runner import LATCHED
 from quad_description import movable_joints, Pose, pose_positions, quadruped, robot_urdf
 from quad_description.sweep import sweep, SWEEP_DURATION
 
@@ -103,8 +103,7 @@ def test_the_display_publishes_what_viewers_need(listener: Listener, isolation: 
     process = display(isolation, 'preset:=mini', 'arm:=true', 'motion:=lie')
     try:
         states = listener.wait_for(JointState, '/joint_states', 10)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        description = listener.wait_for(String, '/robot_description', latched)
+        description = listener.wait_for(String, '/robot_description', LATCHED)
         assert description.data == robot_urdf('mini', arm=True)
         tree = listener.wait_for(TFMessage, '/tf', 10).transforms[0]
         assert (tree.header.frame_id, tree.child_frame_id) == ('base_link', 'base_footprint')

@@ -59,7 +59,7 @@ ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
 def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Frames) -> None:
     """base_link where odometry has it; base_footprint below it on the ground, level."""
     numbers = messages.transforms_numbers(replace(PLACE, rotation=rotation), frames)
-    first, second = messages.transforms_form(frames).message(STAMP, numbers).transforms
+    first, second = messages.transforms_template(frames).message(STAMP, numbers).transforms
     chain = {first.child_frame_id: pose(first.transform)}
     (x, y, z), turn = pose(first.transform)
     offset, further = pose(second.transform)
@@ -87,8 +87,8 @@ def pose(transform: Transform) -> tuple[Vector, Rotation]:
 def test_joints_keep_their_order() -> None:
     """Each velocity stands beside its name; efforts, and joints not measured, are left out."""
     joints = JointSample((0.1, 0.5, 0.2), (1.0, 0.0, 2.0), unmeasured=(1,))
-    form = messages.joint_states_form(('b', 'arm', 'a'), joints)
-    message = form.message(STAMP, messages.joint_numbers(joints))
+    template = messages.joint_states_template(('b', 'arm', 'a'), joints)
+    message = template.message(STAMP, messages.joint_numbers(joints))
     assert message.name == ['b', 'a']
     assert list(message.position) == [0.1, 0.2]
     assert list(message.velocity) == [1.0, 2.0]
@@ -97,16 +97,16 @@ def test_joints_keep_their_order() -> None:
 
 def imu(sample: ImuSample) -> Imu:
     """The message of a sample."""
-    form = messages.imu_form(sample, DEVIATIONS, 'imu_link')
-    message: Imu = form.message(STAMP, messages.imu_numbers(sample))
+    template = messages.imu_template(sample, DEVIATIONS, 'imu_link')
+    message: Imu = template.message(STAMP, messages.imu_numbers(sample))
     return message
 
 
 def odometry(state: OdometryState, frames: Frames) -> Odometry:
     """The message of a place."""
-    form = messages.odometry_form(IMU, DEVIATIONS, frames)
+    template = messages.odometry_template(IMU, DEVIATIONS, frames)
     numbers = messages.odometry_numbers(IMU, state, frames)
-    message: Odometry = form.message(STAMP, numbers)
+    message: Odometry = template.message(STAMP, numbers)
     return message
 
 
@@ -119,7 +119,7 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
     stamps: dict[str, int] = {}
 
     def stream(name: str) -> Any:
-        return SimpleNamespace(publish=lambda _form, stamp, _numbers: stamps.update({name: stamp}))
+        return SimpleNamespace(publish=lambda _, stamp, __: stamps.update({name: stamp}))
 
     node: Any = object.__new__(HardwareNode)
     estimator = Estimator(urdf, joints, EstimatorSettings())
@@ -171,25 +171,26 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
 FORMS: list[MessageTemplate] = [
     messages.JointStates(('a',)),
     messages.JointStates(tuple('abcdefghijkl')),
-    messages.ImuForm('imu_link', 0.02, 0.3, 0.15),
-    messages.ImuForm('', 0.02, None, None),
-    messages.OdometryForm('odom', 'base_link', 0.02, 0.1),
-    messages.OdometryForm('o', 'a longer name', 0.02, None),
-    messages.transforms_form(FRAMES),
-    messages.transforms_form(PARENT),
+    messages.ImuTemplate('imu_link', 0.02, 0.3, 0.15),
+    messages.ImuTemplate('', 0.02, None, None),
+    messages.OdometryTemplate('odom', 'base_link', 0.02, 0.1),
+    messages.OdometryTemplate('o', 'a longer name', 0.02, None),
+    messages.transforms_template(FRAMES),
+    messages.transforms_template(PARENT),
 ]
 
 
 @given(st.sampled_from(FORMS), st.integers(0, 2**31 * 10**9 - 1), st.data())
 def test_every_form_takes_its_numbers(
-    form: MessageTemplate, time: int, data: st.DataObject
+    template: MessageTemplate, time: int, data: st.DataObject
 ) -> None:
     """Whatever its numbers, and whenever it is stamped."""
     floats = st.floats(allow_nan=False)
-    numbers = data.draw(st.lists(floats, min_size=form.count, max_size=form.count))
-    message = form.message(Time(sec=time // 10**9, nanosec=time % 10**9), numbers)
+    numbers = data.draw(st.lists(floats, min_size=template.count, max_size=template.count))
+    message = template.message(Time(sec=time // 10**9, nanosec=time % 10**9), numbers)
     assert (
-        deserialize_message(SerializedTemplate(form).fill(time, numbers), type(message)) == message
+        deserialize_message(SerializedTemplate(template).fill(time, numbers), type(message))
+        == message
     )
 
 
@@ -286,8 +287,8 @@ def test_the_level_of_the_robot(
 def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -> None:
     """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
     sample = replace(IMU, deviation=0.0 if checked else UNCHECKED_DEVIATION)
-    imu = messages.imu_form(sample, DEVIATIONS, 'imu_link')
-    odometry = messages.odometry_form(sample, DEVIATIONS, FRAMES)
+    imu = messages.imu_template(sample, DEVIATIONS, 'imu_link')
+    odometry = messages.odometry_template(sample, DEVIATIONS, FRAMES)
     expected = DEVIATIONS.orientation if checked else pytest.approx(math.pi / 2)
     assert imu.orientation == odometry.tilt == expected
     state = Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})

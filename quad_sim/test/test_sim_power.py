@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Battery, warmth and overload of the simulated robot."""
+"""Battery, temperatures and overload of the simulated robot."""
 
 from __future__ import annotations
 

@@ -8,14 +8,20 @@ the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
 """
 
 from .joint_watch import JointWatch
-from .state_publisher import FrameTransform, joint_transform, Remark, Settings, StatePublisher
+from .state_publisher import (
+    FrameTransform,
+    joint_transform,
+    MessageProblem,
+    Settings,
+    StatePublisher,
+)
 
 __version__ = '0.1.0'
 
 __all__ = [
     'FrameTransform',
     'JointWatch',
-    'Remark',
+    'MessageProblem',
     'Settings',
     'StatePublisher',
     'joint_transform',

@@ -76,7 +76,7 @@ class FrameTransform:
     transform: Transform
 
 
-class Remark(Enum):
+class MessageProblem(Enum):
     """What is wrong with a message."""
 
     LENGTHS = 'name and position have different lengths; the message is ignored'
@@ -93,12 +93,12 @@ class Update:
     Attributes:
         stamp: Stamp of the transforms in [ns].
         transforms: To be published, possibly none.
-        remarks: What is wrong with the message.
+        problems: What is wrong with the message.
     """
 
     stamp: int
     transforms: tuple[FrameTransform, ...] = ()
-    remarks: tuple[Remark, ...] = ()
+    problems: tuple[MessageProblem, ...] = ()
 
 
 def joint_transform(joint: Joint, position: float) -> Transform:
@@ -173,27 +173,29 @@ class StatePublisher:
             What follows.
         """
         if len(names) != len(positions):
-            return Update(stamp, (), (Remark.LENGTHS if positions else Remark.NO_POSITION,))
-        remarks = [*self._clock_remarks(now)]
+            return Update(
+                stamp, (), (MessageProblem.LENGTHS if positions else MessageProblem.NO_POSITION,)
+            )
+        problems = [*self._clock_problems(now)]
         if not stamp and not self.settings.ignore_timestamp:
-            remarks.append(Remark.NO_STAMP)
+            problems.append(MessageProblem.NO_STAMP)
             stamp = now
         if not self._is_due(names, stamp, now):
-            return Update(stamp, (), tuple(remarks))
+            return Update(stamp, (), tuple(problems))
         finite = {
             name: position
             for name, position in zip(names, positions, strict=True)
             if math.isfinite(position)
         }
         if len(finite) < len(set(names)):
-            remarks.append(Remark.NOT_FINITE)
+            problems.append(MessageProblem.NOT_FINITE)
         self._published.update(dict.fromkeys(names, stamp))
-        return Update(stamp, tuple(self._transforms(finite)), tuple(remarks))
+        return Update(stamp, tuple(self._transforms(finite)), tuple(problems))
 
-    def _clock_remarks(self, now: int) -> Iterator[Remark]:
+    def _clock_problems(self, now: int) -> Iterator[MessageProblem]:
         if now < self._last_now:  # a bag that begins again, or a simulation that was reset
             self._published.clear()
-            yield Remark.BACKWARDS
+            yield MessageProblem.BACKWARDS
         self._last_now = now
 
     def _is_due(self, names: Sequence[str], stamp: int, now: int) -> bool:

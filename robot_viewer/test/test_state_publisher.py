@@ -13,7 +13,7 @@ import pytest
 from urdf_reader import read_urdf
 from urdf_robots import ARM, POSITIONS
 
-from robot_viewer import Remark, Settings, StatePublisher
+from robot_viewer import MessageProblem, Settings, StatePublisher
 from robot_viewer.state_publisher import Update
 
 MS = 1_000_000
@@ -47,7 +47,7 @@ def test_only_joints_of_the_message_are_published_with_its_stamp() -> None:
     update = send(publisher(), START, shoulder=0.1, of_another_robot=1.0)
     assert children(update) == {'upper'}
     assert update.stamp == START
-    assert update.remarks == ()
+    assert update.problems == ()
 
 
 def test_a_joint_that_follows_is_published_with_its_source() -> None:
@@ -122,7 +122,7 @@ def test_a_clock_that_jumps_back_begins_anew() -> None:
     send(core, START)
     update = send(core, START // 2)
     assert update.transforms
-    assert update.remarks == (Remark.BACKWARDS,)
+    assert update.problems == (MessageProblem.BACKWARDS,)
 
 
 def test_an_old_message_is_passed_over() -> None:
@@ -132,28 +132,32 @@ def test_an_old_message_is_passed_over() -> None:
     names = list(POSITIONS)
     late = core.update(names, list(POSITIONS.values()), START - 5 * MS, START + MS)
     assert late.transforms == ()
-    assert late.remarks == ()
+    assert late.problems == ()
 
 
 def test_a_message_without_stamp_gets_the_time_of_its_arrival() -> None:
     """A transform of the year 1970 is of no use to anybody."""
     update = publisher().update(['shoulder'], [0.0], 0, START)
     assert update.stamp == START
-    assert update.remarks == (Remark.NO_STAMP,)
+    assert update.problems == (MessageProblem.NO_STAMP,)
     assert update.transforms
 
 
 @pytest.mark.parametrize(
-    ('positions', 'remark'),
-    [([], Remark.NO_POSITION), ([0.0], Remark.LENGTHS), ([0.0] * 3, Remark.LENGTHS)],
+    ('positions', 'problem'),
+    [
+        ([], MessageProblem.NO_POSITION),
+        ([0.0], MessageProblem.LENGTHS),
+        ([0.0] * 3, MessageProblem.LENGTHS),
+    ],
 )
 def test_a_message_with_the_wrong_lengths_is_ignored(
-    positions: list[float], remark: Remark
+    positions: list[float], problem: MessageProblem
 ) -> None:
     """And said so; the next good one is published."""
     core = publisher()
     update = core.update(['shoulder', 'lift'], positions, START, START)
-    assert update == Update(START, (), (remark,))
+    assert update == Update(START, (), (problem,))
     assert send(core, START + MS).transforms
 
 
@@ -162,7 +166,7 @@ def test_a_position_that_is_not_finite_is_left_out(value: float) -> None:
     """The others are published; NaN in /tf breaks whoever listens."""
     update = send(publisher(), START, shoulder=value, lift=0.1)
     assert children(update) == {'slider'}
-    assert update.remarks == (Remark.NOT_FINITE,)
+    assert update.problems == (MessageProblem.NOT_FINITE,)
 
 
 @pytest.mark.parametrize('frequency', [-1.0, 1000.1, math.nan])

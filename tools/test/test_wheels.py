@@ -12,9 +12,9 @@ from workspace.wheels import (
     BOOTSTRAP_FILE,
     BOOTSTRAP_LINE,
     library_folders,
-    mend_bootstrapper,
-    mend_cmake_files,
-    mend_cmake_text,
+    patch_bootstrapper,
+    patch_cmake_files,
+    patch_cmake_text,
 )
 
 BUILDER = '/opt/python/cp311-cp311'
@@ -26,15 +26,15 @@ EXPORTED = (
 
 def test_builder_paths_become_ours() -> None:
     """Both folders are replaced, and what else stands in the line stays."""
-    mended = mend_cmake_text(EXPORTED, '/inc', '/np')
-    assert mended == 'INTERFACE_INCLUDE_DIRECTORIES "/inc;/np;/usr/include"'
+    patched = patch_cmake_text(EXPORTED, '/inc', '/np')
+    assert patched == 'INTERFACE_INCLUDE_DIRECTORIES "/inc;/np;/usr/include"'
 
 
 @given(st.text(alphabet='/abpython3.1;"\n ', max_size=60))
-def test_mending_twice_is_mending_once(text: str) -> None:
+def test_patching_twice_is_patching_once(text: str) -> None:
     """The fix-up is idempotent, also for text with a path or two in it."""
-    once = mend_cmake_text(EXPORTED + text, '/inc', '/np')
-    assert mend_cmake_text(once, '/inc', '/np') == once
+    once = patch_cmake_text(EXPORTED + text, '/inc', '/np')
+    assert patch_cmake_text(once, '/inc', '/np') == once
 
 
 def test_only_files_that_need_it_are_written(tmp_path: Path) -> None:
@@ -45,7 +45,7 @@ def test_only_files_that_need_it_are_written(tmp_path: Path) -> None:
     cached = tmp_path / 'cached'
     cached.write_text(EXPORTED)
     (share / 'export.cmake').hardlink_to(cached)
-    assert [mend_cmake_files(tmp_path, '/inc', '/np') for _ in range(2)] == [1, 0]
+    assert [patch_cmake_files(tmp_path, '/inc', '/np') for _ in range(2)] == [1, 0]
     assert cached.read_text() == EXPORTED
     assert BUILDER not in (share / 'export.cmake').read_text()
 
@@ -63,7 +63,7 @@ def bootstrapped(tmp_path: Path) -> list[str]:
     """A command that starts an interpreter as site does with our line and a fake bootstrapper."""
     (tmp_path / 'ros_wheels_bootstrapper.py').write_text('print("bootstrapped")\n')
     (tmp_path / BOOTSTRAP_FILE).write_text('import ros_wheels_bootstrapper\n')
-    mend_bootstrapper(tmp_path)
+    patch_bootstrapper(tmp_path)
     assert (tmp_path / BOOTSTRAP_FILE).read_text() == BOOTSTRAP_LINE
     folder = repr(str(tmp_path))
     code = f'import site, sys; sys.path.insert(0, {folder}); site.addsitedir({folder})'

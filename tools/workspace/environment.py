@@ -155,7 +155,7 @@ class Environment:
     def _finish(self, runner: Runner) -> None:
         libraries = []
         if self.underlay.kind is UnderlayKind.WHEELS:
-            libraries = wheels.mend(runner, self.layout.venv, self.layout.venv_python)
+            libraries = wheels.patch(runner, self.layout.venv, self.layout.venv_python)
         shell.write_setup_scripts(self.layout.venv, self.underlay, libraries)
         front_end = self.layout.root / 'tools' / 'ros2_frontend'
         shell.write_front_end(self.layout.venv, self.underlay, front_end)

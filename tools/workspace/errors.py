@@ -69,7 +69,7 @@ class StepFailedError(WorkspaceError):
         """Show the last lines that the program printed."""
         super().__init__(
             f'{what} failed (exit code {code}).',
-            f'Its last lines:\n{tail}\nRun again after mending it; finished steps are kept.',
+            f'Its last lines:\n{tail}\nRun again after correcting it; finished steps are kept.',
         )
 
 

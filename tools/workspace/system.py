@@ -37,7 +37,7 @@ SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
 
 
 def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:
-    """Refuse a system that no remedy on it can mend.
+    """Refuse a system that no remedy on it can help.
 
     Raises:
         UnsupportedSystemError: The machine, the Python or the checkout's place is not supported.

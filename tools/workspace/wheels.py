@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Mends what the ROS wheels bring from the machine that built them; safe to run again."""
+"""Patches what the ROS wheels bring from the machine that built them; safe to run again."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BOOTSTRAP_LINE = (
 )
 
 
-def mend_cmake_text(text: str, include: str, numpy_include: str) -> str:
+def patch_cmake_text(text: str, include: str, numpy_include: str) -> str:
     """Replace the builder's include folders by those of this machine.
 
     Args:
@@ -40,8 +40,8 @@ def mend_cmake_text(text: str, include: str, numpy_include: str) -> str:
     )
 
 
-def mend_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
-    """Mend every CMake file of an installation.
+def patch_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
+    """Patch every CMake file of an installation.
 
     Args:
         prefix: The virtual environment.
@@ -54,14 +54,14 @@ def mend_cmake_files(prefix: Path, include: str, numpy_include: str) -> int:
     changed = 0
     for path in sorted((prefix / 'share').rglob('*.cmake')):
         text = path.read_text(encoding='utf-8', errors='surrogateescape')
-        mended = mend_cmake_text(text, include, numpy_include)
-        if mended != text:
-            write_atomically(path, mended)
+        patched = patch_cmake_text(text, include, numpy_include)
+        if patched != text:
+            write_atomically(path, patched)
             changed += 1
     return changed
 
 
-def mend_bootstrapper(site_packages: Path) -> None:
+def patch_bootstrapper(site_packages: Path) -> None:
     """Let an interpreter that has the library path start once."""
     path = site_packages / BOOTSTRAP_FILE
     if path.is_file() and path.read_text(encoding='utf-8') != BOOTSTRAP_LINE:
@@ -73,7 +73,7 @@ def library_folders(prefix: Path, site_packages: Path) -> list[Path]:
     return [prefix / 'lib', *sorted(site_packages.glob('ros_*.libs'))]
 
 
-def mend(runner: Runner, prefix: Path, python: Path) -> list[Path]:
+def patch(runner: Runner, prefix: Path, python: Path) -> list[Path]:
     """Make the wheels in a virtual environment fit this machine.
 
     Args:
@@ -91,6 +91,6 @@ def mend(runner: Runner, prefix: Path, python: Path) -> list[Path]:
     )
     runner.run('Asking the new environment for its paths', [python, '-c', code, answer])
     site_packages, include, numpy_include = json.loads(answer.read_text(encoding='utf-8'))
-    mend_cmake_files(prefix, include, numpy_include)
-    mend_bootstrapper(Path(site_packages))
+    patch_cmake_files(prefix, include, numpy_include)
+    patch_bootstrapper(Path(site_packages))
     return library_folders(prefix, Path(site_packages))

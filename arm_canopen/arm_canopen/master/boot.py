@@ -132,7 +132,7 @@ class BootProcess:
         await self._check_identity(node.config.identity)
         # PDO parameters may only be written while the device does not process PDOs
         await self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        if node.life.owed and node.config.uses_node_guarding:
+        if node.life.silent and node.config.uses_node_guarding:
             await self._await_answer_to_guarding()
         self._fault = BootFault.CONFIGURATION
         if node.config.restore_configuration and not self._restored:
@@ -141,7 +141,7 @@ class BootProcess:
         await self._configurator.apply()
         # not waiting for the first heartbeat saves its period; its absence is noticed all the
         # same, and only a device that once was without it has to show it first
-        if node.life.owed and not node.config.uses_node_guarding:
+        if node.life.silent and not node.config.uses_node_guarding:
             await self._await_heartbeat(configured_at)
         await read_outputs(node, self._sdo_timeout)
         started = await self._admitted()

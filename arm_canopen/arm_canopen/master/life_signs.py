@@ -18,7 +18,7 @@ class LifeSigns:
 
     Attributes:
         last: Steady time of the last heartbeat, or of the last answer, in [s].
-        owed: It was started and has never shown one, though it is supervised; it has to show one
+        silent: It was started and has never shown one, though it is supervised; it has to show one
             before it is started again.
     """
 
@@ -30,7 +30,7 @@ class LifeSigns:
             send: Hands a frame to the bus.
         """
         self.last = 0.0
-        self.owed = False
+        self.silent = False
         self._config = config
         self._since = 0.0
         self._timeout = math.inf
@@ -42,7 +42,7 @@ class LifeSigns:
     def start(self, now: float) -> None:
         """Supervise from a time in [s] on, from which the first sign is awaited."""
         self.last = self._since = now
-        self.owed = False
+        self.silent = False
         self._timeout = self._config.heartbeat_timeout or math.inf
         if self._guarding is not None:
             self._guarding.start(now)
@@ -70,10 +70,10 @@ class LifeSigns:
     def overdue(self, now: float) -> str:
         """Return in words what is missing at a time in [s], empty while nothing is."""
         if now - self.last > self._timeout:
-            self.owed = self.last <= self._since
+            self.silent = self.last <= self._since
             return f'heartbeat lost: none within its consumer time of {self._timeout * 1000:g} ms'
         if self._guarding is not None and self._guarding.advance(now):
-            self.owed = self.last <= self._since
+            self.silent = self.last <= self._since
             config = self._config
             return (
                 f'lost: no answer to node guarding {config.retry_factor} times in a row, each '

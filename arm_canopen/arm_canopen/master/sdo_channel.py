@@ -52,7 +52,7 @@ class SdoChannel:
     """Sends questions to the SDO server of one device and finds their answers.
 
     An answer carries its object, and not the request that it belongs to. So answers that are
-    still owed are remembered: before their object is read again, another one is read, and
+    outstanding are remembered: before their object is read again, another one is read, and
     since a server answers in order, what comes after that is new.
 
     Attributes:
@@ -90,7 +90,7 @@ class SdoChannel:
         Args:
             index: Object index.
             subindex: Sub-index.
-            timeout: Longest time to wait for the answers that are owed in [s].
+            timeout: Longest time to wait for the outstanding answers in [s].
             settle: Do wait for them; otherwise one to the same question counts.
 
         Raises:
@@ -192,7 +192,7 @@ class SdoChannel:
         )
 
     async def _settle(self, index: int, subindex: int, timeout: float) -> None:
-        """Let the answers that are owed pass, by reading an object that none of them is of."""
+        """Let the outstanding answers pass, by reading an object that none of them is of."""
         marker = next(
             (place for place in MARKERS if place not in self._pending_replies), MARKERS[0]
         )

@@ -103,7 +103,7 @@ class SdoClient:
             timeout: Longest time for each answer of the device in [s].
             repeat: Writing the value twice does no harm, so a lost frame may be sent again.
             urgent: It leaves at once, and ends the transfer that runs unless that is urgent, too;
-                an answer that is still owed for the object counts as its own.
+                an outstanding answer for the object counts as its own.
 
         Returns:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 
 class Segment(NamedTuple):
-    """A stretch of constant acceleration; it lasts until the next one begins.
+    """A segment of constant acceleration; it lasts until the next one begins.
 
     Attributes:
         start: Time at which it begins.
@@ -99,7 +99,7 @@ class Motion:
         return math.inf
 
     def pieces(self, begin: float, end: float) -> Iterator[tuple[Point, float]]:
-        """Yield the start of each stretch between two times, and its duration in [s]."""
+        """Yield the start of each segment between two times, and its duration in [s]."""
         for index, segment in enumerate(self.segments):
             last = index == len(self.segments) - 1
             stop = end if last else min(end, self.segments[index + 1].start)

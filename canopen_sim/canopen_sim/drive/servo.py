@@ -7,7 +7,7 @@ motor position :math:`y` follows its output :math:`r` through a first-order lag:
 
 .. math:: \tau \dot y = r - y.
 
-On a stretch where :math:`r(s) = r_0 + v s + \frac{1}{2} a s^2` this has the solution
+On a segment where :math:`r(s) = r_0 + v s + \frac{1}{2} a s^2` this has the solution
 
 .. math::
     y(s) = q(s) + (y_0 - q(0))\, e^{-s/\tau}, \qquad q(s) = r(s) - \tau r'(s) + \tau^2 a,
@@ -26,7 +26,7 @@ from .profile import advanced, Motion, Point, Segment
 
 TOLERANCE = 1e-6  # [inc] a smaller gap between demand and limiter is rounding
 SETTLED = 1e-4  # [inc] a smaller distance to the demand is none
-STRETCHES_MAX = 8  # a parabola is caught and lost less often than that
+SEGMENTS_MAX = 8  # a parabola is caught and lost less often than that
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,14 +130,14 @@ class Servo:
             self.limited = False
             self._track(start, duration)
             return
-        for _ in range(STRETCHES_MAX):
-            elapsed = self._stretch(start, duration, speed)
+        for _ in range(SEGMENTS_MAX):
+            elapsed = self._segment(start, duration, speed)
             duration -= elapsed
             if duration <= 0.0:
                 return
             start = advanced(Segment(0.0, *start), elapsed)
 
-    def _stretch(self, start: Point, duration: float, speed: float) -> float:
+    def _segment(self, start: Point, duration: float, speed: float) -> float:
         """Follow until the limiter catches the demand or loses it; return the time taken."""
         position, velocity, acceleration = start
         gap = position - self.setpoint
@@ -160,7 +160,7 @@ class Servo:
         return time
 
     def _track(self, start: Point, duration: float) -> None:
-        """Let the limiter take a stretch, and the motor follow it (see the module)."""
+        """Let the limiter take a segment, and the motor follow it (see the module)."""
         lag = self._model.lag
         position, velocity, acceleration = start
         offset = self.position - (position - lag * velocity + lag * lag * acceleration)

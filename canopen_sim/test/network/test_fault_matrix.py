@@ -167,7 +167,7 @@ def cut_bus(arm: Arm) -> None:
     arm.net.wire.refuses = 'the interface is down'
 
 
-def mend_bus(arm: Arm) -> None:
+def restore_bus(arm: Arm) -> None:
     """Everything reaches everybody."""
     arm.net.wire.loses = lambda sender, frame: False
     arm.net.wire.refuses = ''
@@ -265,7 +265,7 @@ FAULTS = (
         EventKind.HEARTBEAT_LOST,
         FAULT,
         RefusalCause.OFFLINE,
-        mend_bus,
+        restore_bus,
         Way.RECOVER,
         emcy=0x8130,
         witness_stops=True,
@@ -276,7 +276,7 @@ FAULTS = (
         EventKind.BUS,
         FAULT,
         RefusalCause.OFFLINE,
-        mend_bus,
+        restore_bus,
         Way.RECOVER,
         witness_stops=True,
     ),
@@ -315,7 +315,7 @@ FAULTS = (
         EventKind.HEARTBEAT_LOST,
         SWITCHED_OFF,
         RefusalCause.OFFLINE,
-        mend_bus,
+        restore_bus,
         Way.ENABLE,
     ),
 )
@@ -450,7 +450,7 @@ def test_lost_pdos_in_motion(
         halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
         arm.net.run(0.5)
         assert not any(halt.done for halt in halts)  # none is commanded to stand while it moves
-    mend_bus(arm)
+    restore_bus(arm)
     arm.net.run(0.7)
     arm.stands(FAULTY, WITNESS)
     for name in (FAULTY, WITNESS):
@@ -469,7 +469,7 @@ def test_sdo_time_outs_do_not_disturb_motion(mode: OperationMode) -> None:
         arm.net.result(arm.net.network.nodes[FAULTY].sdo.read(0x1008, 0, 0.2))
     arm.stop(FAULTY, mode)
     assert arm.state() is DriveState.OPERATION_ENABLED
-    mend_bus(arm)
+    restore_bus(arm)
     arm.net.run(1.0)
     assert_accepts_targets(arm, mode)
 

@@ -248,7 +248,7 @@ def test_an_expected_0_is_not_checked(name: str) -> None:
 
 
 def test_the_right_device_in_place_of_the_wrong_is_booted() -> None:
-    """After the mistake is mended the device is booted without anybody asking."""
+    """After the mistake is corrected the device is booted without anybody asking."""
     scene = Scene()
     scene.device.values[0x1018, 2] = (0xBAD).to_bytes(4, 'little')
     scene.net.start()

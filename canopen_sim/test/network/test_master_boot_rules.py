@@ -104,7 +104,7 @@ def test_a_device_in_operation_is_taken_over_without_a_word() -> None:
 
 
 def test_a_device_with_other_pdos_is_left_alone() -> None:
-    """The difference is named, and nothing is sent that could disturb it; a reset mends it."""
+    """The difference is named, and nothing is sent that could disturb it; a reset corrects it."""
     network, device = running(reset_communication=False)
     device.values[0x1A00, 2] = (0x606C_0020).to_bytes(4, 'little')
     network.start(3.0)

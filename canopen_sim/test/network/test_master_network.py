@@ -554,7 +554,7 @@ def test_another_master_is_noticed(frame: Frame, what: str) -> None:
     net = network('a')
     net.boot()
     for _ in range(5):
-        net.send_as('rival', frame)
+        net.send_as('other_master', frame)
         net.run(0.01)
     said = [
         text for text in net.reported(Severity.ERROR) if 'another master is on this bus' in text

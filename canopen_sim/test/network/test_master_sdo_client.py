@@ -581,7 +581,7 @@ def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> 
     assert line.defects == []
 
 
-def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_owed() -> None:
+def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_outstanding() -> None:
     """The device may receive what it does not answer."""
     line = Line()
     for data, request in (

@@ -209,20 +209,22 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, queried: bool) -
         return 1
     named = config is not None
     head = ('node', *(('name',) if named else ()), 'state', *(t for _, t, _, _ in IDENTITY))
-    remarks = {device.node_id: list(_differences(device, queried=queried)) for device in devices}
+    differences = {
+        device.node_id: list(_differences(device, queried=queried)) for device in devices
+    }
     rows = [
         (
             str(device.node_id),
             *((device.config.name if device.config else '',) if named else ()),
             _state(device, queried=queried),
             *_cells(device),
-            *(('; '.join(remarks[device.node_id]),) if named else ()),
+            *(('; '.join(differences[device.node_id]),) if named else ()),
         )
         for device in devices
     ]
     print_table((*head, '') if named else head, rows, right='node')
     print_line(f'{counted(len(present), "device")}')
-    return 1 if not present or any(remarks.values()) else 0
+    return 1 if not present or any(differences.values()) else 0
 
 
 def _state(device: Found, *, queried: bool) -> str:

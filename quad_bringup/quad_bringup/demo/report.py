@@ -55,7 +55,7 @@ def progress_line(figures: Figures) -> str:
     return (
         f'{figures.state}, commanded {velocity_text(figures.commanded)}, '
         f'measured {velocity_text(speed)}, tilt {math.degrees(figures.tilt):.1f}°, '
-        f'{rhythm_text(figures)}'
+        f'{period_text(figures)}'
     )
 
 
@@ -84,7 +84,7 @@ def _tidy(velocity: Velocity) -> tuple[float, float, float]:
     return round(forward, 3) + 0.0, round(left, 3) + 0.0, round(turn, 2) + 0.0
 
 
-def rhythm_text(figures: Figures) -> str:
+def period_text(figures: Figures) -> str:
     """Write the rate and jitter of the loop.
 
     Args:
@@ -97,36 +97,36 @@ def rhythm_text(figures: Figures) -> str:
     )
 
 
-def summary_lines(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
+def summary_lines(figures: Figures, segments: Sequence[Measured]) -> list[str]:
     """Sum a demo up.
 
     Args:
         figures: The last ones before it lay down.
-        stretches: What was measured.
+        segments: What was measured.
     """
     head = f'{"[m/s, rad/s]":<14}  {"commanded":^19}  {"in physics":^19}  {"by /odom":^19}'
     names = f'{"":<14}' + 3 * f'  {"ahead":>6} {"left":>6} {"turn":>5}'
     rows = [
         f'{each.segment.name:<7}{each.segment.duration:5.1f} s  '
         f'{_columns(each.segment.velocity)}  {_columns(each.measured)}  {_columns(each.odometry)}'
-        for each in stretches
+        for each in segments
     ]
-    body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {rhythm_text(figures)}'
+    body = f'tilt at most {math.degrees(figures.tilt_max):.1f}°, {period_text(figures)}'
     return [head, names, *rows, body]
 
 
-def problems(figures: Figures, stretches: Sequence[Measured]) -> list[str]:
+def problems(figures: Figures, segments: Sequence[Measured]) -> list[str]:
     """Return what went wrong.
 
     Args:
         figures: The last ones before it lay down.
-        stretches: What was measured.
+        segments: What was measured.
 
     Returns:
         One sentence each; empty when all went well.
     """
     return [
-        *(text for each in stretches for text in _wrong_speed(each)),
+        *(text for each in segments for text in _wrong_speed(each)),
         *_wrong_body(figures),
     ]
 

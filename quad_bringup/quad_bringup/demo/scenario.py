@@ -22,8 +22,8 @@ FIND_TIMEOUT = 20.0
 """Longest time in [s] for the demo's node and the others to find each other."""
 MODE_TIMEOUT = 15.0
 """Longest time in [s] for a mode to be reached."""
-KEPT_STRETCHES = 40
-"""How many stretches a demo without end remembers for its summary."""
+KEPT_SEGMENTS = 40
+"""How many segments a demo without end remembers for its summary."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ class WalkScenario(DemoScenario[Client]):
             _between(before.measured, after.measured),
             _between(before.odometry, after.odometry),
         )
-        self._measured = [*self._measured, measured][-KEPT_STRETCHES:]
+        self._measured = [*self._measured, measured][-KEPT_SEGMENTS:]
 
     def _wait_for_time(self, client: Client, end: float) -> None:
         self._wait(client, lambda: self.left or time.monotonic() >= end, math.inf, 'the time')

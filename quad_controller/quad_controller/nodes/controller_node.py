@@ -14,7 +14,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import (
-    DurabilityPolicy,
     HistoryPolicy,
     qos_profile_sensor_data,
     QoSProfile,
@@ -27,6 +26,7 @@ from std_srvs.srv import Trigger
 from message_templates import FastPublisher, FastReader
 from node_runner import (
     destroyed_when_refused,
+    LATCHED,
     notify_ready,
     raise_thread_priority,
     run_program,
@@ -55,7 +55,6 @@ from .parameters import changed_gait, declare_parameters
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
-LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 REQUEST_QOS = 1  # only the newest velocity and pose count
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
@@ -81,7 +80,7 @@ class ControllerNode(Node):
         """
         super().__init__('controller_node')
         self._settings = settings = declare_parameters(self)
-        self._report = self.create_publisher(String, '~/policy', LATCHED_QOS)
+        self._report = self.create_publisher(String, '~/policy', LATCHED)
         policy, refusal = self._load_policy()
         self._controller = Controller(
             settings.robot,
@@ -111,7 +110,7 @@ class ControllerNode(Node):
             FastPublisher(self.create_publisher(JointCommand, topic, COMMAND_QOS))
             for topic in ('joint_command', 'joint_command_shadow')
         )
-        self._state = self.create_publisher(String, '~/state', LATCHED_QOS)
+        self._state = self.create_publisher(String, '~/state', LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
         if policy is not None and policy.needs_linear_velocity:

@@ -369,7 +369,7 @@ class Controller:
             return ''
         if self._latch.texts:
             return (
-                f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is mended. '
+                f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '
                 'The modes lie and relax are possible in spite of it'
             )
         if request.state is State.POLICY and self._policy is None:

@@ -143,7 +143,7 @@ class Quadruped:
             if not all(solution.reachable for solution in solutions):
                 raise DescriptionError(
                     f'the legs do not reach a height of {height:.3f} m; choose a height between '
-                    'folded and stretched legs'
+                    'folded and straight legs'
                 )
             placed = self.place(solutions, placed)
             centre = centre_of_mass(self.description, self._named(placed))

@@ -113,7 +113,7 @@ def _check_joints(seen: Observation) -> Iterator[Finding]:
     try:
         wanted = [joint.name for joint in parse(seen.urdf).commanded]
     except DescriptionError as problem:
-        yield error('robot_description', str(problem), 'mend the URDF')
+        yield error('robot_description', str(problem), 'correct the URDF')
         return
     if not seen.joints:
         return

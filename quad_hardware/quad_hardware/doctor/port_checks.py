@@ -46,7 +46,7 @@ def check_port(path: str) -> Iterator[Finding]:
         yield note('port user', f'in use by {", ".join(users)}; the robot was not contacted')
         return
     yield from _contact(path)
-    yield from check_latency(path, latency_timer(path))  # opening the port may have mended it
+    yield from check_latency(path, latency_timer(path))  # opening the port may have changed it
 
 
 def check_latency(path: str, latency: float | None) -> Iterator[Finding]:

@@ -111,7 +111,7 @@ class HardwareNode(Node):
         # what a controller waits for comes first
         if (joints := state.joints) is not None:
             self._joint_states.publish(
-                messages.joint_states_form(self._robot.names, joints),
+                messages.joint_states_template(self._robot.names, joints),
                 self._stamp(joints.time),
                 messages.joint_numbers(joints),
             )
@@ -126,18 +126,18 @@ class HardwareNode(Node):
         settings, stamp = self._settings, self._stamp(state.time)
         deviations, frames = settings.deviations, settings.frames
         self._imu.publish(
-            messages.imu_form(state.imu, deviations, frames.imu),
+            messages.imu_template(state.imu, deviations, frames.imu),
             stamp,
             messages.imu_numbers(state.imu),
         )
         self._odom.publish(
-            messages.odometry_form(state.imu, deviations, frames),
+            messages.odometry_template(state.imu, deviations, frames),
             stamp,
             messages.odometry_numbers(state.imu, odometry, frames),
         )
         if frames.publish:
             self._tf.publish(
-                messages.transforms_form(frames),
+                messages.transforms_template(frames),
                 stamp,
                 messages.transforms_numbers(odometry, frames),
             )

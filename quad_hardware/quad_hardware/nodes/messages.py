@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state of the robot as ROS messages (REP 103, 105, 145).
 
-What is published with every report comes as a form, which makes the message, and as the numbers
-that change from one message to the next.
+What is published with every report comes as a template, which makes the message, and as the
+numbers that change from one message to the next.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class JointStates:
         )
 
 
-def joint_states_form(names: tuple[str, ...], joints: JointSample) -> JointStates:
-    """Return the form for the joints that are measured, of all joints by name."""
+def joint_states_template(names: tuple[str, ...], joints: JointSample) -> JointStates:
+    """Return the template for the joints that are measured, of all joints by name."""
     return JointStates(tuple(joints.measured(names)) if joints.unmeasured else names)
 
 
@@ -80,7 +80,7 @@ def joint_numbers(joints: JointSample) -> Numbers:
 
 
 @dataclass(frozen=True, slots=True)
-class ImuForm:
+class ImuTemplate:
     """Attitude, angular velocity and specific force.
 
     Attributes:
@@ -108,9 +108,9 @@ class ImuForm:
         return message
 
 
-def imu_form(imu: ImuSample, deviations: Deviations, frame: str) -> ImuForm:
-    """Return the form for what a sample holds."""
-    return ImuForm(
+def imu_template(imu: ImuSample, deviations: Deviations, frame: str) -> ImuTemplate:
+    """Return the template for what a sample holds."""
+    return ImuTemplate(
         frame,
         max(deviations.orientation, imu.deviation),
         None if imu.acceleration is None else deviations.acceleration,
@@ -119,12 +119,12 @@ def imu_form(imu: ImuSample, deviations: Deviations, frame: str) -> ImuForm:
 
 
 def imu_numbers(imu: ImuSample) -> Numbers:
-    """Return what :class:`ImuForm` takes; zeros for what is not measured."""
+    """Return what :class:`ImuTemplate` takes; zeros for what is not measured."""
     return (*imu.orientation, *(imu.angular_velocity or _ZERO), *(imu.acceleration or _ZERO))
 
 
 @dataclass(frozen=True, slots=True)
-class OdometryForm:
+class OdometryTemplate:
     """The pose in odom and the velocity in base_link (or in the footprint).
 
     Attributes:
@@ -158,15 +158,15 @@ class OdometryForm:
         return message
 
 
-def odometry_form(imu: ImuSample, deviations: Deviations, frames: Frames) -> OdometryForm:
-    """Return the form for what a sample holds."""
+def odometry_template(imu: ImuSample, deviations: Deviations, frames: Frames) -> OdometryTemplate:
+    """Return the template for what a sample holds."""
     child = frames.footprint if frames.footprint_is_parent else frames.base
     tilt = max(deviations.orientation, imu.deviation)
-    return OdometryForm(frames.odom, child, tilt, _rate_deviation(imu, deviations))
+    return OdometryTemplate(frames.odom, child, tilt, _rate_deviation(imu, deviations))
 
 
 def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Numbers:
-    """Return what :class:`OdometryForm` takes."""
+    """Return what :class:`OdometryTemplate` takes."""
     rotation, height = state.rotation, state.height
     velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
     rate = imu.angular_velocity or _ZERO  # in the body
@@ -179,7 +179,7 @@ def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Nu
 
 
 @dataclass(frozen=True, slots=True)
-class TransformsForm:
+class TransformsTemplate:
     """odom to base_link and base_link to base_footprint, or the other way round.
 
     Attributes:
@@ -200,15 +200,15 @@ class TransformsForm:
         )
 
 
-def transforms_form(frames: Frames) -> TransformsForm:
-    """Return the form for names and order of frames."""
+def transforms_template(frames: Frames) -> TransformsTemplate:
+    """Return the template for names and order of frames."""
     if frames.footprint_is_parent:
-        return TransformsForm((frames.odom, frames.footprint, frames.base))
-    return TransformsForm((frames.odom, frames.base, frames.footprint))
+        return TransformsTemplate((frames.odom, frames.footprint, frames.base))
+    return TransformsTemplate((frames.odom, frames.base, frames.footprint))
 
 
 def transforms_numbers(state: OdometryState, frames: Frames) -> Numbers:
-    """Return what :class:`TransformsForm` takes."""
+    """Return what :class:`TransformsTemplate` takes."""
     tilt = _level(state.rotation)
     if frames.footprint_is_parent:
         heading = about_z(yaw_of(state.rotation))

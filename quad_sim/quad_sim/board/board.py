@@ -134,14 +134,14 @@ class Board:
         self._boot(self._now + BOOT_TIME if on else math.inf)
 
     @property
-    def awake(self) -> bool:
+    def is_booted(self) -> bool:
         """Whether the board runs its programme."""
         return self._powered and self._now >= self._booted_at
 
     @property
     def uptime(self) -> float:
         """Time since the board began to run [s]."""
-        return self._now - self._booted_at if self.awake else 0.0
+        return self._now - self._booted_at if self.is_booted else 0.0
 
     # -- sensors
 

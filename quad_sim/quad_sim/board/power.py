@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Battery and warmth of a simulated robot. The figures are ours, of the right size."""
+"""Battery and temperatures of a simulated robot. The figures are ours, of the right size."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ class RobotLine:
     def _push(self, now: float) -> None:
         self._board.advance(now)
         frame = self._functions.push(now)
-        if self._board.awake:
+        if self._board.is_booted:
             self._send(frame, V2, now)
 
     def _receive(self, arrived: Arrival) -> None:
@@ -161,7 +161,7 @@ class RobotLine:
     ) -> None:
         gap = begin - self._frame_end
         self._frame_end = end
-        if not self._board.awake:
+        if not self._board.is_booted:
             return
         if protocol is V1 and gap < self._command_gap:
             self.statistics.hurried += 1

@@ -113,7 +113,7 @@ class KinematicRobot:
         self._random = np.random.default_rng(seed)
         self._on = dict.fromkeys(self.joint_names, True)
         self._missed: dict[str, float] = {}  # targets that came without torque
-        self._steps, self._owed = 0, 0.0
+        self._steps, self._remaining_steps = 0, 0.0
         self._ramp.jump(np.zeros(len(self.joint_names)))
         try:
             self._ramp.approach(pose or {}, 0.0)
@@ -187,9 +187,9 @@ class KinematicRobot:
 
     def step(self, duration: float) -> None:
         """Let time pass [s]."""
-        self._owed += duration / TIMESTEP
-        count = int(self._owed + 1e-6)
-        self._owed -= count
+        self._remaining_steps += duration / TIMESTEP
+        count = int(self._remaining_steps + 1e-6)
+        self._remaining_steps -= count
         self._steps += count
         for _ in range(count):
             self._before[:] = self._ramp.values

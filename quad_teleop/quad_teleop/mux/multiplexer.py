@@ -4,7 +4,7 @@
 
 As in twist_mux: of the sources that are not stale and not below a lock, the one of the highest
 priority is forwarded; of equal ones the first by name. A lock is closed while its last message
-was true, and when it is stale. Mended here: when the source that is active falls silent or is
+was true, and when it is stale. Other than there: when the source that is active falls silent or is
 locked, the robot is commanded to stop, and does not wait for its own time-out; and a source
 that never published does not block others, even with a time-out of 0.
 """

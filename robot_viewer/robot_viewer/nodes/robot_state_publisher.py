@@ -24,7 +24,7 @@ from urdf_reader import DescriptionError, JointKind, read_urdf
 from node_runner import destroyed_when_refused, LATCHED, notify_ready, ParameterError, run_node
 
 from ..joint_watch import JointWatch
-from ..state_publisher import FrameTransform, Remark, StatePublisher
+from ..state_publisher import FrameTransform, MessageProblem, StatePublisher
 from .parameters import check, declare, DESCRIPTION, read_settings
 
 NAME = 'robot_state_publisher'
@@ -99,17 +99,17 @@ class RobotStatePublisher(Node):
         now = self.get_clock().now().nanoseconds
         self._watch.take(message.name)
         update = self._core.update(message.name, message.position, stamp_ns, now)
-        for remark in update.remarks:
-            self._remark(remark, message.name)
+        for problem in update.problems:
+            self._warn(problem, message.name)
         if update.transforms:
             self._tf.publish(_message(update.transforms, Time(nanoseconds=update.stamp)))
 
-    def _remark(self, remark: Remark, names: Sequence[str]) -> None:
-        text = f'message about {", ".join(names[:3]) or "no joint"}: {remark.value}'
-        if remark is Remark.LENGTHS:
+    def _warn(self, problem: MessageProblem, names: Sequence[str]) -> None:
+        text = f'message about {", ".join(names[:3]) or "no joint"}: {problem.value}'
+        if problem is MessageProblem.LENGTHS:
             self.get_logger().error(text, throttle_duration_sec=5.0)
-        elif remark is Remark.BACKWARDS:
-            self.get_logger().warning(remark.value)
+        elif problem is MessageProblem.BACKWARDS:
+            self.get_logger().warning(problem.value)
         else:
             self.get_logger().warning(f'{text} (logged once)', once=True)
 
