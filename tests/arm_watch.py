@@ -68,7 +68,6 @@ class ArmWatch:
     """
 
     def __init__(self, nodes: Mapping[int, str], limits: JointLimits) -> None:
-        """Take the drives' names by node id, and their limits."""
         self.violations: list[str] = []
         self._begin = time.monotonic()
         self._lock = threading.Lock()

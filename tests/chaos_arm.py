@@ -53,7 +53,6 @@ class TappedArm(MovingArm):
     """The drives are on a bus of their own, behind a tap."""
 
     def __init__(self, isolation: Isolation, folder: Path, device_bus: str) -> None:
-        """Start the processes and wait until all drives are booted."""
         self._device_bus = device_bus
         super().__init__(isolation, folder)
 
@@ -83,7 +82,6 @@ class ArmVictim:
     processes = ('master', 'slaves')
 
     def __init__(self, isolation: Isolation, folder: Path, seed: int) -> None:
-        """Start master, drives and tap, and let the drives follow."""
         self.watch = ArmWatch(dict(enumerate(JOINTS, FIRST_NODE)), panda_limits())
         listeners = (self.watch.take_from_master, self.watch.take_from_device)
         self._stack = ExitStack()

@@ -57,7 +57,6 @@ class QuadVictim:
     processes = ('controller', 'hardware')
 
     def __init__(self, isolation: Isolation, folder: Path, seed: int) -> None:
-        """Start everything, and let it walk."""
         self._servos = {
             servo.motor: servo
             for servo in JointMap(map(servo_of, movable_joints(robot_urdf()))).servos

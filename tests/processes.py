@@ -37,7 +37,6 @@ class RunningProcess:
     """
 
     def __init__(self, arguments: Sequence[str], env: Mapping[str, str]) -> None:
-        """Start it."""
         self.lines: list[str] = []
         self._changed = threading.Condition()
         self._readiness = ReadinessSocket()

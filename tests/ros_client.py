@@ -29,7 +29,6 @@ class RosClient:
     """Calls services and listens to topics."""
 
     def __init__(self, domain_id: int, name: str = 'test_client') -> None:
-        """Join a domain as a node of that name."""
         self._context = Context()
         rclpy.init(context=self._context, domain_id=domain_id)
         self.node = Node(name, context=self._context)

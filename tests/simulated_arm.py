@@ -46,7 +46,6 @@ class SimulatedArm:
         joints: Sequence[str] = JOINTS,
         master_arguments: Sequence[str] = (),
     ) -> None:
-        """Start the processes and wait until all drives are booted."""
         self.joints = list(joints)
         self._isolation = isolation
         self._bus_config = bus_config or panda_bus()

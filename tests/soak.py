@@ -111,7 +111,6 @@ class FrameCount:
     """Counts the frames on a bus from outside."""
 
     def __init__(self, bus: str) -> None:
-        """Begin to count."""
         self.counts: Counter[int] = Counter()
         self._bus = open_bus(bus)
         self._closing = threading.Event()
@@ -155,7 +154,6 @@ class Robots:
     """Both, kept in motion."""
 
     def __init__(self, arm: MovingArm, quad: SimulatedQuad) -> None:
-        """Begin to move."""
         self.arm, self.quad = arm, quad
         self.goals, self.failures = 0, list[str]()
         self._client = trajectory_client(arm.client)

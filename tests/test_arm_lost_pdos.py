@@ -39,7 +39,6 @@ class Arm:
     """The Panda in a virtual network, led by the motion core along a line."""
 
     def __init__(self, mode: OperationMode) -> None:
-        """Begin a trajectory of all joints and let a third of it pass."""
         core = MotionCore(robot('panda'))
         joints = core.model.joints
         self.begin = np.array(ready('panda'))

@@ -16,7 +16,6 @@ class Pane:
     """One pane of a tmux server of its own."""
 
     def __init__(self, folder: Path, environment: dict[str, str]) -> None:
-        """Start the server with a shell."""
         self._socket = str(folder / 'tmux.socket')
         self._environment = environment
         self.tmux('-f', '/dev/null', 'new-session', '-d', '-x', '100', '-y', '30', 'sh')

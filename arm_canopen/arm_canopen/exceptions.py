@@ -68,7 +68,6 @@ class ConfigError(CanopenError, ValueError):
     """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        """Keep the problems beside the message."""
         self.problems = tuple(problems)
         super().__init__('\n'.join(str(problem) for problem in self.problems))
 
@@ -108,7 +107,6 @@ class SdoAbortError(SdoError):
     """
 
     def __init__(self, message: str, code: int) -> None:
-        """Keep the code beside the message."""
         super().__init__(message)
         self.code = code
 

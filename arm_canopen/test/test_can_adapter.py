@@ -23,7 +23,6 @@ class ScriptedDriver(can.BusABC):
     """A driver that delivers prepared messages, and refuses to send."""
 
     def __init__(self, messages: list[can.Message]) -> None:
-        """Keep the messages."""
         super().__init__('scripted')
         self.messages = messages
 

@@ -24,7 +24,6 @@ class Publisher:
     """Feeds an aggregator and keeps what it publishes."""
 
     def __init__(self, *joints: RobotJoint) -> None:
-        """Begin at time 0."""
         self.aggregator = JointAggregator(joints or [RobotJoint(name) for name in NAMES])
         self.sets: list[JointSet] = []
 

@@ -28,7 +28,6 @@ class Recorder:
     """A managed entity whose work takes a second of virtual time, and may fail."""
 
     def __init__(self, scheduler: Scheduler, name: str = 'entity') -> None:
-        """Begin unconfigured."""
         self.fails: set[Verb] = set()
         self.done: list[Verb] = []
         self.events: list[tuple[str, str, bool]] = []

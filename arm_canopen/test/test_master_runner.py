@@ -124,7 +124,6 @@ class SlowBus(VirtualBus):
     """
 
     def __init__(self, look: float) -> None:
-        """Start at no particular time."""
         super().__init__('here', VirtualWire())
         self.now = 100.0  # [s]
         self.look = look

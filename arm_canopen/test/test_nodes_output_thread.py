@@ -20,7 +20,6 @@ class Log:
     """A logger that keeps what it gets."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self.warnings: list[str] = []
         self.errors: list[str] = []
 
@@ -41,7 +40,6 @@ class Slow:
     """
 
     def __init__(self) -> None:
-        """Start it, and hold it up."""
         self.log = Log()
         self.done: list[object] = []
         self.thread = OutputThread(self.log)

@@ -45,7 +45,6 @@ class LimitsError(ModelError):
     """
 
     def __init__(self, *problems: str) -> None:
-        """Keep all that is wrong beside the message."""
         super().__init__('; '.join(problems))
         self.problems = problems
 

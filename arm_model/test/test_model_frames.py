@@ -72,7 +72,6 @@ class TfNode:
     """What a TfListener needs of a node, with a clock of its own."""
 
     def __init__(self) -> None:
-        """Remember who listens."""
         self.subscribed: dict[str, Any] = {}
 
     def create_subscription(self, _kind: object, topic: str, take: object, _qos: object) -> None:

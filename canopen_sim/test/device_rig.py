@@ -61,7 +61,6 @@ class RefusedError(Exception):
     """The device aborted an SDO."""
 
     def __init__(self, code: int) -> None:
-        """Keep the abort code."""
         super().__init__(f'0x{code:08X}')
         self.code = code
 

@@ -144,7 +144,6 @@ class FlakyBus(Bus):
     """A bus that fails for some calls, and then delivers a frame."""
 
     def __init__(self) -> None:
-        """Begin with failures ahead."""
         super().__init__('flaky')
         self.failures = 3
         self.served = threading.Event()

@@ -39,7 +39,6 @@ class Robot:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Start everything and wait until it is booted."""
         self.name = free_virtual()
         shutil.copy(EDS, folder / 'cia402_slave.eds')
         text = ARTICLE_BUS.read_text('utf-8')

@@ -179,7 +179,6 @@ class Slave:
     """The program fake_slave without a node id."""
 
     def __init__(self, name: str) -> None:
-        """Start it."""
         parameters = ['-p', 'node_id:=255', '-p', f'can_interface_name:={name}']
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'canopen_sim.nodes.fake_slave', '--ros-args', *parameters],

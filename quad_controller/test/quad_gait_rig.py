@@ -60,7 +60,6 @@ class Rig:
     """Makes time pass for a controller."""
 
     def __init__(self, controller: Controller | None = None, positions: Targets = FOLDED) -> None:
-        """Start with a folded robot."""
         self.controller = controller or Controller(ROBOT, GaitParameters(), StateParameters())
         self.positions = positions
         self.imu: ImuSample | None = UPRIGHT

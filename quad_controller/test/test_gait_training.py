@@ -37,7 +37,6 @@ class Lesson:
         return ''
 
     def __init__(self, teacher: GaitTeacher) -> None:
-        """Begin at the start of a cycle."""
         self._teacher = teacher
         self._phase = 0.0
 

@@ -57,7 +57,6 @@ class Listener:
     """A node of the test in a domain of its own."""
 
     def __init__(self, domain_id: int) -> None:
-        """Join a domain."""
         self.context = Context()
         rclpy.init(context=self.context, domain_id=domain_id)
         self.node = Node('listener', context=self.context)

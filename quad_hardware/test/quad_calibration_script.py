@@ -13,7 +13,6 @@ class Script:
     """Someone who answers in order, moves the robot before, and remembers what was said."""
 
     def __init__(self, *answers: str | tuple[Callable[[], None], str]) -> None:
-        """Prepare the answers."""
         self._answers = list(answers)
         self.said: list[str] = []
 

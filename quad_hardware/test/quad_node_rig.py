@@ -51,7 +51,6 @@ class Rig(ABC):
     """
 
     def __init__(self, isolation: Isolation, port: Path, *arguments: str) -> None:
-        """Start the robot and the node, and listen until it reports."""
         self._env, self._stack = isolation.env, ExitStack()
         try:
             self._add_robot(self._stack, port)

@@ -51,7 +51,6 @@ class OldRig:
     """A robot of protocol v1 in virtual time: answers when request and answer are over."""
 
     def __init__(self, latency: float = 0.002) -> None:
-        """Begin at time zero."""
         self.now = 0.0
         self.dialect: Dialect[Frame] = V1Dialect(self.now)
         self.latency = latency

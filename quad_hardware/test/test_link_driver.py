@@ -33,7 +33,6 @@ class Rig:
     """A driver with a robot."""
 
     def __init__(self, peer: PtyPeer) -> None:
-        """Prepare both."""
         self.peer = peer
         self.states: list[Report] = []
         self.changes: list[tuple[LinkState, str]] = []

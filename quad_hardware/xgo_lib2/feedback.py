@@ -50,7 +50,6 @@ class SendStateParser:
     """Finds states in a stream of bytes that may be cut anywhere and damaged."""
 
     def __init__(self) -> None:
-        """Begin with an empty buffer."""
         self._parser = StreamParser(V2, ROBOT_KINDS)
 
     @property

@@ -24,7 +24,6 @@ class Served:
     """A robot that lives, and the path of its port."""
 
     def __init__(self, simulation: Simulation, server: Server, path: Path) -> None:
-        """Keep the parts."""
         self.simulation, self.server, self.path = simulation, server, path
 
     def do(self, action: Callable[[], object]) -> object:

@@ -20,7 +20,6 @@ class WorkspaceError(Exception):
     """
 
     def __init__(self, message: str, remedy: str) -> None:
-        """Keep both texts."""
         super().__init__(message)
         self.remedy = remedy
 

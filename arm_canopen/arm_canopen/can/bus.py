@@ -45,7 +45,6 @@ class Bus(ABC):
     """
 
     def __init__(self, name: str) -> None:
-        """Keep the name."""
         self.name = name
         self.counters = BusCounters()
 

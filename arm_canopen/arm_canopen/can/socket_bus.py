@@ -68,7 +68,6 @@ class TimestampReader:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing lost."""
         self.lost = 0
         self._drops = 0
         self._last = 0.0
@@ -109,7 +108,6 @@ class SocketBus(Bus):
     """A bus that reads datagrams from a socket; subclasses define their content."""
 
     def __init__(self, name: str, receiver: socket.socket) -> None:
-        """Take over a prepared, non-blocking socket."""
         super().__init__(name)
         self._receiver = receiver
         self._stamps = TimestampReader()

@@ -20,7 +20,6 @@ class VirtualWire:
     """What the buses of one name are connected to."""
 
     def __init__(self) -> None:
-        """Begin with nobody connected."""
         self.lock = Lock()
         self.taps: list[VirtualBus] = []
 
@@ -29,7 +28,6 @@ class VirtualBus(Bus):
     """A connection to a wire in this process."""
 
     def __init__(self, name: str, wire: VirtualWire) -> None:
-        """Connect to the wire."""
         super().__init__(name)
         self._wire = wire
         self._arrived = Condition()

@@ -41,7 +41,6 @@ class DriveCommands:
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        """Take the drive and the time."""
         self.drive = drive
         self._steps = DriveSequences(drive, scheduler)
         self.stops = StopCommands(drive, self._steps)

@@ -32,7 +32,6 @@ class FollowingWatch:
     """
 
     def __init__(self) -> None:
-        """Begin without set-points."""
         self._samples: deque[tuple[float, float, float]] = deque()
         self._beside_since: float | None = None
         self._unseen_from: float | None = None  # set-point when the axis was seen last

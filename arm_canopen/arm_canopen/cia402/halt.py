@@ -29,7 +29,6 @@ class Halt:
     """
 
     def __init__(self) -> None:
-        """Begin without a halt."""
         self.held = self.unanswered = False
         self._leaving_since: float | None = None
         self._delivery = completed()

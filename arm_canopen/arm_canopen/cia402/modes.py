@@ -184,7 +184,6 @@ class Homing(Mode):
     number = OperationMode.HOMING
 
     def __init__(self) -> None:
-        """Wait for the start."""
         self.started = False
 
     def preload(self, actual: Actual) -> Promise[None]:

@@ -35,7 +35,6 @@ class DriveSequences:
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        """Take the drive and the time."""
         self.drive = drive
         self.quirks = quirks_of(drive.config.quirks)
         self._scheduler = scheduler

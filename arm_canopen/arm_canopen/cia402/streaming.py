@@ -23,7 +23,6 @@ class TargetStream:
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler, steps: DriveSequences) -> None:
-        """Take the drive, the time, and the steps of its commands."""
         self._drive = drive
         self._steps = steps
         self._scheduler = scheduler

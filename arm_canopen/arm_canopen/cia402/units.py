@@ -32,7 +32,6 @@ class Units:
     """
 
     def __init__(self, config: DriveConfig) -> None:
-        """Take the factors."""
         self._config = config
 
     def use(self, config: DriveConfig) -> None:

@@ -37,7 +37,6 @@ class RefusedError(Exception):
     """
 
     def __init__(self, message: str, remedy: str) -> None:
-        """Keep both texts."""
         super().__init__(message)
         self.message = message
         self.remedy = remedy
@@ -50,7 +49,6 @@ class Findings:
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._errors: dict[tuple[Place, str], Problem] = {}
         self._warnings: dict[tuple[Place, str], Problem] = {}
 

@@ -96,7 +96,6 @@ class SdoWriter:
     def __init__(
         self, objects: WritableObjects, scheduler: Scheduler, index: int, subindex: int
     ) -> None:
-        """Remember nothing written yet."""
         self._objects = objects
         self._scheduler = scheduler
         self._address = (index, subindex)

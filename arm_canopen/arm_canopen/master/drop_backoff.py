@@ -17,7 +17,6 @@ class DropBackoff:
     """
 
     def __init__(self) -> None:
-        """Begin without any drop."""
         self.drops = 0
         self._booted_at = 0.0
 

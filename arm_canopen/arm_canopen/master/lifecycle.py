@@ -169,7 +169,6 @@ class Supervisor:
     """
 
     def __init__(self, master: Managed, devices: Sequence[Managed], scheduler: Scheduler) -> None:
-        """Take what is brought up."""
         self._master = master
         self._devices = devices
         self._scheduler = scheduler

@@ -95,7 +95,6 @@ class ReceivedTpdo:
     """
 
     def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
-        """Compile the mapping."""
         self.config = config
         self.codec = PdoCodec(config.mapping)
         self.values: tuple[Number, ...] | None = None
@@ -174,7 +173,6 @@ class SentRpdo:
     """
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
-        """Start with the values that the device has."""
         self.config = config
         self.cyclic = cyclic
         self.due = False
@@ -276,7 +274,6 @@ class InputReader:
     """Reads an object from a TPDO."""
 
     def __init__(self, source: ReceivedTpdo, position: int) -> None:
-        """Point to one object of the PDO."""
         self._source = source
         self._position = position
 
@@ -306,7 +303,6 @@ class OutputWriter:
     by_sdo = False
 
     def __init__(self, places: Sequence[tuple[SentRpdo, int]]) -> None:
-        """Point to the object: RPDOs, and its position in each."""
         self._places = [(output.values, position) for output, position in places]
         output, position = places[0]
         self._mapped = output.config.mapping[position]

@@ -21,7 +21,6 @@ class Promise(Generic[T]):
     """A result that comes later, once; it can be awaited by coroutines of a scheduler."""
 
     def __init__(self) -> None:
-        """Start unresolved."""
         self.done = False
         self._value: T | None = None
         self._error: BaseException | None = None
@@ -152,7 +151,6 @@ class Scheduler:
     """
 
     def __init__(self, now: float = 0.0) -> None:
-        """Start at a time, with nothing to do."""
         self.now = now
         self.on_defect: Callable[[BaseException], None] = lambda error: None
         self._timers: list[tuple[float, int, Promise[None]]] = []

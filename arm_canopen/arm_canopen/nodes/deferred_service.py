@@ -25,7 +25,6 @@ class Deferred:
     """A response that is not known yet."""
 
     def __init__(self) -> None:
-        """Wait for both the response and the way to send it."""
         self._lock = threading.Lock()
         self._response: Any = None
         self._send: Callable[[Any], None] | None = None
@@ -51,7 +50,6 @@ class DeferredServices:
     """Creates services of one process whose handlers return futures."""
 
     def __init__(self, output: OutputThread) -> None:
-        """Take the thread that sends the responses."""
         self._output = output
 
     def create(

@@ -25,7 +25,6 @@ class Axis:
     """
 
     def __init__(self, model: ServoModel) -> None:
-        """Begin at rest at position 0, without power."""
         self.time = 0.0
         self.speed = float('inf')
         self.motor = MotorModel()

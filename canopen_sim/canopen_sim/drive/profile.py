@@ -77,7 +77,6 @@ class Motion:
     __slots__ = ('end', 'segments')
 
     def __init__(self, segments: Sequence[Segment]) -> None:
-        """Take segments of which each begins where the one before has arrived."""
         self.segments = tuple(segments)
         self.end = self.segments[-1].start
 

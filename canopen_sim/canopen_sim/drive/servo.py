@@ -54,7 +54,6 @@ class Servo:
     """
 
     def __init__(self, model: ServoModel) -> None:
-        """Begin at rest at position 0, without power."""
         self.position = 0.0
         self.setpoint = 0.0
         self.powered = False

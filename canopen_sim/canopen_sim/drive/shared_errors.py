@@ -11,7 +11,6 @@ class SharedErrors:
     """Errors of a device; one that several axes have is gone when all have lost it."""
 
     def __init__(self, errors: EmcyProducer) -> None:
-        """Report them through the producer of the device."""
         self._errors = errors
         self._axes: dict[int, set[int]] = {}
 

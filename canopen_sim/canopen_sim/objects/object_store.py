@@ -52,7 +52,6 @@ class Variable:
     __slots__ = ('before_read', 'check', 'entry', 'listener', 'value')
 
     def __init__(self, entry: ObjectEntry) -> None:
-        """Begin with the default."""
         self.entry = entry
         self.value: Value = default_value(entry)
         self.check: Callable[[Value], None] | None = None
@@ -136,7 +135,6 @@ class Integer(Scalar):
     value: int
 
     def __init__(self, entry: ObjectEntry) -> None:
-        """Begin with the default."""
         super().__init__(entry)
         self.low, self.high = integer_range(entry.data_type) or (0, 0)
 
@@ -175,7 +173,6 @@ class ObjectStore:
     """
 
     def __init__(self, dictionary: ObjectDictionary) -> None:
-        """Give every object its default."""
         self.dictionary = dictionary
         self.overlay: dict[tuple[int, int], bytes] = {}
         self.saved: dict[tuple[int, int], Value] = {}

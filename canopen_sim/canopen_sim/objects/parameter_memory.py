@@ -24,7 +24,6 @@ class ParameterMemory:
     """
 
     def __init__(self) -> None:
-        """Begin empty."""
         self.values: dict[Address, bytes] = {}
         self.node_id: int | None = None
         self.bit_timing: int | None = None

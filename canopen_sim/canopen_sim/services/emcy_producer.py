@@ -49,7 +49,6 @@ class EmcyProducer:
     """
 
     def __init__(self, store: ObjectStore, send: Callable[[Frame], None]) -> None:
-        """Bind 0x1001, 0x1003, 0x1014 and 0x1015."""
         self.deadline = NEVER
         self._send = send
         self._register = store.integer(Index.ERROR_REGISTER)

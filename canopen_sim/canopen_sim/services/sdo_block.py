@@ -40,7 +40,6 @@ class BlockDownload:
     """
 
     def __init__(self, request: bytes) -> None:
-        """Begin with the client's initiation."""
         command, self.index, self.subindex, size = struct.unpack('<BHBI', request)
         self.size: int | None = size if command & SIZE_BIT else None
         self.streaming = True

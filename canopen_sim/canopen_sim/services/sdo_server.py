@@ -76,7 +76,6 @@ class SdoServer:
     def __init__(
         self, can_id: int, response_id: int, store: ObjectStore, send: Callable[[Frame], None]
     ) -> None:
-        """Serve the objects of a store under two identifiers."""
         self.can_id = can_id
         self.response_id = response_id
         self.deadline = NEVER

@@ -33,7 +33,6 @@ class Stream:
     axes = JOINTS
 
     def __init__(self) -> None:
-        """Begin where the axes are."""
         self.losses: dict[str, Refusal] = {}
         self._positions: dict[str, float] = {}
 

@@ -30,7 +30,6 @@ class Ramp:
     axes = (JOINT,)
 
     def __init__(self, velocity: float = SPEED, effort: float = EFFORT) -> None:
-        """Take the feed-forward."""
         self.losses: list[Refusal] = []
         self.pauses = False
         self._velocity = velocity

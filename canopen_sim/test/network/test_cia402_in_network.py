@@ -317,7 +317,6 @@ class Ramp:
     """A motion source that moves one axis at a constant speed, after an offset at its start."""
 
     def __init__(self, speed: float, jump: float = 0.0) -> None:
-        """Begin at rest."""
         self.axes = [JOINT]
         self.losses: list[Refusal] = []
         self._speed = speed

@@ -40,7 +40,6 @@ class Path:
     axes = JOINTS
 
     def __init__(self) -> None:
-        """Begin at rest."""
         self.refusals: dict[str, Refusal] = {}
         self.losses: dict[str, Refusal] = {}
         self._begin: list[float] = []

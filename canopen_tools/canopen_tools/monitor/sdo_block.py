@@ -20,7 +20,6 @@ class BlockFollower:
     """Describes block transfers of one device; frames of others it ignores."""
 
     def __init__(self, names: ObjectNames) -> None:
-        """Begin with no transfer on."""
         self._names = names
         self._title = ''
         self._block_size = 0

@@ -103,7 +103,6 @@ class InjectedDevices:
     """The machine's devices; a test plugs them in and out."""
 
     def __init__(self, *devices: InjectedDevice) -> None:
-        """Start with some."""
         self.plugged = list(devices)
 
     def paths(self) -> list[str]:

@@ -40,7 +40,6 @@ class Guardian:
     """What the guardian knows: the processes, by name, and how to stop them."""
 
     def __init__(self) -> None:
-        """Begin with none."""
         self._pidfds: dict[str, int] = {}
         self._pids: dict[str, int] = {}
         self._sequence = StopSequence(self._send)
@@ -109,7 +108,6 @@ class GuardianLink:
     """The supervisor's end: starts the guardian and sends it what runs."""
 
     def __init__(self) -> None:
-        """Start the guardian."""
         package = Path(__file__).resolve().parent
         code = (
             f'import sys; sys.path.insert(0, {str(package.parent)!r})\n'

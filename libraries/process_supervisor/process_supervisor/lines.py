@@ -12,7 +12,6 @@ class LineSplitter:
     """Collects bytes and gives back whole lines."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self._rest = b''
 
     def feed(self, data: bytes) -> list[str]:

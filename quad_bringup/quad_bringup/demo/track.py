@@ -87,7 +87,6 @@ class Track:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing."""
         self.milestone: Milestone | None = None
         self._last: Pose | None = None
         self._recent: deque[Milestone] = deque()

@@ -29,7 +29,6 @@ class JointReader:
     """
 
     def __init__(self, robot: Quadruped) -> None:
-        """Read for the joints of a robot, in its order."""
         self._names = robot.names
         self._spared = {robot.names[index] for index in robot.others}
         self._seen: list[str] | None = None

@@ -41,7 +41,6 @@ class FaultLatch:
     """Keeps faults until they are cleared."""
 
     def __init__(self) -> None:
-        """Start without faults."""
         self._faults: dict[Fault, str] = {}
 
     @property

@@ -137,7 +137,6 @@ class Walk(Motion):
     """
 
     def __init__(self, generator: GaitGenerator) -> None:
-        """Use a generator, from standing."""
         self._generator = generator
         self.reachable = True
 

@@ -13,7 +13,6 @@ class Notices:
     """Compares what is the matter now with what was the matter in the step before."""
 
     def __init__(self) -> None:
-        """Start with nothing being the matter."""
         self._present: set[str] = set()
 
     def step(self, present: dict[str, str], over: dict[str, str]) -> Iterator[Event]:

@@ -36,7 +36,6 @@ class BatteryFilter:
     """
 
     def __init__(self) -> None:
-        """Begin without a report."""
         self.state = Battery()
         self._charges: deque[float] = deque(maxlen=REPORTS)
         self._voltages: deque[float] = deque(maxlen=REPORTS)

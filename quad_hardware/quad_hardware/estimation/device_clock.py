@@ -26,7 +26,6 @@ class SampleClock:
     """
 
     def __init__(self) -> None:
-        """Begin without a report."""
         self._offset = math.inf
         self._device = 0.0
         self._wraps = 0
@@ -64,7 +63,6 @@ class BoardWatch:
     """
 
     def __init__(self) -> None:
-        """Begin without a report."""
         self._last: Report | None = None
 
     def restarted(self, state: Report) -> bool:

@@ -34,7 +34,6 @@ class GravityCheck:
     """
 
     def __init__(self) -> None:
-        """Begin without a report."""
         self._reports: deque[tuple[Quaternion, Vector]] = deque(maxlen=REPORTS)
 
     def take(self, attitude: Quaternion, acceleration: Vector | None) -> None:

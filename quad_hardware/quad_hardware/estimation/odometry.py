@@ -102,7 +102,6 @@ class LegOdometry:
     """Adds up what the standing legs say."""
 
     def __init__(self, settings: OdometrySettings, foot_radius: float) -> None:
-        """Begin at the origin, with the first update."""
         self._settings = settings
         self._radius = foot_radius
         # replaced as a whole: commands come from another thread than measurements

@@ -64,7 +64,6 @@ class CommandLimiter:
     """
 
     def __init__(self, joints: JointMap, settings: LimiterSettings | None = None) -> None:
-        """Begin without a stream."""
         self._joints = joints
         self._settings = settings or LimiterSettings()
         degree = math.pi / 180.0

@@ -33,7 +33,6 @@ class Mailbox:
     """
 
     def __init__(self) -> None:
-        """Begin closed."""
         self._lock = threading.Lock()
         self._orders = _NONE
         self._open = False

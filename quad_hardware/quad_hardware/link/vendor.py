@@ -117,7 +117,6 @@ class VendorParser:
     """The vendor's parser."""
 
     def __init__(self) -> None:
-        """Begin with an empty buffer."""
         feedback = importlib.import_module('xgo_lib2.feedback')
         self._parser: StateParser = feedback.SendStateParser()
         self._counters = ParserCounters()

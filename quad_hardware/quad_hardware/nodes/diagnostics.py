@@ -50,7 +50,6 @@ class LinkDiagnostic:
     """Describes the serial link, look by look: damage is judged since the last one."""
 
     def __init__(self) -> None:
-        """Nothing was seen yet."""
         self._frames = self._damaged = 0
 
     def describe(self, node: str, port: str, status: LinkStatus) -> DiagnosticStatus:

@@ -25,7 +25,6 @@ class RefusedError(Exception):
     """A frame requests what the board does not do; it becomes a NACK."""
 
     def __init__(self, reason: Refusal) -> None:
-        """Keep the reason."""
         super().__init__(reason.name)
         self.reason = reason
 

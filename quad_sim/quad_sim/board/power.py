@@ -57,7 +57,6 @@ class ServoThermalModel:
     """Temperatures of the servos, of first order in the square of their loads."""
 
     def __init__(self, count: int) -> None:
-        """Begin at the temperature of the room."""
         self.temperatures: Array = np.full(count, AMBIENT)
 
     def advance(self, loads: Array, duration: float) -> None:
@@ -70,7 +69,6 @@ class Overload:
     """How long each servo has been held at its full torque; a foot that lands is no overload."""
 
     def __init__(self, count: int) -> None:
-        """Begin without load."""
         self._since: Array = np.zeros(count)
 
     def advance(self, loads: Array, duration: float) -> None:

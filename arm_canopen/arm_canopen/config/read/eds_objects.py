@@ -26,7 +26,6 @@ class ObjectReader:
     """
 
     def __init__(self, ini: IniFile) -> None:
-        """Sort the sections into objects and their sub-indices."""
         self.oddities: list[tuple[int, str, str]] = []
         self._ini = ini
         self._objects: dict[int, IniSection] = {}

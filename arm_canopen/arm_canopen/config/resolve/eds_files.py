@@ -25,7 +25,6 @@ class EdsFiles:
     """
 
     def __init__(self, folder: Path, beside: Path) -> None:
-        """Begin with no file read."""
         self.folder = folder
         self.beside = beside
         self._read: dict[Path, Eds | None] = {}

@@ -35,7 +35,6 @@ class Homing(Mode):
     number = OperationMode.HOMING
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin not homed."""
         super().__init__(objects, axis, clock)
         self._attained = False
         self._failed = False

@@ -39,7 +39,6 @@ class Mode:
     number: ClassVar[OperationMode]
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Work on the objects and the axis of a drive."""
         self.objects = objects
         self.axis = axis
         self.clock = clock
@@ -128,7 +127,6 @@ class Dwell:
     """
 
     def __init__(self) -> None:
-        """Begin with the condition not met."""
         self.reached = False
         self.pending = False
         self._since = 0.0

@@ -54,7 +54,6 @@ class ProfilePosition(Mode):
     number = OperationMode.PROFILE_POSITION
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin without a set-point."""
         super().__init__(objects, axis, clock)
         self._active: SetPoint | None = None
         self._next: SetPoint | None = None

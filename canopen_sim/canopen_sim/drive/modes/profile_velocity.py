@@ -24,7 +24,6 @@ class ProfileVelocity(Mode):
     number = OperationMode.PROFILE_VELOCITY
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin at rest."""
         super().__init__(objects, axis, clock)
         self._target = 0.0
         self._bounded = False  # the motion ends at a software limit

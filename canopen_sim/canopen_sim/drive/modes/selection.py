@@ -45,7 +45,6 @@ class ModeSelection:
     """
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin in mode 0."""
         self._objects = objects
         self._modes: dict[int, Mode] = {m.number: m(objects, axis, clock) for m in MODES}
         self.current = self._modes[NoMode.number]

@@ -28,7 +28,6 @@ class Streamed(Mode):
     """
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin without a set-point."""
         super().__init__(objects, axis, clock)
         self._fresh = False  # written since the last SYNC
         self._streaming = False  # there was one for the SYNC before

@@ -67,7 +67,6 @@ class InterpolatedPosition(StreamedPosition):
     number = OperationMode.INTERPOLATED_POSITION
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin disabled."""
         super().__init__(objects, axis, clock)
         self._enabled = False
         self._buffer: deque[int] = deque()

@@ -24,7 +24,6 @@ class TorqueMode(Mode):
     """Applies a torque in steps, each of which begins exactly where the one before has ended."""
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin without torque."""
         super().__init__(objects, axis, clock)
         self._torque = 0.0
         self._next = NEVER
@@ -143,7 +142,6 @@ class CyclicTorque(TorqueMode, Streamed):
     number = OperationMode.CYCLIC_TORQUE
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin without a set-point."""
         super().__init__(objects, axis, clock)
         self._target = 0.0
 

@@ -27,7 +27,6 @@ class Velocity(Mode):
     number = OperationMode.VELOCITY
 
     def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
-        """Begin at rest."""
         super().__init__(objects, axis, clock)
         self._word = 0
         self._wanted = 0.0
