@@ -11,12 +11,11 @@ from pathlib import Path
 from process_supervisor import (
     Executable,
     FindExecutable,
-    first_found,
     LOG_FORMAT,
     node_argv,
     ProcessSpec,
     RosOptions,
-    STATE_PUBLISHERS,
+    state_publisher,
 )
 
 from .robots import Robot
@@ -27,9 +26,6 @@ MOTION_NODE = Executable('arm_servo', 'motion_node')
 """Trajectories and jogging: with the master in it, or for drives that another process has."""
 PLANNER = Executable('arm_planning', 'move_group')
 """Motions among obstacles, for clients of MoveIt."""
-
-TF_RATE = '100.0'
-"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
 """Order of stopping: the master disables the drives, so they must still be there."""
@@ -82,7 +78,9 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
     everything = [
         _slaves(stack, bus, find),
         _master(stack, bus, parameters, find),
-        _state_publisher(stack, parameters, find),
+        state_publisher(  # without it the arm moves without TF
+            parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
+        ),
         _planner(stack, parameters, find),
     ]
     return [spec for spec in everything if spec is not None]
@@ -164,25 +162,4 @@ def controller_process(
         notifies_ready=True,
         ready_timeout=ready_timeout,
         stop_order=MASTER_FIRST,
-    )
-
-
-def frame_prefix(ros: RosOptions) -> dict[str, str]:
-    """Return the parameter that keeps the TF frames of several robots apart."""
-    return {'frame_prefix': ros.frame_prefix} if ros.frame_prefix else {}
-
-
-def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec | None:
-    executable = first_found(STATE_PUBLISHERS, find)
-    if executable is None:
-        return None  # the arm moves without TF
-    values = {'publish_frequency': TF_RATE, **frame_prefix(stack.ros)}
-    return ProcessSpec(
-        name='robot_state',
-        argv=node_argv(executable, find, values, (parameters,), stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=executable.notifies_ready,
-        ready_timeout=stack.ready_timeout,
-        required=False,
-        stop_order=THEN_LISTENERS,
     )

@@ -10,17 +10,13 @@ from pathlib import Path
 from process_supervisor import (
     Executable,
     FindExecutable,
-    first_found,
     LOG_FORMAT,
     node_argv,
     ProcessSpec,
     RosOptions,
     StartError,
-    STATE_PUBLISHERS,
+    state_publisher,
 )
-
-TF_RATE = 100.0
-"""Greatest rate of /tf in [Hz]; its default of 20 would halve what /joint_states has."""
 
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
 """Order of stopping: the controller, then the bridge, then the robot."""
@@ -55,12 +51,6 @@ class Stack:
     calibration: Path | None = None
     ready_timeout: float = 30.0
     ros: RosOptions = field(default_factory=RosOptions)
-
-    @property
-    def frames(self) -> dict[str, str]:
-        """The parameter that keeps the TF frames of several robots apart."""
-        prefix = self.ros.frame_prefix
-        return {'frame_prefix': prefix} if prefix else {}
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -105,7 +95,7 @@ def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
 
 
 def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    values = {'port': stack.port, 'protocol': stack.protocol, **stack.frames}
+    values = {'port': stack.port, 'protocol': stack.protocol, **stack.ros.frame_parameters}
     if stack.simulate:  # its IMU is where the description has it
         values |= {'imu.mounting_checked': 'true', 'imu.rates_checked': 'true'}
     executable = Executable('quad_hardware', 'hardware_node')
@@ -136,19 +126,12 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
 
 
 def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    executable = first_found(STATE_PUBLISHERS, find)
-    if executable is None:
+    spec = state_publisher(
+        parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_BRIDGE
+    )
+    if spec is None:
         raise StartError(
             'no robot_state_publisher; source env.sh in this shell again; '
             'if that does not help, run make build before it'
         )
-    values = {'publish_frequency': f'{TF_RATE}', **stack.frames}
-    return ProcessSpec(
-        name='robot_state',
-        argv=node_argv(executable, find, values, (parameters,), stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=executable.notifies_ready,
-        ready_timeout=stack.ready_timeout,
-        required=False,
-        stop_order=THEN_BRIDGE,
-    )
+    return spec

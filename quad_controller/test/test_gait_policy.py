@@ -62,7 +62,7 @@ def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedP
         ({'action_scale': 'nan'}, 'not finite'),
         ({'observation_names': 'gravity,ang_vel,cmd,phase,joint_pos,joint_vel,prev_action'},
          'open: period: time between two steps'),
-        ({'observation_names': TERMS.replace('phase', 'rhythm')}, 'terms.rhythm.source: one of'),
+        ({'observation_names': TERMS.replace('phase', 'tempo')}, 'terms.tempo.source: one of'),
         ({'observation_names': TERMS.replace('phase', 'cmd')}, 'has cmd twice'),
         ({'observation_terms_history_length': '[1, 3, 1]'}, 'has 3 entries for 7 terms'),
         ({'observation_terms_history_length': '1,1,1,1,2,1,1'}, 'input'),

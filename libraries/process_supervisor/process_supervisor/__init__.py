@@ -19,16 +19,15 @@ from .nodes import (
     Executable,
     find_executable,
     FindExecutable,
-    first_found,
     LOG_FORMAT,
     namespaced_parameters,
     node_argv,
     parameters_by_node,
     ros_domain,
-    STATE_PUBLISHERS,
     write_parameters,
 )
 from .readiness import ServiceManager
+from .robot_state import state_publisher
 from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
 from .spec import ProcessSpec, STOP_STEPS, StopStep
@@ -40,7 +39,6 @@ __version__ = '0.1.0'
 __all__ = [
     'EVERY_NODE',
     'LOG_FORMAT',
-    'STATE_PUBLISHERS',
     'STOP_STEPS',
     'USAGE_ERROR',
     'CallError',
@@ -66,7 +64,6 @@ __all__ = [
     'exclusive',
     'explain',
     'find_executable',
-    'first_found',
     'is_smart',
     'namespaced_parameters',
     'node_argv',
@@ -74,6 +71,7 @@ __all__ = [
     'parse_with_ros',
     'ros_domain',
     'severity_of',
+    'state_publisher',
     'supervise',
     'wants_colour',
     'write_parameters',

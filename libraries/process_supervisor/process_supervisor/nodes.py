@@ -50,13 +50,6 @@ class Executable:
     notifies_ready: bool = True
 
 
-STATE_PUBLISHERS = (
-    Executable('robot_state_publisher', 'robot_state_publisher', notifies_ready=False),
-    Executable('robot_viewer', 'robot_state_publisher'),
-)
-"""Programs that make /tf of a description and /joint_states: the public one where ROS has it."""
-
-
 def find_executable(package: str, name: str) -> Path | None:
     """Find an executable as ``ros2 run`` does.
 

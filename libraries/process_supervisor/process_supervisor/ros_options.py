@@ -38,6 +38,11 @@ class RosOptions:
         return f'{self.namespace}/' if self.namespace else ''
 
     @property
+    def frame_parameters(self) -> dict[str, str]:
+        """The parameter with that prefix, for the nodes that have it; empty without a prefix."""
+        return {'frame_prefix': self.frame_prefix} if self.frame_prefix else {}
+
+    @property
     def node_arguments(self) -> tuple[str, ...]:
         """Words for the command line of a node, behind its ``--ros-args``.
 

@@ -12,12 +12,12 @@ import yaml
 from process_supervisor import (
     EVERY_NODE,
     Executable,
-    first_found,
     node_argv,
     ros_domain,
     StartError,
     write_parameters,
 )
+from process_supervisor.nodes import first_found
 
 NODE = Executable('some_package', 'some_node')
 
