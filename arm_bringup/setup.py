@@ -56,7 +56,6 @@ setup(
     install_requires=[
         'PyYAML>=6',
         'rich>=13',
-        'xacro>=2',
         sibling('arm_canopen'),
         sibling('libraries/demo_runner'),
         sibling('libraries/process_supervisor'),

@@ -14,6 +14,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/urdf_reader']),
         ('share/urdf_reader', ['package.xml']),
     ],
+    install_requires=['xacro>=2'],
     extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -2,16 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot descriptions as plain values: the kinematic tree of a URDF, the groups of an SRDF.
 
-The standard library is enough for it, so that every package can read a description here: the
+The standard library is enough for it, but for xacro files, so that every package can read a description here: the
 model of an arm, publishers of joint states and of /tf, bring-ups.
 """
 
-from .exceptions import DescriptionError, MeshFileError
+from .exceptions import DescriptionError, MeshFileError, XacroError
 from .groups import find_group, JointGroup
 from .mesh_files import find_mesh
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
 from .urdf import Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf, UrdfShape
+from .xacro_files import expand_xacro
 
 __all__ = [
     'MOVABLE',
@@ -31,7 +32,9 @@ __all__ = [
     'Transform',
     'UrdfShape',
     'Vector',
+    'XacroError',
     'about',
+    'expand_xacro',
     'find_group',
     'find_mesh',
     'from_rpy',

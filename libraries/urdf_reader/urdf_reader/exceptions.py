@@ -15,3 +15,19 @@ class DescriptionError(ValueError):
 
 class MeshFileError(DescriptionError):
     """The file of a mesh cannot be found; the message says what to do."""
+
+
+class XacroError(DescriptionError):
+    """A xacro file cannot be expanded.
+
+    Scenarios: malformed XML, an undefined property, a package that is not installed.
+
+    Attributes:
+        package: Name of the package that is missing; empty for none.
+        argument: Name of the xacro argument that has no value; empty for none.
+    """
+
+    def __init__(self, reason: str, *, package: str = '', argument: str = '') -> None:
+        """Keep what is missing beside the reason."""
+        super().__init__(reason)
+        self.package, self.argument = package, argument

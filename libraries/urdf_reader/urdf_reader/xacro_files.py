@@ -1,0 +1,130 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Expands xacro files of others as they are.
+
+What they include for ros2_control or Gazebo is left out where it is not installed: it is for other
+drivers and simulators.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+import contextlib
+import io
+import os
+from pathlib import Path
+import re
+import tempfile
+from typing import Any
+
+from .exceptions import XacroError
+
+OTHER_HARDWARE = ('ros2_control', 'gazebo')
+"""Files and macros with these words in their names are for other drivers and simulators."""
+NOT_FOUND = re.compile(r"package '(?P<package>[^']+)' not found")
+UNDEFINED = re.compile(r'Undefined substitution argument (?P<argument>\S+)')
+
+
+def expand_xacro(
+    path: Path,
+    arguments: Mapping[str, str] | None = None,
+    packages: Mapping[str, Path] | None = None,
+) -> str:
+    """Expand a xacro file.
+
+    Args:
+        path: The xacro file.
+        arguments: Values for its xacro arguments.
+        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
+
+    Returns:
+        What it makes, as XML text.
+
+    Raises:
+        XacroError: The file cannot be expanded; the message is xacro's own, or names the package
+            or argument that is missing and the remedy.
+    """
+    import xacro
+
+    complaints = io.StringIO()  # xacro writes to stderr where in the file it was
+    try:
+        with (
+            contextlib.redirect_stderr(complaints),
+            _package_overlay(packages or {}),
+            _without_other_hardware(xacro),
+        ):
+            document = xacro.process_file(str(path), mappings=dict(arguments or {}))
+    except Exception as error:  # an expression in the file may raise anything
+        place = ' '.join(complaints.getvalue().split())
+        if refusal := _missing(path, str(error)):
+            raise refusal from error
+        reason = f'{type(error).__name__}: {error} {place}'.strip()
+        raise XacroError(f'{path}: {reason}') from error
+    return str(document.toprettyxml(indent='  '))
+
+
+def _missing(path: Path, words: str) -> XacroError | None:
+    """Return what is missing and the remedy, where xacro's words are long or have none."""
+    if found := NOT_FOUND.search(words):
+        name = found['package']
+        reason = f'package {name!r} is not found: source the workspace that has it'
+        return XacroError(f'{path}: {reason}', package=name)
+    if found := UNDEFINED.search(words):
+        name = found['argument']
+        reason = f'xacro argument {name!r} has no value: give it with --xacro-arg {name}:=VALUE'
+        return XacroError(f'{path}: {reason}', argument=name)
+    return None
+
+
+@contextlib.contextmanager
+def _package_overlay(packages: Mapping[str, Path]) -> Iterator[None]:
+    """Let ``$(find ...)`` find folders as if they were installed, as long as the block runs."""
+    with contextlib.ExitStack() as stack:
+        if packages:
+            prefix = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix='packages-')))
+            index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+            index.mkdir(parents=True)
+            for name, folder in packages.items():
+                (index / name).touch()
+                (prefix / 'share' / name).symlink_to(folder)
+            before = os.environ.get('AMENT_PREFIX_PATH', '')
+            os.environ['AMENT_PREFIX_PATH'] = f'{prefix}{os.pathsep}{before}'
+            stack.callback(os.environ.__setitem__, 'AMENT_PREFIX_PATH', before)
+        yield
+
+
+@contextlib.contextmanager
+def _without_other_hardware(xacro: Any) -> Iterator[None]:  # noqa: ANN401  # it has no types
+    """Leave out includes for other drivers that are not installed, and calls of their macros."""
+    include, call = xacro.process_include, xacro.handle_macro_call
+
+    def process_include(element: Any, *rest: Any) -> None:  # noqa: ANN401
+        files = list(xacro.filestack)
+        try:
+            include(element, *rest)
+        except xacro.XacroException as error:
+            lacking = isinstance(error.exc, (LookupError, OSError))
+            if not lacking or not _of_other_hardware(element.getAttribute('filename')):
+                raise
+            xacro.filestack[:] = files
+            xacro.replace_node(element, by=None)
+
+    def handle_macro_call(node: Any, *rest: Any) -> bool:  # noqa: ANN401
+        try:
+            return bool(call(node, *rest))
+        except xacro.XacroException as error:
+            unknown = str(error).startswith('unknown macro name')
+            if not unknown or not _of_other_hardware(node.tagName):
+                raise
+            xacro.replace_node(node, by=None)
+            return True
+
+    xacro.process_include, xacro.handle_macro_call = process_include, handle_macro_call
+    try:
+        yield
+    finally:
+        xacro.process_include, xacro.handle_macro_call = include, call
+
+
+def _of_other_hardware(name: str) -> bool:
+    return any(word in name for word in OTHER_HARDWARE)
