@@ -20,9 +20,9 @@ from .exceptions import (
     ObjectNameError,
     SceneError,
 )
-from .frame_tree import FrameTree
+from .frame_tree import FrameTree, TRANSFORM_TIMEOUT
 from .kinematics import Kinematics
-from .limits import JointLimits, load_limits
+from .limits import JointLimits, load_limits, merge_limits
 from .link_pairs import LinkPairs, sample_link_pairs
 from .model import RobotModel
 from .names import ArmNames, names_of
@@ -38,6 +38,7 @@ from .state import RobotState
 
 __all__ = [
     'ORIGIN',
+    'TRANSFORM_TIMEOUT',
     'AllowedCollisionMatrix',
     'ArmError',
     'ArmFiles',
@@ -81,6 +82,7 @@ __all__ = [
     'frozen',
     'inverse',
     'load_limits',
+    'merge_limits',
     'names_of',
     'padded',
     'pose_quality',

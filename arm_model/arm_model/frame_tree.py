@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 import numpy as np
 
@@ -38,6 +39,16 @@ class FrameTree:
             time: Steady time of its arrival in [s]; infinity for a static one.
         """
         self._links[child] = _Link(parent, pose, time)
+
+    def age(self, frame: str, now: float) -> float:
+        """Return how old the newest transform of a frame is in [s]; infinity where it has none.
+
+        Args:
+            frame: Name of the frame.
+            now: Steady time in [s].
+        """
+        link = self._links.get(frame)
+        return math.inf if link is None else max(now - link.time, 0.0)
 
     def pose(self, frame: str, base: str, now: float) -> Pose | None:
         """Return the pose of a frame in another; None where they are not connected.

@@ -8,7 +8,7 @@ A :class:`Planner` plans: a :class:`MotionRequest` goes in, a :class:`MotionPlan
 
 from __future__ import annotations
 
-from .exceptions import PlanningCode, PlanningError
+from .exceptions import ConfigError, PlanningCode, PlanningError
 from .industrial.sequence import SequenceItem
 from .planner import Planner
 from .requests import (
@@ -31,6 +31,7 @@ __all__ = [
     'SRDF_SAMPLES',
     'CircPoint',
     'CircPointKind',
+    'ConfigError',
     'Goal',
     'JointGoal',
     'MotionPlan',

@@ -5,7 +5,8 @@
 ::
 
     ArmError (of arm_model)
-    └── PlanningError   a request is refused, or no motion was found; carries MoveIt's code
+    ├── PlanningError   a request is refused, or no motion was found; carries MoveIt's code
+    └── ConfigError     a file or parameter of MoveIt's names is broken; names file, line and key
 """
 
 from __future__ import annotations
@@ -69,3 +70,10 @@ class PlanningError(ArmError):
         """
         super().__init__(reason)
         self.code = code
+
+
+class ConfigError(ArmError):
+    """A package of MoveIt's Setup Assistant, or a parameter of its names, is broken.
+
+    Scenarios: a file is no YAML, a limit is a text, a group names a planner that is not there.
+    """

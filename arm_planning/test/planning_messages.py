@@ -36,7 +36,7 @@ class QuietNode:
         """Return what does nothing."""
         if name == 'resolve_topic_name':
             return lambda topic: f'/{topic}'
-        return lambda *_: SimpleNamespace(publish=lambda _message: None)
+        return lambda *_, **__: SimpleNamespace(publish=lambda _message: None)
 
 
 @cache

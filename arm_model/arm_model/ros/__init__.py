@@ -19,9 +19,10 @@ from .robot_parameters import (
     GroupModels,
     same_robot,
 )
-from .tf_listener import TfListener
+from .tf_listener import learn_static, learn_transforms, STATIC_QOS, TfListener
 
 __all__ = [
+    'STATIC_QOS',
     'Description',
     'FrameOf',
     'GroupModels',
@@ -34,6 +35,8 @@ __all__ = [
     'declare_groups',
     'declare_robot',
     'duration_fields',
+    'learn_static',
+    'learn_transforms',
     'primitive_shape',
     'same_robot',
     'seconds',

@@ -55,17 +55,18 @@ class Description:
     limits: Mapping[str, Any]
 
 
-def declare_description(node: Node) -> Description:
+def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> Description:
     """Declare what describes a robot, for a node that has all groups.
 
     Args:
         node: The node.
+        limits: The table ``joint_limits`` where no file of limits is given; None needs a file.
 
     Raises:
         ModelError: A parameter is missing, or the limits file cannot be read.
     """
-    urdf, srdf, limits, _group, _tip = _given(node)
-    return Description(urdf, srdf, load_limits(Path(limits)))
+    urdf, srdf, path, _group, _tip = _given(node, needs_limits=limits is None)
+    return Description(urdf, srdf, load_limits(Path(path)) if path else limits or {})
 
 
 def declare_robot(node: Node) -> RobotModel:
@@ -114,7 +115,7 @@ def declare_groups(node: Node) -> GroupModels:
     return GroupModels([arm(name) for name in arms], tools)
 
 
-def _given(node: Node) -> tuple[str, str, str, str, str]:
+def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str, str]:
     """Declare what describes an arm, and make sure that it is given."""
     urdf, srdf, limits, group, tip = _declare(node)
     for name, value in (
@@ -122,7 +123,7 @@ def _given(node: Node) -> tuple[str, str, str, str, str]:
         ('robot_description_semantic', srdf),
         ('joint_limits', limits),
     ):
-        if not value:
+        if not value and (needs_limits or name != 'joint_limits'):
             raise ModelError(f'no {name}: give it with --ros-args -p {name}:=... or a params file')
     return urdf, srdf, limits, group, tip
 

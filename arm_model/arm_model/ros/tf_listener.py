@@ -75,20 +75,42 @@ class TfListener:
 
     def _take(self, message: TFMessage) -> None:
         now, clock = time.monotonic(), float(self._node.get_clock().now().nanoseconds) * 1e-9
-        for transform in message.transforms:
-            # what comes late is as old as its stamp says
-            self._learn(transform, now - max(clock - seconds(transform.header.stamp), 0.0))
+        if self._tree is not None:
+            learn_transforms(self._tree, message, now, clock)
 
     def _take_static(self, message: TFMessage) -> None:
-        for transform in message.transforms:
-            self._learn(transform, math.inf)
-
-    def _learn(self, transform: TransformStamped, when: float) -> None:
-        try:
-            rotation = rotation_of(xyzw(transform.transform.rotation))
-            position = checked(xyz(transform.transform.translation), 3, 'translation')
-        except CommandError:
-            return  # other listeners of TF report it to its publisher
         if self._tree is not None:
-            child, parent = transform.child_frame_id, transform.header.frame_id
-            self._tree.learn(child, parent, Pose(rotation, position), when)
+            learn_static(self._tree, message)
+
+
+def learn_transforms(tree: FrameTree, message: TFMessage, now: float, clock: float) -> None:
+    """Take a message of /tf; what comes late is as old as its stamps say.
+
+    Args:
+        tree: What takes it.
+        message: The message.
+        now: Steady time of its arrival in [s].
+        clock: Time of its arrival by the clock of the stamps in [s].
+    """
+    for transform in message.transforms:
+        _learn(tree, transform, now - max(clock - seconds(transform.header.stamp), 0.0))
+
+
+def learn_static(tree: FrameTree, message: TFMessage) -> None:
+    """Take a message of /tf_static.
+
+    Args:
+        tree: What takes it.
+        message: The message.
+    """
+    for transform in message.transforms:
+        _learn(tree, transform, math.inf)
+
+
+def _learn(tree: FrameTree, transform: TransformStamped, when: float) -> None:
+    try:
+        rotation = rotation_of(xyzw(transform.transform.rotation))
+        position = checked(xyz(transform.transform.translation), 3, 'translation')
+    except CommandError:
+        return  # other listeners of TF report it to its publisher
+    tree.learn(transform.child_frame_id, transform.header.frame_id, Pose(rotation, position), when)

@@ -4,32 +4,38 @@
 
 from __future__ import annotations
 
+import argparse
+from pathlib import Path
 import sys
 import threading
 
 from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 
 from arm_model import ArmError
-from arm_model.ros import declare_description, Description
+from arm_model.ros import Description
 from node_runner import (
     destroyed_when_refused,
     LATCHED,
     notify_ready,
-    ParameterError,
-    ParameterReader,
-    refuse_misspelt,
     run_program,
     spin,
 )
 
+from ..moveit_config.package import MoveItPackage, read_package
 from ..ros.background import Background
-from ..ros.controllers import Controller, FOLLOW, KINDS
 from ..ros.execute_action import ExecuteAction
-from ..ros.execution import ExecutionLimits, TrajectoryExecution
+from ..ros.execution import TrajectoryExecution
 from ..ros.kinematic_services import KinematicServices
 from ..ros.motion_action import MotionAction, sequence, single_motion
+from ..ros.parameters import (
+    declare_controllers,
+    declare_execution_limits,
+    declare_others,
+    declare_parameters,
+)
 from ..ros.path_watch import PathWatch
 from ..ros.planner_queries import PlannerQueries
 from ..ros.planning import PlanningThread
@@ -42,19 +48,29 @@ NAME = 'move_group'
 HELP = """\
 Plan and execute motions of a robot among obstacles: MoveIt's interfaces.
 
-usage: ros2 run arm_planning move_group --ros-args --params-file robot.yaml
+usage: ros2 run arm_planning move_group --moveit-config DIR
+       ros2 run arm_planning move_group --ros-args --params-file robot.yaml
 
-parameters:
+options:
+  --moveit-config DIR     a package as the MoveIt Setup Assistant writes it, as it is
+  --xacro-arg NAME:=VALUE an argument of its xacro files; may be repeated
+
+parameters, each before what the package says:
   robot_description, robot_description_semantic, joint_limits   what describes the robot
+  robot_description_kinematics, robot_description_planning,
+  ompl, pilz_industrial_motion_planner                          MoveIt's, as its launch files do
+  allow_trajectory_execution                                    (default true)
   trajectory_execution.allowed_start_tolerance                  [rad] (default 0.01)
   trajectory_execution.allowed_execution_duration_scaling       (default 1.1)
   trajectory_execution.allowed_goal_duration_margin             [s] (default 0.5)
+  trajectory_execution.execution_duration_monitoring            (default true)
   moveit_simple_controller_manager.controller_names             (default: <group>_controller)
   <controller>.joints                                           joints that it moves
   <controller>.type                                             FollowJointTrajectory (default),
                                             GripperCommand or ParallelGripperCommand
   <controller>.action_ns                                        its action (default: by type)
   <controller>.default                                          it comes first (default false)
+  <controller>.command_joint, <controller>.max_effort           of a GripperCommand
 """
 
 
@@ -62,32 +78,43 @@ class MoveGroup(Node):
     """Serves clients of MoveIt."""
 
     @destroyed_when_refused
-    def __init__(self) -> None:
+    def __init__(self, package: MoveItPackage | None = None) -> None:
         """Read the robot and offer everything.
+
+        Args:
+            package: Of MoveIt's Setup Assistant; gives what the parameters leave out.
 
         Raises:
             ArmError: The robot, or a parameter, is refused.
         """
         super().__init__(NAME)
-        description = declare_description(self)
+        given = declare_parameters(self, package)
+        description, settings = given.description, given.settings
         robot = _robot(description)
-        limits = _execution_limits(self)
-        controllers = _controllers(self, robot)
-        refuse_misspelt(self)
+        limits = declare_execution_limits(self)
+        controllers = declare_controllers(self, robot, given.places)
+        declare_others(self, given.names)
         semantic = self.create_publisher(String, 'robot_description_semantic', LATCHED)
         semantic.publish(String(data=description.srdf))
         monitor = SceneMonitor(self, robot)
         self._queries = Background(self, 'queries')
         queried = _robot(description)
         StateServices(self, monitor, self._queries, queried)
-        KinematicServices(self, monitor, self._queries, queried)
+        KinematicServices(self, monitor, self._queries, queried, settings)
         execution = TrajectoryExecution(self, controllers, monitor.received, limits)
         self._watch = Background(self, 'watch')
         PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
-        planning = PlanningThread(self, monitor, self._planning, _robot(description))
-        PlannerQueries(self)
+        planning = PlanningThread(
+            self,
+            monitor,
+            self._planning,
+            _robot(description),
+            settings=settings,
+            cartesian_limits=given.cartesian_limits,
+        )
+        PlannerQueries(self, settings.planners)
         for kind in (single_motion(planning), sequence(planning)):
             MotionAction(self, kind, planning, self._planning, execution)
         # there is no octomap that would have to be cleared
@@ -104,58 +131,26 @@ def _robot(description: Description) -> RobotGroups:
     return RobotGroups(description.urdf, description.srdf, description.limits)
 
 
-def _execution_limits(node: Node) -> ExecutionLimits:
-    read = ParameterReader(node, 'trajectory_execution.')
-    return ExecutionLimits(
-        read.number(
-            'allowed_start_tolerance',
-            0.01,
-            (0.0, 10.0),
-            'how far the robot may be from the start of a trajectory; 0 is anywhere [rad]',
-        ),
-        read.number(
-            'allowed_execution_duration_scaling',
-            1.1,
-            (1.0, 100.0),
-            'how many times as long as planned a trajectory may take',
-        ),
-        read.number(
-            'allowed_goal_duration_margin',
-            0.5,
-            (0.0, 100.0),
-            'how much longer than that it may take [s]',
-        ),
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        'move_group', usage=argparse.SUPPRESS, add_help=False, allow_abbrev=False
     )
-
-
-def _controllers(node: Node, robot: RobotGroups) -> dict[str, Controller]:
-    """Return the controllers; by default those of bring-up, one for each group.
-
-    Those that are default come first: they get the joints that several move.
-    """
-    defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
-    manager = 'moveit_simple_controller_manager.'
-    names = ParameterReader(node, manager).texts(
-        'controller_names', list(defaults), 'controllers that follow trajectories'
-    )
-    found, first = {}, []
-    for name in names:
-        read = ParameterReader(node, f'{manager}{name}.')
-        joints = read.texts('joints', defaults.get(name, []), f'joints that {name} moves')
-        kind = read.choice('type', FOLLOW.name, KINDS, f'what {name} takes')
-        namespace = read.text('action_ns', kind.namespace, f'name of the action of {name}')
-        if kind.single and len(joints) != 1:
-            raise ParameterError(
-                f'{manager}{name}.joints has {len(joints)} joints; a {kind.name} moves one'
-            )
-        if read.flag('default', f'{name} comes before those that are not', default=False):
-            first.append(name)
-        found[name] = Controller(tuple(joints), kind, namespace)
-    return {name: found[name] for name in sorted(found, key=lambda name: name not in first)}
+    parser.add_argument('--moveit-config', type=Path)
+    parser.add_argument('--xacro-arg', action='append', default=[])
+    arguments = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    for each in arguments.xacro_arg:
+        if ':=' not in each:
+            parser.error(f'--xacro-arg {each}: write NAME:=VALUE')
+    return arguments
 
 
 def _serve(stop: threading.Event) -> None:
-    node = MoveGroup()
+    arguments = _arguments()
+    package = None
+    if arguments.moveit_config is not None:
+        pairs = (each.partition(':=') for each in arguments.xacro_arg)
+        package = read_package(arguments.moveit_config, {name: value for name, _, value in pairs})
+    node = MoveGroup(package)
     try:
         notify_ready()
         spin([node], stop)

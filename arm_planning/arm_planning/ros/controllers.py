@@ -39,11 +39,20 @@ class Controller:
         joints: Joints that it moves.
         kind: What it takes.
         namespace: Name of its action below that of the controller.
+        max_effort: Greatest effort of a GripperCommand in [N]; 0 for its own.
     """
 
     joints: Sequence[str]
     kind: ControllerKind
     namespace: str
+    max_effort: float = 0.0
+
+    def goal(self, part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
+        """Return the goal of its action for the part of a trajectory that is for its joints."""
+        goal = self.kind.goal(part)
+        if self.kind.single and self.max_effort:
+            goal.command.max_effort = self.max_effort
+        return goal
 
     def action(self, name: str) -> str:
         """Return the name of its action, by its own."""

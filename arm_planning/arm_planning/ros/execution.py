@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 import time
 from typing import Any
 
@@ -47,11 +48,15 @@ class ExecutionLimits:
         start_tolerance: How far the robot may be from the start in [rad]; 0 for anywhere.
         duration_scaling: How many times as long as planned it may take.
         duration_margin: How much longer than that in [s].
+        is_monitored: Whether one that takes longer is stopped.
+        is_allowed: Whether anything is executed.
     """
 
     start_tolerance: float = 0.01
     duration_scaling: float = 1.1
     duration_margin: float = 0.5
+    is_monitored: bool = True
+    is_allowed: bool = True
 
 
 @dataclass(slots=True, eq=False)
@@ -170,6 +175,11 @@ class TrajectoryExecution:
             PlanningError: It is no trajectory, does not begin where the robot is, no controller
                 follows it, or one of its joints is on its way already.
         """
+        if not self._limits.is_allowed:
+            raise PlanningError(
+                PlanningCode.CONTROL_FAILED,
+                'Cannot execute trajectory since allow_trajectory_execution was set to false',
+            )
         check_trajectory(trajectory)
         execution = Execution(trajectory, done)
         for other in self._running:
@@ -187,11 +197,13 @@ class TrajectoryExecution:
         limits = self._limits
         execution.deadline = (
             execution.begin + limits.duration_scaling * lasts + limits.duration_margin
+            if limits.is_monitored
+            else math.inf
         )
         self._running.append(execution)
         execution.waits_for = set(parts)
         for name, part in parts.items():
-            goal = self._controllers[name].kind.goal(part)
+            goal = self._controllers[name].goal(part)
             sent = self._clients[name].send_goal_async(goal)
             sent.add_done_callback(
                 lambda answer, name=name: self._accepted(execution, name, answer)

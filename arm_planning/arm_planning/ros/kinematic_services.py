@@ -22,6 +22,7 @@ from ..ik.link_kinematics import LinkKinematics
 from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
 from ..industrial.limits import scaled
 from ..link_speed import speed_limited
+from ..moveit_config.settings import MoveItSettings
 from ..validity import ValidityCheck
 from .background import Background, error_code
 from .motion_request import RequestReader, scaling_factor
@@ -39,7 +40,12 @@ class KinematicServices:
     """Answers in a thread of its own, with a robot of its own."""
 
     def __init__(
-        self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
+        self,
+        node: Node,
+        monitor: SceneMonitor,
+        background: Background,
+        robot: RobotGroups,
+        settings: MoveItSettings | None = None,
     ) -> None:
         """Offer the services.
 
@@ -48,9 +54,10 @@ class KinematicServices:
             monitor: The scene and where the joints are.
             background: The thread.
             robot: The robot, for that thread alone.
+            settings: What holds where a request does not say so.
         """
         self._node, self._monitor = node, monitor
-        self._kinematics = GroupKinematics(robot)
+        self._kinematics = GroupKinematics(robot, settings)
         background.serve(GetPositionIK, 'compute_ik', self._ik, _refuse)
         background.serve(
             GetCartesianPath, 'compute_cartesian_path', self._cartesian_path, _refuse_path
@@ -79,13 +86,14 @@ class KinematicServices:
 class GroupKinematics:
     """Answers of one robot; belongs to one thread."""
 
-    def __init__(self, robot: RobotGroups) -> None:
+    def __init__(self, robot: RobotGroups, settings: MoveItSettings | None = None) -> None:
         """Solve nothing yet.
 
         Args:
             robot: The robot, for this thread alone.
+            settings: What holds where a request does not say so.
         """
-        self._robot = robot
+        self._robot, self._settings = robot, settings or MoveItSettings()
         self._solvers: dict[tuple[str, str], tuple[RobotModel, IkSolver]] = {}
 
     def ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
@@ -106,7 +114,11 @@ class GroupKinematics:
         link, pose = reader.on_link(pose, name)
         constraints = reader.constraints(request.constraints)
         scene = scene_for(snapshot, model.scene) if request.avoid_collisions else None
-        timeout = seconds(request.timeout) or DEFAULT_TIMEOUT
+        timeout = seconds(request.timeout) or max(
+            # a shorter one is meant for solvers in C++
+            self._settings.ik_timeouts.get(request.group_name, 0.0),
+            DEFAULT_TIMEOUT,
+        )
         solver = self._solver(model, link)
         count = 1 if constraints is None else CANDIDATES
         try:
@@ -167,7 +179,7 @@ class GroupKinematics:
             scene=scene,
             is_valid=None if check is None else lambda state: not check.violated(state),
         )
-        path = _timed(request, model, found.positions, scene)
+        path = self._timed(request, model, found.positions, scene)
         start = state_message(self._robot.joints, positions, snapshot.root)
         response = GetCartesianPath.Response(
             start_state=start,
@@ -176,6 +188,40 @@ class GroupKinematics:
             error_code=error_code(reason=found.reason),
         )
         return response, start
+
+    def _timed(
+        self,
+        request: Any,  # noqa: ANN401
+        model: RobotModel,
+        rows: Array,
+        scene: PlanningScene | None,
+    ) -> Path:
+        """Return the path through joint positions as fast as a request allows.
+
+        Raises:
+            PlanningError: A factor or speed is refused, or it is not valid between the positions.
+        """
+        limits = scaled(
+            model.limits,
+            scaling_factor(
+                'velocity', request.max_velocity_scaling_factor, self._settings.velocity_scaling
+            ),
+            scaling_factor(
+                'acceleration',
+                request.max_acceleration_scaling_factor,
+                self._settings.acceleration_scaling,
+            ),
+        )
+        path = timed_rows(rows, limits)
+        violation = None if scene is None else ValidityCheck(limits, scene).path(path)
+        if violation is not None:
+            raise PlanningError(
+                PlanningCode.INVALID_MOTION_PLAN,
+                f'between two places of the path {violation.reason}; take a smaller max_step, or'
+                ' keep farther away',
+            )
+        link = LinkKinematics(model, request.cartesian_speed_limited_link)
+        return speed_limited(path, link, max(request.max_cartesian_speed, 0.0))[0]
 
     def _solver(self, model: RobotModel, link: str) -> IkSolver:
         key = model.group, link
@@ -209,34 +255,6 @@ def _heeding(check: ConstraintCheck, found: list[Array]) -> list[Array]:
             f' {check.violated(found[0])}',
         )
     return heeding
-
-
-def _timed(
-    request: Any,  # noqa: ANN401
-    model: RobotModel,
-    rows: Array,
-    scene: PlanningScene | None,
-) -> Path:
-    """Return the path through joint positions as fast as a request allows.
-
-    Raises:
-        PlanningError: A factor or speed is refused, or it is not valid between the positions.
-    """
-    limits = scaled(
-        model.limits,
-        scaling_factor('velocity', request.max_velocity_scaling_factor),
-        scaling_factor('acceleration', request.max_acceleration_scaling_factor),
-    )
-    path = timed_rows(rows, limits)
-    violation = None if scene is None else ValidityCheck(limits, scene).path(path)
-    if violation is not None:
-        raise PlanningError(
-            PlanningCode.INVALID_MOTION_PLAN,
-            f'between two places of the path {violation.reason}; take a smaller max_step, or'
-            ' keep farther away',
-        )
-    link = LinkKinematics(model, request.cartesian_speed_limited_link)
-    return speed_limited(path, link, max(request.max_cartesian_speed, 0.0))[0]
 
 
 def _refuse(response: Any, error: PlanningError) -> None:  # noqa: ANN401

@@ -160,7 +160,7 @@ class MotionAction:
         planned = goal.planned = done.result()
         self._planning.display(planned)
         if goal.handle.request.planning_options.plan_only:
-            self._end(goal, PlanningCode.SUCCESS, '')
+            self._end(goal, PlanningCode.SUCCESS, '; '.join(planned.notes))
             return
         self._publish(goal, 'MONITOR')
         self._follow(goal, planned)
@@ -168,7 +168,7 @@ class MotionAction:
     def _follow(self, goal: _Goal, planned: PlannedMotion) -> None:
         """Have the next trajectory of a plan followed, or end the goal after the last."""
         if goal.begun == len(planned.trajectories):
-            self._end(goal, PlanningCode.SUCCESS, '')
+            self._end(goal, PlanningCode.SUCCESS, '; '.join(planned.notes))
             return
         try:
             goal.execution = self._execution.start(

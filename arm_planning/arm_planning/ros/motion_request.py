@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 from typing import Any
 
@@ -25,6 +25,9 @@ from arm_model import (
 from arm_model.ros import primitive_shape, xyz, xyzw
 
 from ..exceptions import PlanningCode, PlanningError
+from ..industrial.planner import PLANNER_IDS
+from ..moveit_config.settings import MoveItSettings, PIPELINES
+from ..planner import DEFAULT_PLANNER, FREE_MOTION
 from ..requests import (
     CircPoint,
     CircPointKind,
@@ -43,10 +46,7 @@ from .scene_snapshot import SceneSnapshot
 ANY_ORIENTATION = (math.pi, math.pi, math.pi)
 """Tolerance of a goal that names a position only in [rad]."""
 
-OMPL, PILZ = 'ompl', 'pilz_industrial_motion_planner'
-
-PIPELINES: Mapping[str, str] = {'': '', OMPL: '', PILZ: 'PTP'}
-"""Planning pipelines by MoveIt's names, each with its default planner; empty is ours."""
+OMPL, PILZ = PIPELINES
 
 
 class RequestReader:
@@ -56,14 +56,22 @@ class RequestReader:
         start: Where the joints of the group are in [rad].
     """
 
-    def __init__(self, model: RobotModel, snapshot: SceneSnapshot, positions: Array) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        snapshot: SceneSnapshot,
+        positions: Array,
+        settings: MoveItSettings | None = None,
+    ) -> None:
         """Read for a group.
 
         Args:
             model: The group.
             snapshot: The scene, for the frames of goals.
             positions: Where all joints of the robot are in [rad].
+            settings: What holds where a request does not say so.
         """
+        self._settings = settings or MoveItSettings()
         self._model, self._snapshot, self._positions = model, snapshot, positions
         place = dict(zip(snapshot.scene.kinematics.joints, positions.tolist(), strict=True))
         self.start = frozen([place[name] for name in model.joints])
@@ -74,8 +82,8 @@ class RequestReader:
         Raises:
             PlanningError: It has no goal, or a part of it is refused.
         """
-        if message.pipeline_id not in PIPELINES:
-            known = ', '.join(filter(None, PIPELINES))
+        if message.pipeline_id not in {'', *PIPELINES}:
+            known = ', '.join(PIPELINES)
             raise PlanningError(
                 PlanningCode.PLANNING_FAILED,
                 f'No planning pipeline {message.pipeline_id!r}; choose one of {known}',
@@ -89,10 +97,14 @@ class RequestReader:
         return MotionRequest(
             start=self.start,
             goals=tuple(self.goal(each) for each in message.goal_constraints),
-            planner_id=message.planner_id or PIPELINES[message.pipeline_id],
-            velocity_scaling=scaling_factor('velocity', message.max_velocity_scaling_factor),
+            planner_id=self._planner_id(message),
+            velocity_scaling=scaling_factor(
+                'velocity', message.max_velocity_scaling_factor, self._settings.velocity_scaling
+            ),
             acceleration_scaling=scaling_factor(
-                'acceleration', message.max_acceleration_scaling_factor
+                'acceleration',
+                message.max_acceleration_scaling_factor,
+                self._settings.acceleration_scaling,
             ),
             timeout=message.allowed_planning_time or DEFAULT_TIMEOUT,
             attempts=max(message.num_planning_attempts, 1),
@@ -101,6 +113,15 @@ class RequestReader:
             max_cartesian_speed=max(message.max_cartesian_speed, 0.0),
             cartesian_speed_link=message.cartesian_speed_limited_link,
         )
+
+    def _planner_id(self, message: Any) -> str:  # noqa: ANN401
+        """Return our name of the planner that a request asks for."""
+        planners = self._settings.planners
+        if (message.pipeline_id or self._settings.default_pipeline) == PILZ:
+            return message.planner_id or self._settings.default_industrial
+        name = planners.name(message.planner_id, message.group_name)
+        is_of_others = name not in {*FREE_MOTION, *PLANNER_IDS} and planners.search(name)
+        return DEFAULT_PLANNER if is_of_others else name
 
     def goal(self, message: Any) -> Goal:  # noqa: ANN401
         """Return a moveit_msgs/Constraints as a goal.
@@ -308,12 +329,13 @@ class RequestReader:
         return CircPoint(kinds[0], frozen(point))
 
 
-def scaling_factor(what: str, value: float) -> float:
+def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
     """Return a scaling factor; 0 is one that was not given.
 
     Args:
         what: Velocity or acceleration.
         value: The factor of the message.
+        default: The factor where none was given.
 
     Raises:
         PlanningError: It is negative, or above 1.
@@ -323,7 +345,7 @@ def scaling_factor(what: str, value: float) -> float:
             PlanningCode.FAILURE,
             f'max_{what}_scaling_factor is {value:g}; it must be above 0 and 1 at most',
         )
-    return value or 1.0
+    return value or default
 
 
 def _bad_goal(reason: str) -> PlanningError:

@@ -11,6 +11,7 @@ from moveit_msgs.srv import GetPlannerParams, QueryPlannerInterfaces, SetPlanner
 from rclpy.node import Node
 
 from ..industrial.planner import PLANNER_IDS
+from ..moveit_config.planner_configs import PlannerConfigs
 from ..planner import FREE_MOTION
 from .motion_request import OMPL, PILZ
 
@@ -20,15 +21,16 @@ SEARCH = 'geometric::RRTConnect'
 class PlannerQueries:
     """Answers about planners; none has anything to set."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node, planners: PlannerConfigs) -> None:
         """Offer query_planner_interface, get_planner_params and set_planner_params.
 
         Args:
             node: The node.
+            planners: Configurations of planners of a package.
         """
-        self._log = node.get_logger()
-        node.create_service(QueryPlannerInterfaces, 'query_planner_interface', _interfaces)
-        node.create_service(GetPlannerParams, 'get_planner_params', _get)
+        self._log, self._planners = node.get_logger(), planners
+        node.create_service(QueryPlannerInterfaces, 'query_planner_interface', self._interfaces)
+        node.create_service(GetPlannerParams, 'get_planner_params', self._get)
         node.create_service(SetPlannerParams, 'set_planner_params', self._set)
 
     def _set(self, request: Any, response: Any) -> Any:  # noqa: ANN401  # rclpy has no types here
@@ -40,21 +42,28 @@ class PlannerQueries:
         )
         return response
 
+    def _interfaces(self, _request: Any, response: Any) -> Any:  # noqa: ANN401
+        response.planner_interfaces = [
+            PlannerInterfaceDescription(
+                name='RRT-Connect',
+                pipeline_id=OMPL,
+                planner_ids=list(self._planners.ids or FREE_MOTION),
+            ),
+            PlannerInterfaceDescription(
+                name='PTP, LIN, CIRC', pipeline_id=PILZ, planner_ids=list(PLANNER_IDS)
+            ),
+        ]
+        return response
 
-def _interfaces(_request: Any, response: Any) -> Any:  # noqa: ANN401
-    response.planner_interfaces = [
-        PlannerInterfaceDescription(
-            name='RRT-Connect', pipeline_id=OMPL, planner_ids=list(FREE_MOTION)
-        ),
-        PlannerInterfaceDescription(
-            name='PTP, LIN, CIRC', pipeline_id=PILZ, planner_ids=list(PLANNER_IDS)
-        ),
-    ]
-    return response
-
-
-def _get(request: Any, response: Any) -> Any:  # noqa: ANN401
-    if request.planner_config in FREE_MOTION:
-        words = 'how it searches; nothing of it can be set'
-        response.params = PlannerParams(keys=['type'], values=[SEARCH], descriptions=[words])
-    return response
+    def _get(self, request: Any, response: Any) -> Any:  # noqa: ANN401
+        name = self._planners.name(request.planner_config, request.group)
+        entries = dict(self._planners.configs.get(name, {}))
+        if not entries and name in FREE_MOTION:
+            entries = {'type': SEARCH}
+        words = 'RRT-Connect searches; nothing of it can be set'
+        response.params = PlannerParams(
+            keys=list(entries),
+            values=[str(value) for value in entries.values()],
+            descriptions=[words] * len(entries),
+        )
+        return response

@@ -24,7 +24,9 @@ from arm_model import Array, frozen, RobotModel
 from node_runner import LATCHED
 
 from ..exceptions import PlanningCode, PlanningError
+from ..industrial.limits import CartesianLimits
 from ..industrial.sequence import SequenceItem
+from ..moveit_config.settings import MoveItSettings
 from ..planner import Planner
 from ..requests import MotionRequest
 from .background import Background, error_code
@@ -45,23 +47,28 @@ class PlannedMotion:
         start: Where it begins.
         trajectories: The motion; a sequence has one for each change of the group.
         planning_time: How long planning took in [s].
+        notes: What a person should know, such as where it is slower than asked.
     """
 
     start: StateMessage
     trajectories: Sequence[RobotTrajectory]
     planning_time: float
+    notes: Sequence[str] = ()
 
 
 class GroupPlanners:
     """The planner of each group of a robot, made anew when joints beside it have moved."""
 
-    def __init__(self, robot: RobotGroups) -> None:
+    def __init__(
+        self, robot: RobotGroups, cartesian_limits: CartesianLimits | None = None
+    ) -> None:
         """Make none yet.
 
         Args:
             robot: The robot.
+            cartesian_limits: Limits of LIN and CIRC; None has the defaults.
         """
-        self._robot = robot
+        self._robot, self._cartesian_limits = robot, cartesian_limits
         self._planners: dict[str, tuple[RobotModel, Planner]] = {}
         self._seeds = count()
 
@@ -79,7 +86,8 @@ class GroupPlanners:
         known = self._planners.get(group)
         if known is None or known[0] is not model:
             # another seed: a plan that was not found is not searched for in the same way again
-            known = self._planners[group] = model, Planner(model, seed=next(self._seeds))
+            planner = Planner(model, self._cartesian_limits, seed=next(self._seeds))
+            known = self._planners[group] = model, planner
         return known
 
 
@@ -87,7 +95,14 @@ class PlanningThread:
     """Plans in a thread of its own, with a robot of its own."""
 
     def __init__(
-        self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
+        self,
+        node: Node,
+        monitor: SceneMonitor,
+        background: Background,
+        robot: RobotGroups,
+        *,
+        settings: MoveItSettings | None = None,
+        cartesian_limits: CartesianLimits | None = None,
     ) -> None:
         """Offer plan_kinematic_path, plan_sequence_path and what belongs to them.
 
@@ -96,9 +111,11 @@ class PlanningThread:
             monitor: The scene and where the joints are.
             background: The thread.
             robot: The robot, for that thread alone.
+            settings: What holds where a request does not say so.
+            cartesian_limits: Limits of LIN and CIRC; None has the defaults.
         """
-        self._monitor, self._robot = monitor, robot
-        self._planners = GroupPlanners(robot)
+        self._monitor, self._robot, self._settings = monitor, robot, settings
+        self._planners = GroupPlanners(robot, cartesian_limits)
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
         background.serve(GetMotionPlan, 'plan_kinematic_path', self._serve, _refuse)
         background.serve(
@@ -184,20 +201,21 @@ class PlanningThread:
     def _plan(self, message: Any, snapshot: SceneSnapshot, positions: Array) -> PlannedMotion:  # noqa: ANN401
         begin = time.monotonic()
         model, planner = self._planners.at(message.group_name, positions)
-        request = RequestReader(model, snapshot, positions).request(message)
+        request = RequestReader(model, snapshot, positions, self._settings).request(message)
         plan = planner.plan(request, scene_for(snapshot, model.scene))
         start = state_message(self._robot.joints, positions, snapshot.root)
         trajectory = trajectory_message(model.joints, plan.path, snapshot.root)
-        return PlannedMotion(start, [trajectory], time.monotonic() - begin)
+        return PlannedMotion(start, [trajectory], time.monotonic() - begin, plan.notes)
 
     def _plan_sequence(
         self, runs: Sequence[GroupRun], snapshot: SceneSnapshot, start: Array
     ) -> PlannedMotion:
         begin, positions = time.monotonic(), start
         trajectories = []
+        notes: list[str] = []
         for run in runs:
             model, planner = self._planners.at(run.group, positions)
-            read = RequestReader(model, snapshot, positions)
+            read = RequestReader(model, snapshot, positions, self._settings)
             items = [
                 SequenceItem(_read_item(read, number, item.req), item.blend_radius)
                 for number, item in enumerate(run.items, run.first)
@@ -206,10 +224,12 @@ class PlanningThread:
             trajectories.append(trajectory_message(model.joints, plan.path, snapshot.root))
             end = dict(zip(model.joints, plan.path.end.position.tolist(), strict=True))
             positions = self._moved(positions, end)
+            notes += plan.notes
         return PlannedMotion(
             state_message(self._robot.joints, start, snapshot.root),
             trajectories,
             time.monotonic() - begin,
+            notes,
         )
 
     def _serve_sequence(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
@@ -218,7 +238,8 @@ class PlanningThread:
         def answer() -> Any:  # noqa: ANN401
             planned = work()
             self.display(planned)
-            return GetMotionSequence.Response(response=sequence_response(error_code(), planned))
+            code = error_code(reason='; '.join(planned.notes))
+            return GetMotionSequence.Response(response=sequence_response(code, planned))
 
         return answer
 
@@ -230,7 +251,7 @@ class PlanningThread:
             self.display(planned)
             response = GetMotionPlan.Response()
             filled = response.motion_plan_response
-            filled.error_code = error_code()
+            filled.error_code = error_code(reason='; '.join(planned.notes))
             filled.group_name = request.motion_plan_request.group_name
             filled.trajectory_start = planned.start
             (filled.trajectory,) = planned.trajectories

@@ -28,6 +28,7 @@ class RobotGroups:
         all_joints: Names of all joints, those that follow others too.
         kinematics: All joints of the robot.
         scene: The robot alone; all joints move.
+        world_frames: Frames in which the root link is held, by the SRDF.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class RobotGroups:
         except DescriptionError as error:
             raise ModelError(str(error)) from error
         self.name, self.names = tree.name, tuple(semantic.groups)
+        self.world_frames = semantic.world_frames
         if not self.names:
             raise ModelError('the SRDF has no group; give it one with <group name="arm">')
         self.kinematics = Kinematics(tree, [each.name for each in tree.joints if each.independent])

@@ -8,7 +8,7 @@ of objects, padding and scale, and the codes of refusals.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 import math
@@ -32,6 +32,7 @@ from arm_model.ros import (
     apply_attached_object,
     apply_collision_object,
     apply_planning_scene,
+    FrameOf,
     xyz,
     xyzw,
 )
@@ -40,15 +41,11 @@ from ..exceptions import PlanningCode, PlanningError
 from .geometry import check_mesh, placement, pose_of
 from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
 
-Frames = Callable[[str], Pose]
-"""Returns the pose of a frame in the root link; raises PlanningError."""
-
 
 def apply_scene(
     snapshot: SceneSnapshot,
     message: Any,  # noqa: ANN401  # message classes have no type
     positions: Array,
-    frames: Frames | None = None,
 ) -> SceneSnapshot:
     """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene.
 
@@ -56,7 +53,6 @@ def apply_scene(
         snapshot: The scene before.
         message: The message.
         positions: Positions of all joints of the robot in [rad].
-        frames: Frames that neither robot nor scene has, such as those of TF.
 
     Raises:
         PlanningError: A part of it is refused.
@@ -70,14 +66,14 @@ def apply_scene(
     before = replace(
         before,
         name=message.name or snapshot.name,
-        fixed_frames=_fixed(before, message.fixed_frame_transforms, positions, frames),
+        fixed_frames=_fixed(before, message.fixed_frame_transforms, positions),
     )
     before = _padded(before, message.link_padding, message.link_scale)
     bodies = message.robot_state.attached_collision_objects
     _check_meshes([*message.world.collision_objects, *(each.object for each in bodies)])
     with _refused():
         scene = apply_planning_scene(
-            before.scene, message, positions, _frame_of(before, positions, frames)
+            before.scene, message, positions, _frame_of(before, positions)
         )
     colors = {
         each.id: (each.color.r, each.color.g, each.color.b, each.color.a)
@@ -91,7 +87,6 @@ def apply_object(
     snapshot: SceneSnapshot,
     message: Any,  # noqa: ANN401
     positions: Array,
-    frames: Frames | None = None,
 ) -> SceneSnapshot:
     """Return a scene after a moveit_msgs/CollisionObject.
 
@@ -99,7 +94,6 @@ def apply_object(
         snapshot: The scene before.
         message: The message.
         positions: Positions of all joints of the robot in [rad].
-        frames: Frames that neither robot nor scene has.
 
     Raises:
         PlanningError: It is refused.
@@ -107,7 +101,7 @@ def apply_object(
     _check_meshes([message])
     with _refused():
         scene = apply_collision_object(
-            snapshot.scene, message, positions, _frame_of(snapshot, positions, frames)
+            snapshot.scene, message, positions, _frame_of(snapshot, positions)
         )
     return _described(snapshot, scene, [message], [])
 
@@ -116,7 +110,6 @@ def apply_attached(
     snapshot: SceneSnapshot,
     message: Any,  # noqa: ANN401
     positions: Array,
-    frames: Frames | None = None,
 ) -> SceneSnapshot:
     """Return a scene after a moveit_msgs/AttachedCollisionObject.
 
@@ -124,7 +117,6 @@ def apply_attached(
         snapshot: The scene before.
         message: The message.
         positions: Positions of all joints of the robot in [rad].
-        frames: Frames that neither robot nor scene has.
 
     Raises:
         PlanningError: It is refused.
@@ -132,7 +124,7 @@ def apply_attached(
     _check_meshes([message.object])
     with _refused():
         scene = apply_attached_object(
-            snapshot.scene, message, positions, _frame_of(snapshot, positions, frames)
+            snapshot.scene, message, positions, _frame_of(snapshot, positions)
         )
     return _described(snapshot, scene, [], [message])
 
@@ -174,16 +166,8 @@ def _check_meshes(messages: Iterable[Any]) -> None:
             check_mesh(mesh, f'object {message.id!r}')
 
 
-def _frame_of(snapshot: SceneSnapshot, positions: Array, frames: Frames | None) -> Frames:
-    def frame_of(frame: str) -> Pose:
-        try:
-            return snapshot.frame(frame, positions)
-        except PlanningError:
-            if frames is None:
-                raise
-            return frames(frame)
-
-    return frame_of
+def _frame_of(snapshot: SceneSnapshot, positions: Array) -> FrameOf:
+    return lambda frame: snapshot.frame(frame, positions)
 
 
 def _described(
@@ -239,10 +223,10 @@ def _without_settings(snapshot: SceneSnapshot) -> SceneSnapshot:
 
 
 def _fixed(
-    snapshot: SceneSnapshot, transforms: Iterable[Any], positions: Array, frames: Frames | None
+    snapshot: SceneSnapshot, transforms: Iterable[Any], positions: Array
 ) -> Mapping[str, Pose]:
     found = dict(snapshot.fixed_frames)
-    frame_of = _frame_of(snapshot, positions, frames)
+    frame_of = _frame_of(snapshot, positions)
     for each in transforms:
         name, place = each.child_frame_id.removeprefix('/'), each.transform
         pose = placement(xyz(place.translation), xyzw(place.rotation), f'frame {name!r}')

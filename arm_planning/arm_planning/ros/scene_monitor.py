@@ -29,6 +29,7 @@ from .robot_state import joints_of, state_message
 from .scene_changes import apply_attached, apply_object, apply_scene
 from .scene_messages import ALL_COMPONENTS, attached_messages, scene_message
 from .scene_snapshot import SceneSnapshot
+from .tf_frames import TfFrames
 
 DEPTH = 100
 """Messages of changes that may wait: each of them counts."""
@@ -53,7 +54,10 @@ class SceneMonitor:
             robot: The robot.
         """
         self.robot = robot
-        self.snapshot = SceneSnapshot.of(robot.scene, f'{robot.name} scene')
+        frames = TfFrames(node, robot.kinematics)
+        self.snapshot = SceneSnapshot.of(
+            robot.scene, f'{robot.name} scene', robot.world_frames, frames.pose
+        )
         self._node = node
         self._places: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}

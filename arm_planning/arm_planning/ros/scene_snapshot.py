@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -43,6 +43,11 @@ class AttachedDetails:
     weight: float
 
 
+OuterFrames = Callable[[str, Array], Pose]
+"""Returns where a frame that neither robot nor scene has is in the root link, by its name and the
+positions of all joints; raises PlanningError."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneSnapshot:
     """One state of the scene; immutable.
@@ -58,6 +63,8 @@ class SceneSnapshot:
         padding: By link in [m].
         scale: By link.
         fixed_frames: Frames that clients named, in the root link.
+        world_frames: Names of the world in which the root link stands.
+        outer_frames: Frames of others, such as those of TF; None for none.
     """
 
     scene: PlanningScene
@@ -70,16 +77,32 @@ class SceneSnapshot:
     padding: Mapping[str, float] = field(default_factory=dict)
     scale: Mapping[str, float] = field(default_factory=dict)
     fixed_frames: Mapping[str, Pose] = field(default_factory=dict)
+    world_frames: Sequence[str] = ()
+    outer_frames: OuterFrames | None = None
 
     @classmethod
-    def of(cls, scene: PlanningScene, name: str = '') -> SceneSnapshot:
+    def of(
+        cls,
+        scene: PlanningScene,
+        name: str = '',
+        world_frames: Sequence[str] = (),
+        outer_frames: OuterFrames | None = None,
+    ) -> SceneSnapshot:
         """Return the first one.
 
         Args:
             scene: The robot.
             name: Its name.
+            world_frames: Names of the world in which the root link stands.
+            outer_frames: Frames of others; None for none.
         """
-        return cls(scene, scene.link_shapes, name=name)
+        return cls(
+            scene,
+            scene.link_shapes,
+            name=name,
+            world_frames=world_frames,
+            outer_frames=outer_frames,
+        )
 
     @property
     def root(self) -> str:
@@ -99,7 +122,7 @@ class SceneSnapshot:
         name = frame.removeprefix('/')
         if name in self.scene.kinematics.frames:
             return name, ORIGIN
-        if not name:
+        if not name or name in self.world_frames:
             return self.root, ORIGIN
         if name in self.fixed_frames:
             return self.root, self.fixed_frames[name]
@@ -118,13 +141,18 @@ class SceneSnapshot:
         """Return where a frame is in the root link.
 
         Args:
-            frame: As of :meth:`link_of`.
+            frame: As of :meth:`link_of`, or a frame of others.
             positions: Positions of all joints of the robot in [rad].
 
         Raises:
             PlanningError: It is unknown.
         """
-        link, pose = self.link_of(frame)
+        try:
+            link, pose = self.link_of(frame)
+        except PlanningError:
+            if self.outer_frames is None:
+                raise
+            return self.outer_frames(frame.removeprefix('/'), positions)
         if link == self.root:
             return pose
         return combined(self.scene.kinematics.link_pose(link, positions), pose)

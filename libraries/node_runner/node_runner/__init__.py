@@ -7,7 +7,7 @@ from .exceptions import ParameterError
 from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
 from .misspelt import refuse_misspelt, refuse_similar
-from .parameter_reader import ParameterReader
+from .parameter_reader import declare_given, give_defaults, given_values, ParameterReader
 from .program import run_node, run_program
 from .qos import LATCHED
 from .readiness import notify_ready
@@ -22,9 +22,12 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
+    'declare_given',
     'declare_thread_priority',
     'destroyed_if_refused',
     'destroyed_when_refused',
+    'give_defaults',
+    'given_values',
     'init_ros',
     'log_as',
     'make_executor',

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -150,3 +150,41 @@ class ParameterReader:
         # the value from outside is in it already, and of the right kind
         self._node.declare_parameter(name, value, descriptor, ignore_override=True)
         return value
+
+
+def given_values(node: Node) -> dict[str, object]:
+    """Return all parameters that a node was given from outside, declared or not, by name."""
+    given = node._parameter_overrides  # noqa: SLF001  # no public way to read it
+    return {name: parameter.value for name, parameter in given.items()}
+
+
+def give_defaults(node: Node, values: Mapping[str, object]) -> None:
+    """Give a node parameters that nobody gave it, as if they came from outside.
+
+    Args:
+        node: The node; it has not declared them yet.
+        values: Values by name; those of kinds that no parameter has are passed over.
+    """
+    given = node._parameter_overrides  # noqa: SLF001
+    for name, value in values.items():
+        if name in given or value is None or (isinstance(value, list) and not value):
+            continue
+        try:
+            given[name] = Parameter(name, value=value)
+        except TypeError:
+            continue
+
+
+def declare_given(node: Node, names: Iterable[str], meaning: str) -> None:
+    """Declare parameters that were given and that nobody has declared, as they are.
+
+    Args:
+        node: The node.
+        names: Their names; those that are declared already are passed over.
+        meaning: Of all of them.
+    """
+    given = node._parameter_overrides  # noqa: SLF001
+    for name in names:
+        if name in given and not node.has_parameter(name):
+            descriptor = ParameterDescriptor(description=meaning, read_only=True)
+            node.declare_parameter(name, given[name].value, descriptor, ignore_override=True)

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robot descriptions as plain values: the kinematic tree of a URDF, the groups of an SRDF.
 
-The standard library is enough for it, but for xacro files, so that every package can read a description here: the
-model of an arm, publishers of joint states and of /tf, bring-ups.
+The standard library is enough for it, but for xacro files, so that every package can read a
+description here: the model of an arm, publishers of joint states and of /tf, bring-ups.
 """
 
 from .exceptions import DescriptionError, MeshFileError, XacroError
 from .groups import find_group, JointGroup
-from .mesh_files import find_mesh
+from .mesh_files import find_mesh, find_package
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
 from .urdf import Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf, UrdfShape
@@ -37,6 +37,7 @@ __all__ = [
     'expand_xacro',
     'find_group',
     'find_mesh',
+    'find_package',
     'from_rpy',
     'multiply',
     'parse_srdf',

@@ -27,7 +27,7 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
     rest = unquote(rest) if separator else name
     if scheme == 'package' and separator:
         package, _, inside = rest.partition('/')
-        path = _package(package, folder) / inside
+        path = find_package(package, folder) / inside
     elif Path(rest).is_absolute():
         path = Path(rest)
     elif folder is None:
@@ -39,8 +39,16 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
     return path
 
 
-def _package(name: str, folder: Path | None) -> Path:
-    """Find the folder of a package: beside the description, or installed."""
+def find_package(name: str, folder: Path | None = None) -> Path:
+    """Find the folder of a package: beside the description, or installed.
+
+    Args:
+        name: Its name.
+        folder: Folder of the description.
+
+    Raises:
+        MeshFileError: There is no such package.
+    """
     if not name:
         raise MeshFileError('a mesh file without a package; write package://PACKAGE/FILE')
     for above in (folder, *folder.parents) if folder else ():

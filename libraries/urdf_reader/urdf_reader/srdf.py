@@ -64,6 +64,8 @@ class SemanticDescription:
         passive: Joints without an actuator (``passive_joint``).
         virtual: Types of the joints between the world and the robot (``virtual_joint``), by name:
             fixed, planar or floating. They are not in the URDF.
+        world_frames: Frames of the world (``parent_frame``) to which fixed ones of them hold the
+            robot.
     """
 
     groups: Mapping[str, Group]
@@ -74,6 +76,7 @@ class SemanticDescription:
     end_effectors: tuple[EndEffector, ...] = ()
     passive: frozenset[str] = frozenset()
     virtual: Mapping[str, str] = field(default_factory=dict)
+    world_frames: tuple[str, ...] = ()
 
     @property
     def tools(self) -> tuple[str, ...]:
@@ -132,9 +135,11 @@ def parse_srdf(text: str) -> SemanticDescription:
     virtual = {
         each.get('name', ''): each.get('type', '') for each in root.findall('virtual_joint')
     }
+    fixed = (each for each in root.findall('virtual_joint') if each.get('type') == 'fixed')
+    world_frames = tuple(filter(None, (each.get('parent_frame') for each in fixed)))
     effectors = tuple(map(_end_effector, root.findall('end_effector')))
     return SemanticDescription(
-        groups, poses, disabled, unchecked, enabled, effectors, passive, virtual
+        groups, poses, disabled, unchecked, enabled, effectors, passive, virtual, world_frames
     )
 
 

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Packages as the MoveIt Setup Assistant writes them, as parameters of move_group.
+
+::
+
+    .setup_assistant                             which URDF and SRDF, and xacro arguments
+    config/<robot>.urdf.xacro, <robot>.srdf
+    config/kinematics.yaml                       robot_description_kinematics
+    config/joint_limits.yaml                     robot_description_planning
+    config/pilz_cartesian_limits.yaml            robot_description_planning
+    config/<pipeline>_planning.yaml              <pipeline>
+    config/moveit_controllers.yaml, sensors_3d.yaml, moveit_cpp.yaml
+
+MoveIt's launch files make the same parameters of them. Files of others (ros2_controllers.yaml,
+initial_positions.yaml, launch/) are for other programs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from urdf_reader import DescriptionError, expand_xacro, find_package, MeshFileError
+
+from ..exceptions import ConfigError
+from .yaml_file import FlatYaml, Place, read_flat
+
+PLANNING = 'robot_description_planning.'
+FILES: Sequence[tuple[Sequence[str], str]] = (
+    (('kinematics.yaml',), 'robot_description_kinematics.'),
+    (('joint_limits.yaml',), PLANNING),
+    (('pilz_cartesian_limits.yaml', 'cartesian_limits.yaml'), PLANNING),
+    (('sensors_3d.yaml',), ''),
+    (('moveit_cpp.yaml',), ''),
+)
+"""Names of files, of which the first that is there counts, and what is before their keys."""
+
+OTHERS_CONTROLLERS = frozenset({'ros2_controllers.yaml', 'ros_controllers.yaml'})
+"""Controllers of ros2_control, which its controller_manager reads."""
+
+ASSISTANT = 'moveit_setup_assistant_config'
+
+
+@dataclass(frozen=True, slots=True)
+class MoveItPackage:
+    """What a package says.
+
+    Attributes:
+        folder: Its folder.
+        parameters: Parameters of move_group by name, the descriptions of the robot too.
+        places: Where they are.
+    """
+
+    folder: Path
+    parameters: Mapping[str, object]
+    places: Mapping[str, Place] = field(default_factory=dict)
+
+
+def read_package(folder: Path, xacro_args: Mapping[str, str] | None = None) -> MoveItPackage:
+    """Read a package.
+
+    Args:
+        folder: Its folder, or the folder config in it.
+        xacro_args: Values for xacro arguments, beside those of the package.
+
+    Raises:
+        ConfigError: It is no such package, or a file of it is broken; the message names file,
+            line and key.
+    """
+    if not folder.is_dir():
+        raise ConfigError(f'{folder}: no folder; give that of a package of the Setup Assistant')
+    config = folder / 'config' if (folder / 'config').is_dir() else folder
+    root = config.parent if config.name == 'config' else folder
+    assistant = _assistant(root)
+    arguments = {**_xacro_args(root, assistant.values), **(xacro_args or {})}
+    values: dict[str, object] = {
+        'robot_description': _expanded(_urdf(root, config, assistant), arguments),
+        'robot_description_semantic': _expanded(_srdf(root, config, assistant), arguments),
+    }
+    places: dict[str, Place] = {}
+    for file in _files(config):
+        values |= file.values
+        places |= file.places
+    return MoveItPackage(root, values, places)
+
+
+def _files(config: Path) -> list[FlatYaml]:
+    """Read all files of parameters."""
+    found = []
+    for names, prefix in FILES:
+        path = next((config / name for name in names if (config / name).is_file()), None)
+        if path is not None:
+            found.append(_unwrapped(read_flat(path, prefix), prefix))
+    found += [
+        read_flat(path, f'{path.name.removesuffix("_planning.yaml")}.')
+        for path in sorted(config.glob('*_planning.yaml'))
+    ]
+    controllers = _controllers(config)
+    if controllers is not None:
+        found.append(read_flat(controllers))
+    return found
+
+
+def _unwrapped(flat: FlatYaml, prefix: str) -> FlatYaml:
+    """Return a file without the table that some wrap around all of it."""
+    twice = f'{prefix}{prefix}' if prefix else ''
+    if not twice or not any(name.startswith(twice) for name in flat.places):
+        return flat
+    return FlatYaml(
+        {name.replace(twice, prefix, 1): value for name, value in flat.values.items()},
+        {name.replace(twice, prefix, 1): place for name, place in flat.places.items()},
+    )
+
+
+def _controllers(config: Path) -> Path | None:
+    """Return the file of MoveIt's controllers, as MoveIt chooses it."""
+    path = config / 'moveit_controllers.yaml'
+    if path.is_file():
+        return path
+    found = sorted(
+        each for each in config.glob('*_controllers.yaml') if each.name not in OTHERS_CONTROLLERS
+    )
+    return _only(config, found, 'moveit_controllers.yaml') if found else None
+
+
+def _assistant(root: Path) -> FlatYaml:
+    path = root / '.setup_assistant'
+    if not path.is_file():
+        return FlatYaml({}, {})
+    flat = read_flat(path)
+    if not any(name.startswith(f'{ASSISTANT}.') for name in flat.places):
+        raise ConfigError(
+            f'{path}:1: no table {ASSISTANT}; write the file anew with the assistant'
+        )
+    return flat
+
+
+def _entry(values: Mapping[str, object], table: str, key: str) -> str:
+    """Return an entry of .setup_assistant, whose tables were in capitals."""
+    for name in (table, table.upper()):
+        value = values.get(f'{ASSISTANT}.{name}.{key}')
+        if value is not None:
+            return str(value)
+    return ''
+
+
+def _xacro_args(root: Path, values: Mapping[str, object]) -> dict[str, str]:
+    pairs = [each.partition(':=') for each in _entry(values, 'urdf', 'xacro_args').split()]
+    for name, assignment, _ in pairs:
+        if not (name and assignment):
+            raise ConfigError(
+                f'{root / ".setup_assistant"}: xacro_args has {name!r}; write NAME:=VALUE'
+            )
+    return {name: value for name, _, value in pairs}
+
+
+def _urdf(root: Path, config: Path, assistant: FlatYaml) -> Path:
+    """Return the file of the URDF: that of the package, else that of .setup_assistant."""
+    found = sorted([*config.glob('*.urdf.xacro'), *config.glob('*.urdf')])
+    if len(found) > 1:
+        stem = Path(_entry(assistant.values, 'srdf', 'relative_path')).name.partition('.')[0]
+        found = [each for each in found if each.name.partition('.')[0] == stem] or found
+    if found:
+        return _only(config, found, '<robot>.urdf.xacro')
+    package = _entry(assistant.values, 'urdf', 'package')
+    inside = _entry(assistant.values, 'urdf', 'relative_path')
+    if not inside:
+        raise ConfigError(
+            f'{config}: no *.urdf.xacro or *.urdf, and no .setup_assistant that names one; add one'
+        )
+    try:
+        path = (find_package(package, root) if package else root) / inside
+    except MeshFileError as error:
+        raise ConfigError(f'{root / ".setup_assistant"}: urdf: {error}') from error
+    if not path.is_file():
+        raise ConfigError(f'{root / ".setup_assistant"}: urdf: no file {path}; correct it')
+    return path
+
+
+def _srdf(root: Path, config: Path, assistant: FlatYaml) -> Path:
+    inside = _entry(assistant.values, 'srdf', 'relative_path')
+    if inside:
+        path = root / inside
+        if not path.is_file():
+            raise ConfigError(f'{root / ".setup_assistant"}: srdf: no file {path}; correct it')
+        return path
+    found = sorted([*config.glob('*.srdf'), *config.glob('*.srdf.xacro')])
+    if not found:
+        raise ConfigError(f'{config}: no *.srdf or *.srdf.xacro; add one')
+    return _only(config, found, '<robot>.srdf')
+
+
+def _only(config: Path, found: Sequence[Path], wanted: str) -> Path:
+    if len(found) > 1:
+        names = ', '.join(each.name for each in found)
+        raise ConfigError(f'{config}: several files may be {wanted}: {names}; keep one')
+    return found[0]
+
+
+def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
+    """Return a file as XML text, xacro expanded."""
+    if path.suffix == '.xacro':
+        try:
+            return expand_xacro(path, arguments)
+        except DescriptionError as error:
+            raise ConfigError(str(error)) from error
+    try:
+        return path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f'{path}: {error}') from error

@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What parameters of MoveIt's names say, for the parts of move_group."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from ..exceptions import ConfigError
+from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, without_effect
+from .planner_configs import PlannerConfigs
+from .yaml_file import Place
+
+PLANNING = 'robot_description_planning'
+TIMEOUT = 'kinematics_solver_timeout'
+PIPELINES = ('ompl', 'pilz_industrial_motion_planner')
+"""Planning pipelines that are here."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveItSettings:
+    """What was set; the defaults are what holds without.
+
+    Attributes:
+        joint_limits: Tables of limits by joint; None where no parameter has any.
+        cartesian_limits: Limits of LIN and CIRC.
+        velocity_scaling: Factor of requests that have none.
+        acceleration_scaling: Factor of requests that have none.
+        ik_timeouts: Time for inverse kinematics in [s], by group.
+        planners: Planner configurations.
+        default_pipeline: Of requests that name none; empty for ours.
+        default_industrial: Planner of requests to Pilz' pipeline that name none.
+        allows_execution: Whether trajectories are executed.
+        sensors: Names of updaters of octomaps, whose tables have no effect.
+        notes: What has no effect, for the log.
+    """
+
+    joint_limits: Mapping[str, Mapping[str, object]] | None = None
+    cartesian_limits: Mapping[str, object] = field(default_factory=dict)
+    velocity_scaling: float = 1.0
+    acceleration_scaling: float = 1.0
+    ik_timeouts: Mapping[str, float] = field(default_factory=dict)
+    planners: PlannerConfigs = field(default_factory=PlannerConfigs)
+    default_pipeline: str = ''
+    default_industrial: str = 'PTP'
+    allows_execution: bool = True
+    sensors: Sequence[str] = ()
+    notes: Sequence[str] = ()
+
+
+def read_settings(
+    values: Mapping[str, object], places: Mapping[str, Place] | None = None
+) -> MoveItSettings:
+    """Return what parameters say.
+
+    Args:
+        values: Parameters by name, all that were given.
+        places: Where they come from, of those that come from a file.
+
+    Raises:
+        ConfigError: A value is none, or names what there is not.
+    """
+    places = places or {}
+    check(values, places)
+    defaults = _below(values, PLANNING)
+    has_limits = LIMITS in places or any(name.startswith(f'{LIMITS}.') for name in values)
+    listed = values.get('sensors')
+    sensors = [str(each) for each in listed] if isinstance(listed, list | tuple) else []
+    return MoveItSettings(
+        joint_limits=_tables(values, LIMITS) if has_limits else None,
+        cartesian_limits=_below(values, CARTESIAN),
+        velocity_scaling=_number(defaults.get('default_velocity_scaling_factor', 1.0)),
+        acceleration_scaling=_number(defaults.get('default_acceleration_scaling_factor', 1.0)),
+        ik_timeouts={
+            group: _number(table[TIMEOUT])
+            for group, table in _tables(values, KINEMATICS).items()
+            if TIMEOUT in table
+        },
+        planners=_planners(values, places),
+        default_pipeline=_pipeline(values, places),
+        default_industrial=_industrial(values, places),
+        allows_execution=values.get('allow_trajectory_execution', True) is True,
+        sensors=sensors,
+        notes=without_effect(list(values), sensors),
+    )
+
+
+def _below(values: Mapping[str, object], table: str) -> dict[str, object]:
+    """Return the entries of a table, without those of tables in it."""
+    names = {
+        name: name.removeprefix(f'{table}.') for name in values if name.startswith(f'{table}.')
+    }
+    return {key: values[name] for name, key in names.items() if '.' not in key}
+
+
+def _tables(values: Mapping[str, object], above: str) -> dict[str, dict[str, object]]:
+    """Return the tables in a table, by name."""
+    found: dict[str, dict[str, object]] = {}
+    for name, value in values.items():
+        if name.startswith(f'{above}.'):
+            table, _, key = name.removeprefix(f'{above}.').rpartition('.')
+            if table:
+                found.setdefault(table, {})[key] = value
+    return found
+
+
+def _number(value: object) -> float:
+    return float(value)  # type: ignore[arg-type]  # it was checked
+
+
+def _planners(values: Mapping[str, object], places: Mapping[str, Place]) -> PlannerConfigs:
+    configs = _tables(values, 'ompl.planner_configs')
+    tables = {
+        group: table
+        for group, table in _tables(values, 'ompl').items()
+        if not group.startswith('planner_configs')
+    }
+    groups: dict[str, Sequence[str]] = {}
+    defaults: dict[str, str] = {}
+    for group, table in tables.items():
+        names = table.get('planner_configs')
+        listed = [str(each) for each in names] if isinstance(names, Sequence) else list(configs)
+        default = table.get('default_planner_config')
+        for key, given in (('planner_configs', listed), ('default_planner_config', [default])):
+            for name in given:
+                if configs and name is not None and name not in configs:
+                    raise ConfigError(
+                        f'{at(f"ompl.{group}.{key}", places)} names {name!r}, which'
+                        f' ompl.planner_configs does not have; it has'
+                        f' {", ".join(configs)}'
+                    )
+        groups[group] = listed
+        if default is not None:
+            defaults[group] = str(default)
+    return PlannerConfigs(configs, groups, defaults)
+
+
+def _pipeline(values: Mapping[str, object], places: Mapping[str, Place]) -> str:
+    name = str(values.get('default_planning_pipeline', ''))
+    listed = values.get('planning_pipelines.pipeline_names', values.get('planning_pipelines', ()))
+    names = [str(each) for each in listed] if isinstance(listed, Sequence) else []
+    if name and names and name not in names:
+        raise ConfigError(
+            f'{at("default_planning_pipeline", places)} is {name!r}, and planning_pipelines has'
+            f' {", ".join(names)}; choose one of them'
+        )
+    return name if name in PIPELINES else ''
+
+
+def _industrial(values: Mapping[str, object], places: Mapping[str, Place]) -> str:
+    key = 'pilz_industrial_motion_planner.default_planner_config'
+    name = str(values.get(key, 'PTP'))
+    if name not in {'PTP', 'LIN', 'CIRC'}:
+        raise ConfigError(f'{at(key, places)} is {name!r}; it must be PTP, LIN or CIRC')
+    return name

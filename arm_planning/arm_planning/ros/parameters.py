@@ -1,0 +1,237 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of move_group: of the node itself, and of a package of MoveIt's Setup Assistant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from rclpy.node import Node
+from urdf_reader import read_urdf
+
+from arm_model import LimitsError, merge_limits
+from arm_model.ros import declare_description, Description
+from node_runner import (
+    declare_given,
+    give_defaults,
+    given_values,
+    ParameterError,
+    ParameterReader,
+    refuse_misspelt,
+)
+
+from ..exceptions import ConfigError
+from ..industrial.limits import CartesianLimits
+from ..moveit_config.known import at, known_of, LIMITS, MANAGER
+from ..moveit_config.package import MoveItPackage
+from ..moveit_config.settings import MoveItSettings, read_settings
+from ..moveit_config.yaml_file import Place
+from .controllers import Controller, FOLLOW, KINDS
+from .execution import ExecutionLimits
+from .robot_groups import RobotGroups
+
+
+@dataclass(frozen=True, slots=True)
+class MoveGroupParameters:
+    """What move_group was given.
+
+    Attributes:
+        description: What describes the robot.
+        settings: What parameters of MoveIt's names say.
+        cartesian_limits: Limits of LIN and CIRC.
+        places: Where parameters come from, of those that come from a file.
+        names: Names of all that were given, less those of sensors.
+    """
+
+    description: Description
+    settings: MoveItSettings
+    cartesian_limits: CartesianLimits
+    places: Mapping[str, Place]
+    names: Sequence[str]
+
+
+def declare_parameters(node: Node, package: MoveItPackage | None = None) -> MoveGroupParameters:
+    """Declare what describes the robot, read what is for its planners, log what has no effect.
+
+    Args:
+        node: The node.
+        package: Gives what nobody gave the node.
+
+    Raises:
+        ArmError: A parameter is missing or refused.
+    """
+    given = given_values(node)
+    places: dict[str, Place] = {}
+    if package is not None:
+        places = {name: place for name, place in package.places.items() if name not in given}
+        give_defaults(node, package.parameters)
+        given = {**package.parameters, **given}
+    settings = read_settings(given, places)
+    limits = settings.joint_limits
+    if limits is None and package is not None:
+        limits = {}
+    description = declare_description(node, limits)
+    if limits is not None and not node.get_parameter('joint_limits').value:
+        table = _complete(node, description.urdf, limits, places)
+        description = replace(description, limits=table)
+    for note in settings.notes:
+        node.get_logger().info(note)
+    return MoveGroupParameters(
+        description,
+        settings,
+        CartesianLimits.of_table(settings.cartesian_limits),
+        places,
+        [name for name in given if name.partition('.')[0] not in settings.sensors],
+    )
+
+
+def declare_others(node: Node, names: Sequence[str]) -> None:
+    """Declare what MoveIt has and nobody declared, so that tools list it; refuse what is misspelt.
+
+    Args:
+        node: The node, which has declared its own parameters.
+        names: Names of all that were given.
+
+    Raises:
+        ParameterError: A name that is not known looks like one that is.
+    """
+    known = [name for name in names if known_of(name) is not None]
+    declare_given(node, known, "MoveIt's, read at the start")
+    refuse_misspelt(node)
+    if unknown := sorted(set(names) - set(known) - set(node.get_parameters_by_prefix(''))):
+        node.get_logger().info(f'unknown parameters, without effect: {", ".join(unknown)}')
+
+
+def _complete(
+    node: Node, urdf: str, limits: Mapping[str, Mapping[str, object]], places: Mapping[str, Place]
+) -> Mapping[str, Mapping[str, object]]:
+    """Return limits of all joints: one without a table has those of the description.
+
+    Raises:
+        ConfigError: Limits of a joint are refused; the message has their place.
+    """
+    tree = read_urdf(urdf)
+    joints = [joint.name for joint in tree.movable() if joint.independent]
+    table = {name: limits.get(name, {}) for name in joints}
+    notes: list[str] = []
+
+    def check(name: str) -> None:
+        try:
+            merge_limits([name], tree, table, notes)
+        except LimitsError as error:
+            raise ConfigError(f'{at(f"{LIMITS}.{name}", places)}: {error}') from error
+
+    for name in joints:
+        check(name)
+    by_default: dict[str, list[str]] = {}
+    for note in notes:
+        words, _, name = note.rpartition(': ')
+        by_default.setdefault(words, []).append(name)
+    for words, names in by_default.items():
+        node.get_logger().info(f'joint limits: {words}: {", ".join(names)}')
+    return table
+
+
+def declare_execution_limits(node: Node) -> ExecutionLimits:
+    """Declare ``trajectory_execution.*``.
+
+    Args:
+        node: The node.
+
+    Raises:
+        ParameterError: A value is refused.
+    """
+    read = ParameterReader(node, 'trajectory_execution.')
+    return ExecutionLimits(
+        read.number(
+            'allowed_start_tolerance',
+            0.01,
+            (0.0, 10.0),
+            'how far the robot may be from the start of a trajectory; 0 is anywhere [rad]',
+        ),
+        read.number(
+            'allowed_execution_duration_scaling',
+            1.1,
+            (1.0, 100.0),
+            'how many times as long as planned a trajectory may take',
+        ),
+        read.number(
+            'allowed_goal_duration_margin',
+            0.5,
+            (0.0, 100.0),
+            'how much longer than that it may take [s]',
+        ),
+        read.flag(
+            'execution_duration_monitoring',
+            'whether a trajectory that takes longer is stopped',
+            default=True,
+        ),
+        ParameterReader(node).flag(
+            'allow_trajectory_execution', 'whether trajectories are executed', default=True
+        ),
+    )
+
+
+def declare_controllers(
+    node: Node, robot: RobotGroups, places: Mapping[str, Place]
+) -> dict[str, Controller]:
+    """Declare the controllers; by default those of bring-up, one for each group.
+
+    Those that are default come first: they get the joints that several move.
+
+    Args:
+        node: The node.
+        robot: The robot.
+        places: Where parameters come from, of those that come from a file.
+
+    Raises:
+        ParameterError: A value is refused.
+        ConfigError: A controller has no joints, or one that the robot does not have.
+    """
+    defaults = {f'{group}_controller': list(each) for group, each in robot.group_joints().items()}
+    names = ParameterReader(node, f'{MANAGER}.').texts(
+        'controller_names', list(defaults), 'controllers that follow trajectories'
+    )
+    found, first = {}, []
+    for name in names:
+        read = ParameterReader(node, f'{MANAGER}.{name}.')
+        joints = read.texts('joints', defaults.get(name, []), f'joints that {name} moves')
+        if not joints:
+            raise ConfigError(
+                f'{at(f"{MANAGER}.controller_names", places)} has {name!r}, and'
+                f' {MANAGER}.{name}.joints is missing; give its joints'
+            )
+        for joint in joints:
+            if joint not in robot.all_joints:
+                raise ConfigError(
+                    f'{at(f"{MANAGER}.{name}.joints", places)} names {joint!r}, which the robot'
+                    f' does not have; its joints: {", ".join(robot.all_joints)}'
+                )
+        found[name] = _controller(read, name, joints, robot, places)
+        if read.flag('default', f'{name} comes before those that are not', default=False):
+            first.append(name)
+    return {name: found[name] for name in sorted(found, key=lambda name: name not in first)}
+
+
+def _controller(
+    read: ParameterReader,
+    name: str,
+    joints: list[str],
+    robot: RobotGroups,
+    places: Mapping[str, Place],
+) -> Controller:
+    kind = read.choice('type', FOLLOW.name, KINDS, f'what {name} takes')
+    namespace = read.text('action_ns', kind.namespace, f'name of the action of {name}')
+    effort = read.number('max_effort', 0.0, None, f'greatest effort of {name}; 0 for its own')
+    # a joint that follows another one needs no command
+    moved = [joint for joint in joints if joint in robot.joints]
+    if kind.single:
+        lead = read.text('command_joint', '', f'joint whose position {name} takes; empty: its one')
+        moved = [lead] if lead else moved
+        if len(moved) != 1 or lead not in {'', *joints}:
+            raise ParameterError(
+                f'{at(f"{MANAGER}.{name}.joints", places)} has {len(moved)} joints that follow no'
+                f' other, and a {kind.name} moves one; give command_joint, one of them'
+            )
+    return Controller(tuple(moved), kind, namespace, effort)

@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The program move_group beside a robot whose joints are where trajectories end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+import json
+from pathlib import Path
+import shutil
+from typing import Any, TYPE_CHECKING
+
+from ament_index_python.packages import get_package_share_directory
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from geometry_msgs.msg import Pose as PoseMessage
+from moveit_msgs.action import MoveGroup
+from moveit_msgs.msg import (
+    Constraints,
+    JointConstraint,
+    MotionPlanRequest,
+    OrientationConstraint,
+    PositionConstraint,
+)
+from moveit_msgs.srv import GetMotionPlan
+from processes import executable, RunningProcess
+from rclpy.action.server import ActionServer
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+
+from arm_bringup.description import expand_xacro
+
+if TYPE_CHECKING:
+    from types import TracebackType
+
+    from isolation import Isolation
+    from typing_extensions import Self
+
+TIMEOUT = 60.0
+"""Longest time for an answer in [s]."""
+
+JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
+READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
+PACKAGES = Path(__file__).parent / 'moveit_packages'
+SEMANTICS = {'panda': ('panda_hand/panda_hand.srdf', 'panda_link0')}
+SEMANTICS |= {'prbt': ('prbt/prbt.srdf', 'prbt_base_link')}
+"""SRDF of arm_bringup and root link of the robot of each package."""
+
+
+def robots() -> Path:
+    """Return the folder of robots of arm_bringup."""
+    return Path(get_package_share_directory('arm_bringup')) / 'robots'
+
+
+def moveit_package(name: str, folder: Path) -> Path:
+    """Write a package as the Setup Assistant writes it, with a virtual joint in its SRDF.
+
+    Args:
+        name: panda or prbt.
+        folder: Where to.
+    """
+    path = folder / f'{name}_moveit_config'
+    shutil.copytree(PACKAGES / name, path)
+    source, root = SEMANTICS[name]
+    virtual = (
+        '<virtual_joint name="virtual_joint" type="fixed" parent_frame="world"'
+        f' child_link="{root}"/></robot>'
+    )
+    srdf = (robots() / source).read_text(encoding='utf-8').replace('</robot>', virtual)
+    (path / 'config' / f'{name}.srdf').write_text(srdf, encoding='utf-8')
+    return path
+
+
+def panda_parameters(folder: Path, **others: object) -> Path:
+    """Write what describes the Panda as a parameter file.
+
+    Args:
+        folder: Where to.
+        **others: Further parameters.
+    """
+    panda = robots() / 'panda'
+    values = {
+        'robot_description': expand_xacro(panda / 'panda.urdf.xacro'),
+        'robot_description_semantic': (panda / 'panda.srdf').read_text(encoding='utf-8'),
+        'joint_limits': str(panda / 'limits.yaml'),
+        **others,
+    }
+    path = folder / 'panda.json'  # JSON is YAML
+    path.write_text(json.dumps({'/**': {'ros__parameters': values}}), encoding='utf-8')
+    return path
+
+
+class MoveGroupRig:
+    """move_group, joint states, and controllers that are where they were sent at once.
+
+    Attributes:
+        client: The node of the test, which is the robot too.
+        process: move_group.
+        positions: Where the joints are in [rad], by name.
+        followed: Goals of controllers so far.
+    """
+
+    def __init__(
+        self, isolation: Isolation, *arguments: str, positions: Mapping[str, float] | None = None
+    ) -> None:
+        """Start it.
+
+        Args:
+            isolation: Its domain.
+            *arguments: Of move_group.
+            positions: Of the joints in [rad]; by default the Panda's ready.
+        """
+        self.positions = dict(positions or zip(JOINTS, READY, strict=True))
+        self.followed: list[Any] = []
+        self.client = RosClient(isolation.domain_id)
+        node = self.client.node
+        self._states = node.create_publisher(JointState, '/joint_states', 10)
+        node.create_timer(0.02, self._publish)
+        command = [executable('arm_planning', 'move_group'), *arguments]
+        self.process = RunningProcess(command, isolation.env)
+        try:
+            self.process.wait_until_ready(TIMEOUT)
+            self._wait_for_states()
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+
+    def _wait_for_states(self) -> None:
+        self.client.spin_until(
+            lambda: self._states.get_subscription_count() > 0, TIMEOUT, 'a listener'
+        )
+        self.client.spin_for(0.2)
+
+    def serve_arm(self, name: str) -> ActionServer:
+        """Offer a trajectory controller."""
+        return ActionServer(
+            self.client.node,
+            FollowJointTrajectory,
+            f'/{name}/follow_joint_trajectory',
+            self._follow,
+        )
+
+    def serve_gripper(self, name: str, joint: str) -> ActionServer:
+        """Offer a gripper of one joint."""
+
+        def grip(handle: Any) -> GripperCommand.Result:
+            self.followed.append(handle.request)
+            self.positions[joint] = handle.request.command.position
+            handle.succeed()
+            return GripperCommand.Result(reached_goal=True)
+
+        return ActionServer(self.client.node, GripperCommand, f'/{name}/gripper_cmd', grip)
+
+    def _follow(self, handle: Any) -> FollowJointTrajectory.Result:
+        trajectory = handle.request.trajectory
+        self.followed.append(handle.request)
+        end = trajectory.points[-1].positions
+        self.positions |= dict(zip(trajectory.joint_names, end, strict=True))
+        handle.succeed()
+        return FollowJointTrajectory.Result()
+
+    def _publish(self) -> None:
+        state = JointState(name=list(self.positions), position=list(self.positions.values()))
+        state.header.stamp = self.client.node.get_clock().now().to_msg()
+        self._states.publish(state)
+
+    def plan(self, request: MotionPlanRequest) -> Any:
+        """Return the moveit_msgs/MotionPlanResponse of plan_kinematic_path."""
+        asked = GetMotionPlan.Request(motion_plan_request=request)
+        answer = self.client.call(GetMotionPlan, '/plan_kinematic_path', asked, TIMEOUT)
+        return answer.motion_plan_response
+
+    def run(self, kind: Any, name: str, goal: Any) -> tuple[int, Any]:
+        """Send a goal of an action; return status and result."""
+        handle = self.send(kind, name, goal)
+        result = handle.get_result_async()
+        self.client.spin_until(result.done, TIMEOUT, 'result')
+        return result.result().status, result.result().result
+
+    def send(self, kind: Any, name: str, goal: Any, feedback: Any = None) -> Any:
+        """Send a goal of an action; return its handle."""
+        caller: Any = self.client.action(kind, name)
+        self.client.spin_until(caller.server_is_ready, TIMEOUT, name)
+        sent = caller.send_goal_async(goal, feedback)
+        self.client.spin_until(sent.done, TIMEOUT, 'acceptance')
+        return sent.result()
+
+    def move(self, goal: MoveGroup.Goal) -> tuple[int, Any]:
+        """Send a goal of move_action; return status and result."""
+        return self.run(MoveGroup, '/move_action', goal)
+
+    def __enter__(self) -> Self:
+        """Use it in a with statement."""
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """End it."""
+        self.process.__exit__(exc_type, exc, traceback)
+        self.client.__exit__(exc_type, exc, traceback)
+
+
+def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> Constraints:
+    """Return a goal of joints, as MoveGroupInterface makes it."""
+    return Constraints(
+        joint_constraints=[
+            JointConstraint(
+                joint_name=name,
+                position=position,
+                tolerance_above=1e-4,
+                tolerance_below=1e-4,
+                weight=1.0,
+            )
+            for name, position in zip(joints, positions, strict=True)
+        ]
+    )
+
+
+def pose_goal(pose: PoseMessage, link: str, frame: str) -> Constraints:
+    """Return a goal of a pose, as MoveGroupInterface makes it."""
+    place = PositionConstraint(link_name=link, weight=1.0)
+    place.header.frame_id = frame
+    place.constraint_region.primitives = [
+        SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1e-4])
+    ]
+    place.constraint_region.primitive_poses = [PoseMessage(position=pose.position)]
+    turn = OrientationConstraint(link_name=link, orientation=pose.orientation, weight=1.0)
+    turn.header.frame_id = frame
+    turn.absolute_x_axis_tolerance = turn.absolute_y_axis_tolerance = 1e-3
+    turn.absolute_z_axis_tolerance = 1e-3
+    return Constraints(position_constraints=[place], orientation_constraints=[turn])
+
+
+def motion_request(
+    goal: Constraints, group: str = 'panda_arm', **others: Any
+) -> MotionPlanRequest:
+    """Return a request from where the robot is."""
+    request = MotionPlanRequest(
+        group_name=group,
+        goal_constraints=[goal],
+        num_planning_attempts=1,
+        allowed_planning_time=10.0,
+        **others,
+    )
+    request.start_state.is_diff = True
+    return request
+
+
+def action_goal(request: MotionPlanRequest, *, plan_only: bool = False) -> MoveGroup.Goal:
+    """Return a goal of move_action, as MoveGroupInterface makes it."""
+    goal = MoveGroup.Goal(request=request)
+    goal.planning_options.plan_only = plan_only
+    goal.planning_options.planning_scene_diff.is_diff = True
+    goal.planning_options.planning_scene_diff.robot_state.is_diff = True
+    return goal

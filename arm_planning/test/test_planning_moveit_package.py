@@ -1,0 +1,325 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Packages of MoveIt's Setup Assistant: they start move_group, or it says what is broken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from geometry_msgs.msg import Pose as PoseMessage
+from isolation import Isolation, reserve
+from move_group_rig import (
+    action_goal,
+    joint_goal,
+    JOINTS,
+    motion_request,
+    MoveGroupRig,
+    moveit_package,
+    panda_parameters,
+    pose_goal,
+    READY,
+)
+from moveit_msgs.msg import MoveItErrorCodes
+from moveit_msgs.srv import GetPlannerParams, GetPositionFK, QueryPlannerInterfaces
+from processes import executable, RunningProcess
+import pytest
+
+from arm_model.ros import seconds
+from arm_planning import ConfigError
+from arm_planning.moveit_config.package import read_package
+from arm_planning.moveit_config.settings import read_settings
+
+MOVED = [0.4, *READY[1:]]
+
+
+def settings_of(folder: Path) -> Any:
+    """Read a package as the program does."""
+    package = read_package(folder)
+    return read_settings(package.parameters, package.places)
+
+
+def test_a_package_of_the_assistant_is_read_whole(tmp_path: Path) -> None:
+    """Robot, limits, planners and what has no effect."""
+    settings = settings_of(moveit_package('panda', tmp_path))
+    assert settings.joint_limits['panda_joint2']['max_velocity'] == 2.175
+    assert settings.cartesian_limits['max_trans_vel'] == 0.5
+    assert (settings.velocity_scaling, settings.acceleration_scaling) == (0.1, 0.1)
+    assert settings.ik_timeouts == {'panda_arm': 0.25}
+    planners = settings.planners
+    assert planners.name('', 'panda_arm') == 'RRTstarkConfigDefault'
+    assert planners.search('RRTstarkConfigDefault') == 'geometric::RRTstar'
+    assert planners.ids[:2] == ['panda_arm', 'panda_arm[RRTConnectkConfigDefault]']
+    assert planners.configs['TRRTkConfigDefault']['min_temperature'] == pytest.approx(1e-9)
+    noted = '\n'.join(settings.notes)
+    for name in ('kinematics_solver', 'longest_valid_segment_fraction', 'kinect_pointcloud'):
+        assert noted.count(f'{name},') + noted.count(f'{name}:') + noted.count(f'{name}.*') == 1
+
+
+def test_files_of_former_versions_are_read(tmp_path: Path) -> None:
+    """Names in capitals, a URDF elsewhere, controllers by the robot's name, no planner_configs."""
+    package = read_package(moveit_package('prbt', tmp_path))
+    assert '<robot name="prbt"' in str(package.parameters['robot_description'])
+    assert package.parameters['moveit_simple_controller_manager.controller_names'] == [
+        'prbt_joint_trajectory_controller'
+    ]
+    settings = read_settings(package.parameters, package.places)
+    assert settings.joint_limits is None
+    assert settings.planners.search('SBLkConfigDefault') == 'geometric::SBL'
+
+
+def test_limits_may_stand_in_the_table_of_their_parameter(tmp_path: Path) -> None:
+    """As some packages have them."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / 'joint_limits.yaml'
+    lines = path.read_text().splitlines()
+    path.write_text('robot_description_planning:\n' + '\n'.join(f'  {each}' for each in lines))
+    assert settings_of(folder).joint_limits['panda_joint2']['max_velocity'] == 2.175
+
+
+LIMITS, OMPL, CONTROLLERS = 'joint_limits.yaml', 'ompl_planning.yaml', 'moveit_controllers.yaml'
+PILZ, CARTESIAN = 'pilz_industrial_motion_planner_planning.yaml', 'pilz_cartesian_limits.yaml'
+BROKEN = [
+    (LIMITS, 'max_velocity: 2.175', 'max_velocity: fast', 'is .fast.; it must be a number'),
+    (LIMITS, 'has_velocity_limits: true', 'has_velocity_limits: 1', 'must be true or false'),
+    (LIMITS, 'max_velocity:', 'max_speed:', r"has no 'max_speed'; it has .*max_velocity"),
+    (LIMITS, 'factor: 0.1', 'factor: 1.5', 'a number above 0, up to 1'),
+    (LIMITS, 'max_velocity: 2.175', 'max_velocity: .nan', 'it must be a number'),
+    (LIMITS, '  panda_joint2:', '  panda_joint1:', 'there twice'),
+    (LIMITS, 'max_velocity: 2.175', 'max_velocity: "2', 'no YAML'),
+    ('kinematics.yaml', 'timeout: 0.25', 'timeout: -1', 'a number of 0 or more'),
+    (CARTESIAN, '-5.0', '5.0', 'must be a negative number'),
+    (CARTESIAN, 'max_rot_vel', 'max_rot_speed', "no 'max_rot_speed'"),
+    (
+        OMPL,
+        'panda_arm:\n  planner_configs:',
+        'panda_arm:\n  planner_configs: [TRRT]\n  x:',
+        "'TRRT'",
+    ),
+    (OMPL, 'config: RRTstarkConfigDefault', 'config: RRT', "names 'RRT', which .*; it has RRTs"),
+    (PILZ, 'config: PTP', 'config: SPLINE', 'must be PTP, LIN or CIRC'),
+    (CONTROLLERS, 'default: true', 'default: maybe', 'true or false'),
+    (CONTROLLERS, 'margin: 0.5', 'margin: -2', '0 or more'),
+]
+
+
+@pytest.mark.parametrize(('file', 'before', 'after', 'words'), BROKEN)
+def test_a_broken_file_is_refused_with_its_place(
+    tmp_path: Path, file: str, before: str, after: str, words: str
+) -> None:
+    """File, line, key and what it must be."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / file
+    text = path.read_text()
+    line = text[: text.index(before)].count('\n') + before.count('\n') + 1
+    path.write_text(text.replace(before, after, 1))
+    with pytest.raises(ConfigError, match=words) as refused:
+        settings_of(folder)
+    found = re.match(r'(.*):(\d+): ', str(refused.value))
+    assert found is not None, refused.value
+    assert Path(found[1]) == path
+    # a text without its end ends where the file does
+    assert int(found[2]) == line or words == 'no YAML', refused.value
+
+
+@pytest.mark.parametrize(
+    ('remove', 'words'),
+    [
+        ('config/panda.srdf', r'\.setup_assistant: srdf: no file .*panda.srdf'),
+        ('.', 'no folder'),
+        ('config/initial_positions.yaml', r'panda\.urdf\.xacro: .*initial_positions'),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path: Path, remove: str, words: str) -> None:
+    """The file that names it too."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / remove
+    path.rename(tmp_path / 'elsewhere')
+    with pytest.raises(ConfigError, match=words):
+        settings_of(folder)
+
+
+def test_a_urdf_of_a_package_that_is_not_installed_is_named(tmp_path: Path) -> None:
+    """As after a git clone of the configuration alone."""
+    folder = moveit_package('prbt', tmp_path)
+    path = folder / '.setup_assistant'
+    path.write_text(path.read_text().replace('package: arm_bringup', 'package: nobodys_arm'))
+    with pytest.raises(ConfigError, match='nobodys_arm is not installed'):
+        read_package(folder)
+
+
+@pytest.fixture(name='panda', scope='module')
+def start_panda(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
+    """Start move_group with the Panda's package."""
+    folder = moveit_package('panda', tmp_path_factory.mktemp('package'))
+    positions = dict(zip([*JOINTS, 'panda_finger_joint1'], [*READY, 0.0], strict=True))
+    with (
+        reserve() as isolation,
+        MoveGroupRig(isolation, '--moveit-config', str(folder), positions=positions) as rig,
+    ):
+        yield rig
+
+
+def duration(response: Any) -> float:
+    """Return how long a plan takes in [s]."""
+    assert response.error_code.val == MoveItErrorCodes.SUCCESS, response.error_code
+    return seconds(response.trajectory.joint_trajectory.points[-1].time_from_start)
+
+
+def test_planners_of_the_package_plan(panda: MoveGroupRig) -> None:
+    """By all names that clients have for them; those that are not here have another search."""
+    for planner_id in (
+        '',
+        'panda_arm',
+        'RRTConnectkConfigDefault',
+        'panda_arm[TRRTkConfigDefault]',
+    ):
+        answer = panda.plan(motion_request(joint_goal(MOVED), planner_id=planner_id))
+        assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
+    answer = panda.plan(motion_request(joint_goal(MOVED), planner_id='Dijkstra'))
+    assert answer.error_code.val != MoveItErrorCodes.SUCCESS
+    assert 'Dijkstra' in answer.error_code.message
+
+
+def test_planners_of_the_package_are_listed_as_moveit_lists_them(panda: MoveGroupRig) -> None:
+    """RViz takes the names of a group out of the brackets."""
+    interfaces = panda.client.call(
+        QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
+    ).planner_interfaces
+    assert 'panda_arm[RRTstarkConfigDefault]' in interfaces[0].planner_ids
+    asked = GetPlannerParams.Request(planner_config='RRTstarkConfigDefault', group='panda_arm')
+    params = panda.client.call(GetPlannerParams, '/get_planner_params', asked).params
+    assert dict(zip(params.keys, params.values, strict=True)) == {
+        'type': 'geometric::RRTstar',
+        'range': '0.0',
+        'goal_bias': '0.05',
+        'delay_collision_checking': '1',
+    }
+
+
+def test_the_packages_factors_count_where_a_request_has_none(panda: MoveGroupRig) -> None:
+    """A tenth of velocity and acceleration, as beginners get it."""
+    beginners = duration(panda.plan(motion_request(joint_goal(MOVED))))
+    tenth, whole = (
+        duration(
+            panda.plan(
+                motion_request(
+                    joint_goal(MOVED),
+                    max_velocity_scaling_factor=factor,
+                    max_acceleration_scaling_factor=factor,
+                )
+            )
+        )
+        for factor in (0.1, 1.0)
+    )
+    assert beginners == pytest.approx(tenth, rel=1e-6)
+    assert beginners > 2.0 * whole
+
+
+def test_cartesian_limits_of_the_package_bound_a_line(panda: MoveGroupRig) -> None:
+    """0.5 m/s; the world of the SRDF is the frame of the goal."""
+    asked = GetPositionFK.Request(fk_link_names=['panda_link8'])
+    pose: PoseMessage = panda.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+    pose.position.z -= 0.2
+    request = motion_request(
+        pose_goal(pose, 'panda_link8', 'world'),
+        pipeline_id='pilz_industrial_motion_planner',
+        planner_id='LIN',
+        max_velocity_scaling_factor=0.2,
+        max_acceleration_scaling_factor=1.0,
+    )
+    # 0.2 m at 0.2 * 0.5 m/s, and some time to accelerate; 1 m/s would take less than 1.5 s
+    assert 2.0 < duration(panda.plan(request)) < 2.6
+
+
+def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
+    """A GripperCommand with the joint that follows the other one in its list."""
+    server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1')
+    goal = joint_goal([0.03], ['panda_finger_joint1'])
+    _status, result = panda.move(action_goal(motion_request(goal, 'hand')))
+    assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
+    assert panda.followed[-1].command.position == pytest.approx(0.03)
+    server.destroy()
+
+
+def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:
+    """And nothing that has one."""
+    notes = [line for line in panda.process.lines if 'without effect' in line]
+    assert sum('ompl.planner_configs.*.goal_bias' in line for line in notes) == 1
+    assert not any('cartesian' in line or 'unknown' in line for line in notes)
+
+
+def test_the_prbts_package_starts(isolation: Isolation, tmp_path: Path) -> None:
+    """With the least that an assistant wrote; limits of the description count."""
+    joints = [f'prbt_joint_{number}' for number in range(1, 7)]
+    folder = moveit_package('prbt', tmp_path)
+    at = dict.fromkeys(joints, 0.0)
+    with MoveGroupRig(isolation, '--moveit-config', str(folder), positions=at) as rig:
+        goal = joint_goal([0.5] * 6, joints)
+        request = motion_request(goal, 'manipulator', planner_id='SBLkConfigDefault')
+        assert duration(rig.plan(request)) > 0.3
+
+
+def test_parameters_of_moveits_launch_files_do_the_same(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """The same names, flattened, without --moveit-config."""
+    package = read_package(moveit_package('panda', tmp_path))
+    values = {
+        name: value
+        for name, value in package.parameters.items()
+        if not name.startswith('kinect') and name != 'sensors'
+    }
+    values |= {'publish_planning_scene': True, 'capabilities': '', 'monitor_dynamics': False}
+    path = tmp_path / 'launch_params.json'
+    path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
+    with MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
+        request = motion_request(joint_goal(MOVED), planner_id='TRRTkConfigDefault')
+        slow = duration(rig.plan(request))
+        request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 1.0
+        assert slow > 2.0 * duration(rig.plan(request))
+
+
+def refused(isolation: Isolation, *arguments: str) -> str:
+    """Return what a program that does not start prints."""
+    command = [executable('arm_planning', 'move_group'), *arguments]
+    with RunningProcess(command, isolation.env) as process:
+        assert process.wait(60.0) == 1, process.output
+        return process.output
+
+
+def test_limits_that_are_wider_than_the_description_are_refused(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """With file and line, by the program itself."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / 'joint_limits.yaml'
+    path.write_text(path.read_text().replace('max_velocity: 2.175', 'max_velocity: 21.75', 1))
+    output = refused(isolation, '--moveit-config', str(folder))
+    assert re.search(r'joint_limits\.yaml:\d+: .*panda_joint1.*21\.75 is wider', output), output
+
+
+def test_a_controller_of_a_joint_that_there_is_not_is_refused(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """With file and line."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / 'moveit_controllers.yaml'
+    path.write_text(path.read_text().replace('- panda_joint7', '- panda_joint8', 1))
+    output = refused(isolation, '--moveit-config', str(folder))
+    assert re.search(r"moveit_controllers\.yaml:\d+: .*names 'panda_joint8'", output), output
+
+
+def test_execution_can_be_forbidden(isolation: Isolation, tmp_path: Path) -> None:
+    """By MoveIt's parameter and with its words."""
+    path = panda_parameters(tmp_path, allow_trajectory_execution=False)
+    with MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
+        server = rig.serve_arm('panda_arm_controller')
+        _status, result = rig.move(action_goal(motion_request(joint_goal(MOVED))))
+        assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED
+        assert 'allow_trajectory_execution' in result.error_code.message
+        assert not rig.followed
+        server.destroy()

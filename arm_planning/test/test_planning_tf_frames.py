@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Goals and objects in frames of /tf that are none of the robot's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from isolation import reserve
+from move_group_rig import motion_request, MoveGroupRig, panda_parameters, pose_goal
+from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetPositionIK
+from planning_messages import box
+import pytest
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+
+LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def transform(parent: str, child: str, x: float, z: float = 0.0, *, turned: bool = False) -> Any:
+    """Return a transform; a turned one looks back at the robot."""
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id = parent
+    message.transform.translation.x, message.transform.translation.z = x, z
+    if turned:
+        message.transform.rotation.w, message.transform.rotation.z = 0.0, 1.0
+    return message
+
+
+class Camera:
+    """A camera in front of the robot, by TF.
+
+    Attributes:
+        rig: move_group and its client.
+    """
+
+    def __init__(self, rig: MoveGroupRig) -> None:
+        """Publish where the table is, for ever."""
+        self.rig = rig
+        node = rig.client.node
+        self._moving = node.create_publisher(TFMessage, '/tf', 100)
+        static = node.create_publisher(TFMessage, '/tf_static', LATCHED)
+        rig.client.spin_until(
+            lambda: self._moving.get_subscription_count() and static.get_subscription_count(),
+            60.0,
+            'a listener of TF',
+        )
+        static.publish(
+            TFMessage(
+                transforms=[
+                    transform('map', 'panda_link0', -1.0),
+                    transform('map', 'table', 1.0, 0.5),
+                    transform('panda_link8', 'camera_on_hand', 0.0, 0.1),
+                ]
+            )
+        )
+
+    def see(self, age: float = 0.0) -> None:
+        """Publish where the camera is: 2 m in front of the robot's root, looking back."""
+        message = transform('table', 'camera_link', 0.0, turned=True)
+        stamp = self.rig.client.node.get_clock().now().nanoseconds - round(age * 1e9)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        self._moving.publish(TFMessage(transforms=[message]))
+
+    def ik(self, frame: str, x: float, z: float) -> Any:
+        """Return the response to compute_ik for a pose in a frame."""
+        request = GetPositionIK.Request()
+        asked = request.ik_request
+        asked.group_name, asked.ik_link_name = 'panda_arm', 'panda_link8'
+        asked.pose_stamped = PoseStamped(pose=down(x, z))
+        asked.pose_stamped.header.frame_id = frame
+        return self.rig.client.call(GetPositionIK, '/compute_ik', request)
+
+
+def down(x: float, z: float) -> PoseMessage:
+    """Return a pose that looks down."""
+    pose = PoseMessage()
+    pose.position.x, pose.position.z = x, z
+    pose.orientation.w, pose.orientation.x = 0.0, 1.0
+    return pose
+
+
+@pytest.fixture(name='camera', scope='module')
+def make_camera(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
+    """Start move_group."""
+    path = panda_parameters(tmp_path_factory.mktemp('robot'))
+    with (
+        reserve() as isolation,
+        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
+    ):
+        yield Camera(rig)
+
+
+def fk(camera: Camera, state: Any) -> Any:
+    """Return where the flange is in a state."""
+    asked = GetPositionFK.Request(fk_link_names=['panda_link8'], robot_state=state)
+    answer = camera.rig.client.call(GetPositionFK, '/compute_fk', asked)
+    return answer.pose_stamped[0].pose.position
+
+
+def test_poses_are_taken_in_frames_of_tf(camera: Camera) -> None:
+    """Through a common ancestor, and turned."""
+
+    def arrived() -> bool:
+        camera.see()
+        answer = camera.ik('camera_link', 1.5, 0.0)
+        if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+            assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+            return False
+        place = fk(camera, answer.solution)
+        assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
+        return True
+
+    camera.rig.client.spin_until(arrived, 60.0, 'a solution in the frame of the camera')
+
+
+def test_goals_are_taken_in_frames_of_tf(camera: Camera) -> None:
+    """A plan to a pose that the camera sees; a frame on the hand is where the hand is."""
+    camera.see()
+    for frame, pose in (('camera_link', down(1.5, 0.0)), ('camera_on_hand', PoseMessage())):
+        request = motion_request(pose_goal(pose, 'panda_link8', frame))
+        answer = camera.rig.plan(request)
+        assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
+
+
+def test_objects_are_taken_in_frames_of_tf(camera: Camera) -> None:
+    """They come back in the root link."""
+    thing = box('cup', 1.4, 0.3, 0.0)
+    thing.header.frame_id = 'camera_link'
+    scene = PlanningScene(is_diff=True)
+    scene.robot_state.is_diff = True
+    scene.world.collision_objects = [thing]
+    camera.see()
+    apply = ApplyPlanningScene.Request(scene=scene)
+    assert camera.rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    found: CollisionObject
+    answer = camera.rig.client.call(
+        GetPlanningScene, '/get_planning_scene', GetPlanningScene.Request()
+    )
+    (found,) = answer.scene.world.collision_objects
+    place = found.pose.position
+    assert found.header.frame_id == 'panda_link0'
+    assert (place.x, place.y, place.z) == pytest.approx((0.6, -0.3, 0.5), abs=1e-9)
+
+
+def test_old_and_unknown_frames_are_refused(camera: Camera) -> None:
+    """With MoveIt's code, and how old it is."""
+    unknown = camera.ik('moon', 0.3, 0.5).error_code
+    assert unknown.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+    assert "Unknown frame: 'moon'" in unknown.message
+    assert unknown.source == 'move_group'
+    camera.see(age=3.0)
+
+    def is_old() -> bool:
+        code = camera.ik('camera_link', 1.5, 0.0).error_code
+        return bool(
+            code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE and 's old' in code.message
+        )
+
+    camera.rig.client.spin_until(is_old, 60.0, 'refusal of an old frame')
+    answer = camera.rig.plan(
+        motion_request(pose_goal(down(1.5, 0.0), 'panda_link8', 'camera_link'))
+    )
+    assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+
+
+def test_a_frame_of_tf_is_no_link_of_a_goal(camera: Camera) -> None:
+    """It would be one that stands still."""
+    camera.see()
+    answer = camera.rig.plan(motion_request(pose_goal(down(0.5, 0.5), 'table', 'panda_link0')))
+    assert answer.error_code.val == MoveItErrorCodes.INVALID_LINK_NAME
