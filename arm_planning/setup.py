@@ -42,6 +42,7 @@ setup(
     install_requires=[
         'numpy>=1.26',
         'pin>=3.3',
+        'PyYAML>=6',
         sibling('arm_model'),
         sibling('arm_trajectory'),
         sibling('libraries/urdf_reader'),

@@ -30,6 +30,7 @@ from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.objects import AttachedBody, CollisionObject
+from .scene.octomap import octomap_boxes, OCTOMAP_NAME
 from .scene.padding import padded
 from .scene.planning_scene import PlanningScene
 from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
@@ -37,6 +38,7 @@ from .start_poses import pose_quality, start_pose
 from .state import RobotState
 
 __all__ = [
+    'OCTOMAP_NAME',
     'ORIGIN',
     'TRANSFORM_TIMEOUT',
     'AllowedCollisionMatrix',
@@ -84,6 +86,7 @@ __all__ = [
     'load_limits',
     'merge_limits',
     'names_of',
+    'octomap_boxes',
     'padded',
     'pose_quality',
     'rotation_of',

@@ -25,6 +25,7 @@ from moveit_msgs.msg import (
     PlanningScene as SceneMessage,
 )
 import numpy as np
+from octomap_msgs.msg import OctomapWithPose
 from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import Plane as PlaneMessage
 from shape_msgs.msg import SolidPrimitive
@@ -34,6 +35,7 @@ from ..exceptions import CommandError, LinkNameError, ObjectNameError, SceneErro
 from ..pose import combined, inverse, ORIGIN, Pose, rotation_of
 from ..scene.allowed_collisions import AllowedCollisionMatrix
 from ..scene.objects import AttachedBody, CollisionObject
+from ..scene.octomap import octomap_boxes, OCTOMAP_NAME
 from ..scene.planning_scene import PlanningScene
 from ..scene.shapes import Box, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
 from .numbers import xyz, xyzw
@@ -76,7 +78,7 @@ def apply_planning_scene(
 
     A whole scene replaces objects and attached bodies, a diff (``is_diff``) changes those that it
     names. A matrix without names leaves what may touch as it is. Joints in the message count
-    nowhere. Padding, scale and octomap are not read.
+    nowhere. Padding and scale are not read. An octomap is the object ``<octomap>``, made of boxes.
 
     Args:
         scene: The scene before.
@@ -103,6 +105,7 @@ def apply_planning_scene(
         draft.apply_attached(attached)
     for thing in message.world.collision_objects:
         draft.apply(thing)
+    draft.apply_octomap(message.world.octomap)
     return draft.scene(_merged(scene, message.allowed_collision_matrix))
 
 
@@ -217,9 +220,26 @@ class _Draft:
             objects=self.objects, attached_bodies=self.attached, allowed=allowed
         )
 
+    def apply_octomap(self, message: OctomapWithPose) -> None:
+        """Replace the octomap as MoveIt does: without an id by none, without data it ends."""
+        tree = message.octomap
+        if not tree.id:
+            return
+        self.objects.pop(OCTOMAP_NAME, None)
+        if not tree.data:
+            return
+        boxes = octomap_boxes(
+            tree.id, tree.data.tobytes(), float(tree.resolution), binary=bool(tree.binary)
+        )
+        if boxes:
+            frame = self._frame(OCTOMAP_NAME, message.header.frame_id)
+            place = combined(frame, _pose(message.origin, OCTOMAP_NAME))
+            self.objects[OCTOMAP_NAME] = CollisionObject(OCTOMAP_NAME, *boxes, pose=place)
+
     def apply(self, message: ObjectMessage) -> None:
         """Add, move, extend or remove an object of the world."""
         name, operation = message.id, _operation(message)
+        _refuse_reserved(name)
         if operation == REMOVE:
             self._remove(name)
         elif operation == MOVE:
@@ -238,6 +258,7 @@ class _Draft:
         """Attach an object, or lay it down."""
         thing, link = message.object, message.link_name
         name, operation = thing.id, _operation(thing)
+        _refuse_reserved(name)
         if operation == REMOVE:
             self._detach(name, link)
             return
@@ -271,7 +292,8 @@ class _Draft:
 
     def _remove(self, name: str) -> None:
         if not name:
-            self.objects.clear()
+            for each in self.objects.keys() - {OCTOMAP_NAME}:
+                del self.objects[each]
         elif name not in self.attached:  # what a link has taken up is in the world no more
             self._known(name)
             del self.objects[name]
@@ -338,6 +360,14 @@ class _Draft:
             known = ', '.join(self.before.kinematics.frames)
             raise LinkNameError(f'attached object {name!r}: no link {link!r}; links: {known}')
         return self.before.kinematics.link_pose(link, self.positions)
+
+
+def _refuse_reserved(name: str) -> None:
+    if name == OCTOMAP_NAME:
+        raise ObjectNameError(
+            f"The ID '{name}' cannot be used for collision objects (name reserved); send an"
+            ' octomap'
+        )
 
 
 def _operation(message: ObjectMessage) -> int:

@@ -12,7 +12,6 @@ import threading
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
-from std_srvs.srv import Empty
 
 from arm_model import ArmError
 from arm_model.ros import Description
@@ -117,8 +116,6 @@ class MoveGroup(Node):
         PlannerQueries(self, settings.planners)
         for kind in (single_motion(planning), sequence(planning)):
             MotionAction(self, kind, planning, self._planning, execution)
-        # there is no octomap that would have to be cleared
-        self.create_service(Empty, 'clear_octomap', lambda _request, response: response)
 
     def close(self) -> None:
         """End the threads."""

@@ -15,6 +15,8 @@ import math
 from typing import Any
 
 from moveit_msgs.msg import CollisionObject as ObjectMessage
+from octomap_msgs.msg import OctomapWithPose
+from std_msgs.msg import Header
 
 from arm_model import (
     AllowedCollisionMatrix,
@@ -38,7 +40,7 @@ from arm_model.ros import (
 )
 
 from ..exceptions import PlanningCode, PlanningError
-from .geometry import check_mesh, placement, pose_of
+from .geometry import check_mesh, placement, pose_message, pose_of
 from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
 
 
@@ -57,17 +59,13 @@ def apply_scene(
     Raises:
         PlanningError: A part of it is refused.
     """
-    if len(message.world.octomap.octomap.data):
-        raise PlanningError(
-            PlanningCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-            'octomaps are not supported; send boxes or meshes as collision objects',
-        )
     before = snapshot if message.is_diff else _without_settings(snapshot)
     before = replace(
         before,
         name=message.name or snapshot.name,
         fixed_frames=_fixed(before, message.fixed_frame_transforms, positions),
     )
+    before = replace(before, octomap=_octomap(before, message.world.octomap, positions))
     before = _padded(before, message.link_padding, message.link_scale)
     bodies = message.robot_state.attached_collision_objects
     _check_meshes([*message.world.collision_objects, *(each.object for each in bodies)])
@@ -219,7 +217,21 @@ def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
 def _without_settings(snapshot: SceneSnapshot) -> SceneSnapshot:
     """Return a scene without what a whole scene replaces besides its objects."""
     scene = snapshot.scene.with_contents(link_shapes=snapshot.link_shapes)
-    return replace(snapshot, scene=scene, colors={}, padding={}, scale={}, fixed_frames={})
+    return replace(
+        snapshot, scene=scene, colors={}, padding={}, scale={}, fixed_frames={}, octomap=None
+    )
+
+
+def _octomap(snapshot: SceneSnapshot, message: Any, positions: Array) -> Any:  # noqa: ANN401
+    """Return the octomap after a octomap_msgs/OctomapWithPose, in the root link; None for none."""
+    if not message.octomap.id:
+        return snapshot.octomap
+    if not message.octomap.data:
+        return None
+    frame = snapshot.frame(message.header.frame_id, positions)
+    place = combined(frame, pose_of(message.origin, 'origin of the octomap'))
+    header = Header(frame_id=snapshot.root, stamp=message.header.stamp)
+    return OctomapWithPose(header=header, origin=pose_message(place), octomap=message.octomap)
 
 
 def _fixed(

@@ -31,6 +31,7 @@ from arm_model import (
     Cone,
     Cylinder,
     Mesh,
+    OCTOMAP_NAME,
     Plane,
     Pose,
     Sphere,
@@ -87,8 +88,12 @@ def scene_message(
     elif components & has.WORLD_OBJECT_NAMES:
         names = snapshot.scene.objects
         message.world.collision_objects = [
-            _identified(name, snapshot.details[name], snapshot.root) for name in names
+            _identified(name, snapshot.details[name], snapshot.root)
+            for name in names
+            if name != OCTOMAP_NAME
         ]
+    if components & has.OCTOMAP and snapshot.octomap is not None:
+        message.world.octomap = snapshot.octomap
     return message
 
 
@@ -98,6 +103,7 @@ def world_message(snapshot: SceneSnapshot) -> PlanningSceneWorld:
         collision_objects=[
             object_message(each, snapshot.details[name], snapshot.root)
             for name, each in snapshot.scene.objects.items()
+            if name != OCTOMAP_NAME
         ]
     )
 

@@ -19,6 +19,7 @@ from moveit_msgs.msg import RobotState as StateMessage
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Empty
 
 from arm_model import Array
 from node_runner import LATCHED
@@ -75,6 +76,7 @@ class SceneMonitor:
         )
         node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
+        node.create_service(Empty, 'clear_octomap', self._clear_octomap)
         self._publish()
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -153,6 +155,13 @@ class SceneMonitor:
                     f'joint {joint}: its position on {topic} is {since}; start what publishes it,'
                     ' or give the start state',
                 )
+
+    def _clear_octomap(self, _request: Empty.Request, response: Empty.Response) -> Empty.Response:
+        scene = PlanningScene(is_diff=True)
+        scene.robot_state.is_diff = True
+        scene.world.octomap.octomap.id = 'OcTree'  # without data it takes the place of the present
+        self._change('clear_octomap', apply_scene, scene)
+        return response
 
     def _take_joints(self, message: JointState) -> None:
         now = time.monotonic()

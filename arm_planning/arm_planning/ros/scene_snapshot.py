@@ -63,6 +63,7 @@ class SceneSnapshot:
         padding: By link in [m].
         scale: By link.
         fixed_frames: Frames that clients named, in the root link.
+        octomap: The octomap_msgs/OctomapWithPose in the root link; None for none.
         world_frames: Names of the world in which the root link stands.
         outer_frames: Frames of others, such as those of TF; None for none.
     """
@@ -77,6 +78,7 @@ class SceneSnapshot:
     padding: Mapping[str, float] = field(default_factory=dict)
     scale: Mapping[str, float] = field(default_factory=dict)
     fixed_frames: Mapping[str, Pose] = field(default_factory=dict)
+    octomap: Any = None
     world_frames: Sequence[str] = ()
     outer_frames: OuterFrames | None = None
 
