@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import islice
 import time
@@ -98,7 +98,8 @@ class Planner:
         scene = self._model.scene if scene is None else scene
         self._refuse(request)
         if request.planner_id in PLANNER_IDS:
-            plan = self._industrial.plan(request, scene)
+            with self._start_first(request.start, scene):
+                plan = self._industrial.plan(request, scene)
         else:
             plan = self._free_motion(request, scene, began + request.timeout)
         return replace(plan, planning_time=self._clock() - began)
@@ -118,8 +119,19 @@ class Planner:
         """
         began = self._clock()
         scene = self._model.scene if scene is None else scene
-        plan = self._industrial.plan_sequence(items, scene, first)
+        with self._start_first(items[0].request.start if items else None, scene):
+            plan = self._industrial.plan_sequence(items, scene, first)
         return replace(plan, planning_time=self._clock() - began)
+
+    @contextmanager
+    def _start_first(self, start: Array | None, scene: PlanningScene) -> Iterator[None]:
+        """Say of a motion that is not valid that its start is not, where that is the reason."""
+        try:
+            yield
+        except PlanningError as error:
+            if error.code is PlanningCode.INVALID_MOTION_PLAN and start is not None:
+                _require(self._checked_in(scene).state(start), 'start', _START_CODES)
+            raise
 
     def ik(
         self,

@@ -131,16 +131,16 @@ class MoveGroupRig:
         )
         self.client.spin_for(0.2)
 
-    def serve_arm(self, name: str) -> ActionServer:
+    def serve_arm(self, name: str) -> Any:
         """Offer a trajectory controller."""
-        return ActionServer(
+        return ActionServer(  # type: ignore[no-untyped-call]
             self.client.node,
             FollowJointTrajectory,
             f'/{name}/follow_joint_trajectory',
             self._follow,
         )
 
-    def serve_gripper(self, name: str, joint: str) -> ActionServer:
+    def serve_gripper(self, name: str, joint: str) -> Any:
         """Offer a gripper of one joint."""
 
         def grip(handle: Any) -> GripperCommand.Result:
@@ -149,7 +149,9 @@ class MoveGroupRig:
             handle.succeed()
             return GripperCommand.Result(reached_goal=True)
 
-        return ActionServer(self.client.node, GripperCommand, f'/{name}/gripper_cmd', grip)
+        return ActionServer(  # type: ignore[no-untyped-call]
+            self.client.node, GripperCommand, f'/{name}/gripper_cmd', grip
+        )
 
     def _follow(self, handle: Any) -> FollowJointTrajectory.Result:
         trajectory = handle.request.trajectory

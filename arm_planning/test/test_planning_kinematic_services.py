@@ -151,7 +151,7 @@ def test_solutions_heed_constraints(
         ({'ik_link_names': ['a', 'b']}, PlanningCode.INVALID_LINK_NAME),
         (
             {'pose_stamped': PoseStamped(pose=pose_at(float('nan'), 0.0, 0.0))},
-            PlanningCode.FAILURE,
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
         ),
         ({'pose_stamped': PoseStamped(pose=pose_at(9.0, 0.0, 0.0))}, PlanningCode.NO_IK_SOLUTION),
     ],
@@ -255,7 +255,7 @@ def test_a_path_to_where_the_arm_is_stands_still() -> None:
         ({'max_step': 0.0}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
         ({'waypoints': []}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
         ({'max_velocity_scaling_factor': 2.0}, PlanningCode.FAILURE),
-        ({'waypoints': [pose_at(0.0, float('inf'), 0.0)]}, PlanningCode.FAILURE),
+        ({'waypoints': [pose_at(0.0, float('inf'), 0.0)]}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
     ],
 )
 def test_what_is_no_path_is_refused(change: dict[str, Any], code: PlanningCode) -> None:

@@ -153,7 +153,7 @@ def _goal(**fields: Any) -> MotionPlanRequest:
             PlanningCode.INVALID_LINK_NAME,
             'moon',
         ),
-        (_goal(position_constraints=[place(math.nan, 0.0, 0.0)]), PlanningCode.FAILURE, 'nan'),
+        (_goal(position_constraints=[place(math.nan, 0.0, 0.0)]), GOAL, 'nan'),
         (request(pipeline_id='stomp'), PlanningCode.PLANNING_FAILED, 'ompl'),
         (request(max_velocity_scaling_factor=1.5), PlanningCode.FAILURE, '1.5'),
         (request(max_acceleration_scaling_factor=math.nan), PlanningCode.FAILURE, 'nan'),

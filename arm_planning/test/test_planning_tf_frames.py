@@ -15,10 +15,10 @@ from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetPositionIK
 from planning_messages import box
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
 
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+from node_runner import LATCHED
+
 
 
 def transform(parent: str, child: str, x: float, z: float = 0.0, *, turned: bool = False) -> Any:
@@ -45,7 +45,7 @@ class Camera:
         self._moving = node.create_publisher(TFMessage, '/tf', 100)
         static = node.create_publisher(TFMessage, '/tf_static', LATCHED)
         rig.client.spin_until(
-            lambda: self._moving.get_subscription_count() and static.get_subscription_count(),
+            lambda: bool(self._moving.get_subscription_count() * static.get_subscription_count()),
             60.0,
             'a listener of TF',
         )

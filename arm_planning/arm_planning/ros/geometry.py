@@ -43,26 +43,37 @@ MIN_THICKNESS = 1e-6
 """Least extent of a mesh along its thinnest axis in [m] that is a volume."""
 
 
-def pose_of(message: Any, what: str) -> Pose:  # noqa: ANN401  # message classes have no type
+def pose_of(
+    message: Any,  # noqa: ANN401  # message classes have no type
+    what: str,
+    code: PlanningCode = PlanningCode.FAILURE,
+) -> Pose:
     """Return a geometry_msgs/Pose.
 
     Args:
         message: The pose.
         what: What it is the pose of, for the message of the error.
+        code: Of the error.
 
     Raises:
         PlanningError: A number is not finite, or the quaternion is none.
     """
-    return placement(xyz(message.position), xyzw(message.orientation), what)
+    return placement(xyz(message.position), xyzw(message.orientation), what, code)
 
 
-def placement(position: Array, quaternion: Sequence[float], what: str) -> Pose:
+def placement(
+    position: Array,
+    quaternion: Sequence[float],
+    what: str,
+    code: PlanningCode = PlanningCode.FAILURE,
+) -> Pose:
     """Return a pose.
 
     Args:
         position: In [m].
         quaternion: x, y, z, w.
         what: What it is the pose of, for the message of the error.
+        code: Of the error.
 
     Raises:
         PlanningError: A number is not finite, or the quaternion is none.
@@ -71,7 +82,7 @@ def placement(position: Array, quaternion: Sequence[float], what: str) -> Pose:
         rotation = rotation_of(quaternion) if any(quaternion) else ORIGIN.rotation
         return Pose(rotation, checked(position, 3, 'position'))
     except CommandError as error:
-        raise PlanningError(PlanningCode.FAILURE, f'{what}: {error}') from error
+        raise PlanningError(code, f'{what}: {error}') from error
 
 
 def pose_message(pose: Pose) -> PoseMessage:

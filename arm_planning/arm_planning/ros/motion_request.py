@@ -48,6 +48,8 @@ ANY_ORIENTATION = (math.pi, math.pi, math.pi)
 
 OMPL, PILZ = PIPELINES
 
+BAD_GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS
+
 
 class RequestReader:
     """Reads requests of one group in one scene, with the robot at one place.
@@ -106,7 +108,7 @@ class RequestReader:
                 message.max_acceleration_scaling_factor,
                 self._settings.acceleration_scaling,
             ),
-            timeout=message.allowed_planning_time or DEFAULT_TIMEOUT,
+            timeout=planning_time(message.allowed_planning_time),
             attempts=max(message.num_planning_attempts, 1),
             constraints=constraints,
             via=via,
@@ -171,7 +173,8 @@ class RequestReader:
         Raises:
             PlanningError: The frame is unknown, or a number is none.
         """
-        return combined(self._snapshot.frame(frame, self._positions), pose_of(message, what))
+        place = pose_of(message, what, BAD_GOAL)
+        return combined(self._snapshot.frame(frame, self._positions), place)
 
     def on_link(self, pose: Pose, frame: str) -> tuple[str, Pose]:
         """Return the link that carries a frame, and its pose when the frame has a pose.
@@ -278,7 +281,7 @@ class RequestReader:
                 f'{what}: its region has {count} primitives, {len(region.primitive_poses)} poses'
                 f' and {len(region.meshes)} meshes; give it one primitive with a pose'
             )
-        offset = placement(xyz(message.target_point_offset), (), what).position
+        offset = placement(xyz(message.target_point_offset), (), what, BAD_GOAL).position
         link, in_link = self.on_link(Pose(ORIGIN.rotation, -offset), message.link_name)
         regions = []
         for primitive, pose in zip(region.primitives, region.primitive_poses, strict=True):
@@ -286,6 +289,9 @@ class RequestReader:
                 shape = primitive_shape(primitive, what)
             except SceneError as error:
                 raise _bad_goal(str(error)) from error
+            lengths = [float(each) for each in primitive.dimensions]
+            if not all(0.0 <= each < math.inf for each in lengths):
+                raise _bad_goal(f'{what}: the lengths of its region are {lengths}')
             place = self.pose(pose, message.header.frame_id, what)
             regions.append(PlacedShape(shape, place))
         return PositionConstraint(link, frozen(-in_link.position), regions)
@@ -301,7 +307,7 @@ class RequestReader:
         )
         if not (np.isfinite(tolerance).all() and (tolerance >= 0.0).all()):
             raise _bad_goal(f'{what}: its tolerances are {tolerance.tolist()}')
-        pose = placement(np.zeros(3), xyzw(message.orientation), what)
+        pose = placement(np.zeros(3), xyzw(message.orientation), what, BAD_GOAL)
         frame = self._snapshot.frame(message.header.frame_id, self._positions)
         rotation = frame.rotation @ pose.rotation
         return OrientationConstraint(message.link_name, frozen(rotation), frozen(tolerance))
@@ -329,6 +335,22 @@ class RequestReader:
         return CircPoint(kinds[0], frozen(point))
 
 
+def planning_time(given: float) -> float:
+    """Return the time for planning in [s]; 0 and less is one that was not given, as in MoveIt.
+
+    Args:
+        given: The time of the message in [s].
+
+    Raises:
+        PlanningError: It is not finite.
+    """
+    if not math.isfinite(given):
+        raise PlanningError(
+            PlanningCode.FAILURE, f'allowed_planning_time is {given:g} s; it must be finite'
+        )
+    return given if given > 0.0 else DEFAULT_TIMEOUT
+
+
 def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
     """Return a scaling factor; 0 is one that was not given.
 
@@ -349,4 +371,4 @@ def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
 
 
 def _bad_goal(reason: str) -> PlanningError:
-    return PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, reason)
+    return PlanningError(BAD_GOAL, reason)
