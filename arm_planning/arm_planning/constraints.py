@@ -32,8 +32,13 @@ from arm_model import (
 from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
-from .ik.link_kinematics import LinkKinematics, pose_error
-from .requests import OrientationConstraint, PathConstraints, PositionConstraint
+from .ik.link_kinematics import LinkKinematics
+from .requests import (
+    OrientationConstraint,
+    Parameterization,
+    PathConstraints,
+    PositionConstraint,
+)
 from .validity import Violation
 
 TOLERANCE = 1e-6
@@ -54,6 +59,9 @@ COARSE_LOOKS = 2000
 
 INNER = 0.8
 """Share of a constraint into which a state is led that broke it."""
+
+STEEPEST = 0.5 * np.pi - 0.01
+"""Second of three Euler angles up to which the others are told apart in [rad]."""
 
 MAX_ITERATIONS = 12
 """Newton steps at most."""
@@ -288,23 +296,48 @@ class ConstraintCheck:
 def _turned(
     constraint: OrientationConstraint, pose: Pose, jacobian: Array
 ) -> tuple[_Rows, Callable[[], str]]:
-    wanted = Pose(constraint.rotation, pose.position)
-    # the rotation vector about the axes that are wanted
-    turned = -constraint.rotation.T @ pose_error(wanted, pose)[3:]
+    about_wanted = constraint.rotation.T @ pose.rotation
+    if constraint.parameterization is Parameterization.XYZ_EULER_ANGLES:
+        turned, by_turn, room = _euler_angles(about_wanted)
+    else:
+        turned, by_turn, room = _rotation_vector(about_wanted)
 
     def words() -> str:
         angles = ', '.join(f'{abs(each):.3f}' for each in turned.tolist())
         allowed = ', '.join(f'{each:.3f}' for each in constraint.tolerance.tolist())
         return f'link {constraint.link} is turned by ({angles}) rad, ({allowed}) are allowed'
 
-    # of the rotation vector by the turn of the link, about the wanted axes
-    by_turn = pin.Jlog3(constraint.rotation.T @ pose.rotation).T
     gradients = by_turn @ constraint.rotation.T @ jacobian[3:]
-    bounds = constraint.tolerance
+    bounds = np.where(constraint.tolerance < np.pi, constraint.tolerance, np.inf)
+    return _Rows(turned, -bounds, bounds, gradients, room), words
+
+
+def _rotation_vector(rotation: Array) -> tuple[Array, Array, float]:
+    """Return the vector, its change by a turn about the wanted axes, and until the next look."""
+    turned: Array = pin.log3(rotation)
     # it changes quicker than the link turns, the quickest at half a turn; of the farthest until
     # the next look
     half = 0.5 * min(float(np.linalg.norm(turned)) + STEP, np.pi)
-    return _Rows(turned, -bounds, bounds, gradients, 0.5 * STEP * half / np.sin(half)), words
+    return turned, pin.Jlog3(rotation).T, 0.5 * STEP * half / np.sin(half)
+
+
+def _euler_angles(rotation: Array) -> tuple[Array, Array, float]:
+    """Return the angles about x, y and z one after the other, as :func:`_rotation_vector`."""
+    x = np.arctan2(-rotation[1, 2], rotation[2, 2])
+    y = np.arcsin(np.clip(rotation[0, 2], -1.0, 1.0))
+    z = np.arctan2(-rotation[0, 1], rotation[0, 0])
+    # at a quarter turn about y the other two are one
+    slope = np.tan(np.clip(y, -STEEPEST, STEEPEST))
+    quicker = np.hypot(1.0, slope)
+    by_turn = np.array(
+        [
+            [1.0, np.sin(x) * slope, -np.cos(x) * slope],
+            [0.0, np.cos(x), np.sin(x)],
+            [0.0, -np.sin(x) * quicker, np.cos(x) * quicker],
+        ]
+    )
+    room = 0.5 * STEP / np.cos(min(abs(float(y)) + STEP, STEEPEST))
+    return np.array([x, y, z]), by_turn, float(room)
 
 
 def _within(region: PlacedShape, point: Array, moved: Array, room: float) -> _Rows:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, IntEnum
 
 import numpy as np
 
@@ -57,6 +57,13 @@ Goal = JointGoal | PoseGoal
 """What a motion is to reach."""
 
 
+class Parameterization(IntEnum):
+    """Angles of a turn; numbers of moveit_msgs/OrientationConstraint."""
+
+    XYZ_EULER_ANGLES = 0
+    ROTATION_VECTOR = 1
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OrientationConstraint:
     """How a link is to be turned.
@@ -64,12 +71,14 @@ class OrientationConstraint:
     Attributes:
         link: The link; empty for the tip.
         rotation: Rotation matrix (3, 3) from the link that is wanted to the root link.
-        tolerance: Angles of the rotation vector about the wanted axes in [rad] (3).
+        tolerance: Greatest angles about the wanted axes in [rad] (3); pi and more is any angle.
+        parameterization: Which angles these are.
     """
 
     link: str
     rotation: Array
     tolerance: Array
+    parameterization: Parameterization = Parameterization.ROTATION_VECTOR
 
 
 @dataclass(frozen=True, slots=True, eq=False)

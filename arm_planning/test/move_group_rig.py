@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import json
 from pathlib import Path
 import shutil
+import time
 from typing import Any, TYPE_CHECKING
 
 from ament_index_python.packages import get_package_share_directory
@@ -112,6 +113,7 @@ class MoveGroupRig:
         """
         self.positions = dict(positions or zip(JOINTS, READY, strict=True))
         self.followed: list[Any] = []
+        self._published = 0.0
         self.client = RosClient(isolation.domain_id)
         node = self.client.node
         self._states = node.create_publisher(JointState, '/joint_states', 10)
@@ -165,9 +167,16 @@ class MoveGroupRig:
         state = JointState(name=list(self.positions), position=list(self.positions.values()))
         state.header.stamp = self.client.node.get_clock().now().to_msg()
         self._states.publish(state)
+        self._published = time.monotonic()
+
+    def _refresh(self) -> None:
+        """Publish joint states for a while where the test has computed: they are too old then."""
+        if time.monotonic() - self._published > 0.3:
+            self.client.spin_for(0.2)
 
     def plan(self, request: MotionPlanRequest) -> Any:
         """Return the moveit_msgs/MotionPlanResponse of plan_kinematic_path."""
+        self._refresh()
         asked = GetMotionPlan.Request(motion_plan_request=request)
         answer = self.client.call(GetMotionPlan, '/plan_kinematic_path', asked, TIMEOUT)
         return answer.motion_plan_response
@@ -181,6 +190,7 @@ class MoveGroupRig:
 
     def send(self, kind: Any, name: str, goal: Any, feedback: Any = None) -> Any:
         """Send a goal of an action; return its handle."""
+        self._refresh()
         caller: Any = self.client.action(kind, name)
         self.client.spin_until(caller.server_is_ready, TIMEOUT, name)
         sent = caller.send_goal_async(goal, feedback)

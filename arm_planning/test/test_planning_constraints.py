@@ -13,7 +13,12 @@ from planning_scenes import holds
 import pytest
 
 from arm_model import Array, Box, Cone, Cylinder, frozen, ORIGIN, PlacedShape, Pose, Sphere
-from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
+from arm_planning import (
+    OrientationConstraint,
+    Parameterization,
+    PathConstraints,
+    PositionConstraint,
+)
 from arm_planning.constraints import _turned, ConstraintCheck, ConstraintResult, HEEDED, STEP
 
 MODEL = panda().model('panda_arm')
@@ -106,3 +111,43 @@ def test_how_far_a_link_is_turned_changes_as_its_rows_say(
     small = 1e-5 * turn / np.linalg.norm(turn)
     change = 0.5 * (rows(small) - rows(-small))
     assert change == pytest.approx(row.gradients @ small, abs=1e-9)
+
+
+def about(axis: int, angle: float) -> Array:
+    """Return a turn about one axis."""
+    vector = np.zeros(3)
+    vector[axis] = angle
+    return np.asarray(pin.exp3(vector))
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-1.3, 1.3), st.floats(-3.1, 3.1), AXES, AXES)
+def test_euler_angles_are_those_of_moveit_and_change_as_their_rows_say(
+    x: float, y: float, z: float, wanted: Array, turn: Array
+) -> None:
+    """About x, then the new y, then the new z; the gradient, and the room until the next look."""
+    constraint = OrientationConstraint(
+        LINK, frozen(pin.exp3(wanted)), frozen(np.ones(3)), Parameterization.XYZ_EULER_ANGLES
+    )
+    rotation = constraint.rotation @ about(0, x) @ about(1, y) @ about(2, z)
+    by_turn = np.vstack((np.zeros((3, 3)), np.eye(3)))
+
+    def rows(turn: Array) -> Array:
+        pose = Pose(frozen(pin.exp3(turn) @ rotation), TIP.position)
+        return _turned(constraint, pose, by_turn)[0].values
+
+    row, _ = _turned(constraint, Pose(frozen(rotation), TIP.position), by_turn)
+    assert row.values == pytest.approx([x, y, z], abs=1e-9)
+    change = np.abs(rows(0.5 * STEP * turn / np.linalg.norm(turn)) - row.values)
+    assert change.max() <= row.room * (1.0 + 1e-6)
+    small = 1e-5 * turn / np.linalg.norm(turn)
+    change = 0.5 * (rows(small) - rows(-small))
+    assert change == pytest.approx(row.gradients @ small, abs=1e-8)
+
+
+def test_an_angle_of_half_a_turn_is_any_angle() -> None:
+    """Also where the angle jumps from one side to the other."""
+    for parameterization in Parameterization:
+        free = frozen([0.1, 0.1, np.pi])
+        rotation = frozen(TIP.rotation @ about(2, np.pi - 1e-4))
+        turn = OrientationConstraint(LINK, rotation, free, parameterization)
+        assert ConstraintCheck(MODEL, PathConstraints(orientations=[turn])).heeds(READY)

@@ -20,7 +20,6 @@ from tf2_msgs.msg import TFMessage
 from node_runner import LATCHED
 
 
-
 def transform(parent: str, child: str, x: float, z: float = 0.0, *, turned: bool = False) -> Any:
     """Return a transform; a turned one looks back at the robot."""
     message = TransformStamped(child_frame_id=child)

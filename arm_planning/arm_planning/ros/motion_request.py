@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 import math
 from typing import Any
 
@@ -36,6 +37,7 @@ from ..requests import (
     JointGoal,
     MotionRequest,
     OrientationConstraint,
+    Parameterization,
     PathConstraints,
     PoseGoal,
     PositionConstraint,
@@ -310,13 +312,23 @@ class RequestReader:
         pose = placement(np.zeros(3), xyzw(message.orientation), what, BAD_GOAL)
         frame = self._snapshot.frame(message.header.frame_id, self._positions)
         rotation = frame.rotation @ pose.rotation
-        return OrientationConstraint(message.link_name, frozen(rotation), frozen(tolerance))
+        if message.parameterization not in set(Parameterization):
+            raise _bad_goal(
+                f'{what}: no parameterization {message.parameterization}; choose'
+                ' XYZ_EULER_ANGLES (0) or ROTATION_VECTOR (1)'
+            )
+        return OrientationConstraint(
+            message.link_name,
+            frozen(rotation),
+            frozen(tolerance),
+            Parameterization(message.parameterization),
+        )
 
     def _of_link(self, constraint: OrientationConstraint) -> OrientationConstraint:
         """Return the constraint of a body or subframe as one of the link that carries it."""
         pose = Pose(constraint.rotation, ORIGIN.position)
         link, in_link = self.on_link(pose, constraint.link)
-        return OrientationConstraint(link, in_link.rotation, constraint.tolerance)
+        return replace(constraint, link=link, rotation=in_link.rotation)
 
     def _via(self, message: Any) -> CircPoint | None:  # noqa: ANN401
         """Return the point of a circle, which Pilz' planner has as a path constraint."""
