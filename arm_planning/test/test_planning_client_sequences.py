@@ -1,0 +1,358 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The calls of MoveIt's clients in their order, against the real move_group.
+
+Each test is what one client does, with its fields, QoS and expectations: MoveGroupInterface and
+PlanningSceneInterface of C++, RViz' MotionPlanning panel, and Python clients in the manner of
+pymoveit2, which have a node of their own and no robot model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Pose as PoseMessage
+from isolation import reserve
+from move_group_rig import (
+    action_goal,
+    joint_goal,
+    JOINTS,
+    motion_request,
+    MoveGroupRig,
+    panda_parameters,
+    pose_goal,
+    READY,
+)
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    DisplayTrajectory,
+    MotionPlanRequest,
+    MoveItErrorCodes,
+    PlanningScene,
+    PlanningSceneComponents,
+)
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetCartesianPath,
+    GetMotionPlan,
+    GetPlanningScene,
+    GetPositionFK,
+    GetPositionIK,
+    QueryPlannerInterfaces,
+)
+from planning_messages import box
+import pytest
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+
+from node_runner import LATCHED
+
+HAND, BASE = 'panda_link8', 'panda_link0'
+MOVED = [0.4, *READY[1:]]
+SUCCESS = MoveItErrorCodes.SUCCESS
+
+
+@pytest.fixture(name='rig', scope='module')
+def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
+    """Start move_group and a trajectory controller."""
+    path = panda_parameters(tmp_path_factory.mktemp('robot'))
+    with (
+        reserve() as isolation,
+        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
+    ):
+        rig.serve_arm('panda_arm_controller')
+        yield rig
+
+
+@pytest.fixture(autouse=True)
+def at_ready(rig: MoveGroupRig) -> None:
+    """Begin each test at the same place."""
+    rig.positions.update(zip(JOINTS, READY, strict=True))
+    rig.client.spin_for(0.2)
+
+
+def interface_request(goal: Any) -> MotionPlanRequest:
+    """Return a request as MoveGroupInterface::constructMotionPlanRequest fills it."""
+    request = motion_request(goal)
+    request.allowed_planning_time = 5.0
+    request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 0.1
+    corners = request.workspace_parameters
+    corners.header.frame_id = BASE
+    corners.min_corner.x = corners.min_corner.y = corners.min_corner.z = -1.0
+    corners.max_corner.x = corners.max_corner.y = corners.max_corner.z = 1.0
+    return request
+
+
+def tip(rig: MoveGroupRig) -> PoseMessage:
+    """Return where the hand is."""
+    asked = GetPositionFK.Request(fk_link_names=[HAND])
+    asked.header.frame_id = BASE
+    return rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+
+
+def at(rig: MoveGroupRig) -> list[float]:
+    """Return where the joints are in [rad]."""
+    return [rig.positions[name] for name in JOINTS]
+
+
+def test_move_group_interface(rig: MoveGroupRig) -> None:
+    """Constructor, setJointValueTarget, plan, execute, setPoseTarget, move, a Cartesian path."""
+    # the constructor waits for these two, and sends nothing to the others yet
+    for kind, name in ((MoveGroup, '/move_action'), (ExecuteTrajectory, '/execute_trajectory')):
+        rig.client.spin_until(rig.client.action(kind, name).server_is_ready, 20.0, name)
+    # plan(): look_around and replan are off
+    goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
+    states: list[str] = []
+    handle = rig.send(
+        MoveGroup, '/move_action', goal, lambda each: states.append(each.feedback.state)
+    )
+    result = handle.get_result_async()
+    rig.client.spin_until(result.done, 60.0, 'plan')
+    assert result.result().status == GoalStatus.STATUS_SUCCEEDED
+    plan = result.result().result
+    # the interface takes the trajectory, its start and the time from the result
+    assert (plan.error_code.val, plan.error_code.source) == (SUCCESS, 'move_group')
+    assert plan.planning_time > 0.0
+    assert list(plan.trajectory_start.joint_state.name)[:7] == JOINTS
+    assert list(plan.trajectory_start.joint_state.position)[:7] == pytest.approx(READY)
+    trajectory = plan.planned_trajectory.joint_trajectory
+    assert (list(trajectory.joint_names), trajectory.header.frame_id) == (JOINTS, BASE)
+    assert not plan.executed_trajectory.joint_trajectory.points
+    assert states[0] == 'PLANNING'
+    assert not rig.followed
+    # execute()
+    status, executed = rig.run(
+        ExecuteTrajectory,
+        '/execute_trajectory',
+        ExecuteTrajectory.Goal(trajectory=plan.planned_trajectory),
+    )
+    assert (status, executed.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
+    assert at(rig) == pytest.approx(MOVED, abs=1e-3)
+    # setPoseTarget() and move(): the frame of the model
+    pose = tip(rig)
+    pose.position.z += 0.1
+    _status, moved = rig.move(action_goal(interface_request(pose_goal(pose, HAND, BASE))))
+    assert moved.error_code.val == SUCCESS, moved.error_code
+    assert moved.executed_trajectory.joint_trajectory.points
+    rig.client.spin_for(0.2)
+    assert tip(rig).position.z == pytest.approx(pose.position.z, abs=2e-3)
+    # computeCartesianPath()
+    down = tip(rig)
+    down.position.z -= 0.1
+    asked = GetCartesianPath.Request(
+        group_name='panda_arm', link_name=HAND, waypoints=[down], max_step=0.01
+    )
+    asked.header.frame_id, asked.avoid_collisions = BASE, True
+    asked.start_state.is_diff = True
+    answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+    assert (answer.error_code.val, answer.fraction) == (SUCCESS, 1.0), answer.error_code
+    assert list(answer.start_state.joint_state.position)[:7] == pytest.approx(at(rig))
+
+
+def test_planning_scene_interface(rig: MoveGroupRig) -> None:
+    """applyCollisionObjects, getKnownObjectNames, getObjects, attach by topic, detach, remove."""
+
+    def scene(components: int) -> PlanningScene:
+        request = GetPlanningScene.Request()
+        request.components.components = components
+        return rig.client.call(GetPlanningScene, '/get_planning_scene', request).scene
+
+    def names() -> set[str]:
+        found = scene(PlanningSceneComponents.WORLD_OBJECT_NAMES)
+        return {each.id for each in found.world.collision_objects}
+
+    change = PlanningScene(is_diff=True)
+    change.robot_state.is_diff = True
+    change.world.collision_objects = [box('cup', 0.5, 0.3, 0.3, edge=0.05)]
+    apply = ApplyPlanningScene.Request(scene=change)
+    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    assert names() == {'cup'}
+    geometry = scene(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+    assert geometry.world.collision_objects[0].primitives[0].dimensions[0] == 0.05
+    # MoveGroupInterface::attachObject publishes with depth 1, the id only
+    publisher = rig.client.node.create_publisher(
+        AttachedCollisionObject, '/attached_collision_object', 1
+    )
+    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    attach = AttachedCollisionObject(link_name=HAND, touch_links=['panda_hand'])
+    attach.object.id, attach.object.operation = 'cup', CollisionObject.ADD
+    publisher.publish(attach)
+
+    def attached() -> set[str]:
+        found = scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        return {each.object.id for each in found.robot_state.attached_collision_objects}
+
+    rig.client.spin_until(lambda: attached() == {'cup'} and not names(), 30.0, 'the attached cup')
+    attach.object.operation = CollisionObject.REMOVE
+    publisher.publish(attach)
+    rig.client.spin_until(lambda: names() == {'cup'} and not attached(), 30.0, 'the cup laid down')
+    change.world.collision_objects = [CollisionObject(id='cup', operation=CollisionObject.REMOVE)]
+    apply = ApplyPlanningScene.Request(scene=change)
+    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    assert names() == set()
+
+
+def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
+    """It may start late: latched SRDF, whole scene by service, then changes; plan, stop."""
+    semantic = rig.client.listen(String, '/robot_description_semantic', LATCHED)
+    rig.client.spin_until(lambda: bool(semantic), 20.0, 'the SRDF')
+    assert '<group name="panda_arm">' in semantic[0].data
+    # its monitor listens with the system's default, which is volatile, and asks for the rest
+    monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', 100)
+    displayed = rig.client.listen(DisplayTrajectory, '/display_planned_path', 2)
+    request = GetPlanningScene.Request()
+    request.components.components = (1 << 10) - 1
+    whole = rig.client.call(GetPlanningScene, '/get_planning_scene', request).scene
+    assert not whole.is_diff
+    assert (whole.robot_model_name, whole.robot_state.joint_state.header.frame_id) == (
+        'panda',
+        BASE,
+    )
+    assert whole.allowed_collision_matrix.entry_names
+    described = rig.client.call(
+        QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
+    ).planner_interfaces
+    assert {each.pipeline_id for each in described} >= {'ompl', 'pilz_industrial_motion_planner'}
+    assert all(each.name and each.planner_ids for each in described)
+    # Publish Scene; another node's monitor sees it
+    publisher = rig.client.node.create_publisher(PlanningScene, '/planning_scene', 1)
+    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    whole.world.collision_objects = [box('crate', 0.0, 0.8, 0.2, edge=0.2)]
+    publisher.publish(whole)
+
+    def has_crate() -> bool:
+        return bool(monitored) and [each.id for each in monitored[-1].world.collision_objects] == [
+            'crate'
+        ]
+
+    rig.client.spin_until(has_crate, 30.0, 'the scene with the crate')
+    # Plan with what the panel has in its start state, then Execute
+    asked = interface_request(joint_goal(MOVED))
+    asked.start_state = deepcopy(whole.robot_state)
+    asked.pipeline_id, asked.planner_id = 'ompl', 'RRTConnectkConfigDefault'
+    _status, plan = rig.move(action_goal(asked, plan_only=True))
+    assert plan.error_code.val == SUCCESS, plan.error_code
+    rig.client.spin_until(lambda: bool(displayed), 30.0, 'the planned path')
+    assert displayed[-1].model_id == 'panda'
+    assert displayed[-1].trajectory[0] == plan.planned_trajectory
+    # Stop, with nothing on its way, and Clear octomap
+    stop = rig.client.node.create_publisher(String, '/trajectory_execution_event', 1)
+    rig.client.spin_until(lambda: stop.get_subscription_count() > 0, 20.0, 'a listener')
+    stop.publish(String(data='stop'))
+    rig.client.call(Empty, '/clear_octomap', Empty.Request())
+    empty = PlanningScene()
+    publisher.publish(empty)
+    rig.client.spin_until(
+        lambda: not monitored[-1].world.collision_objects, 30.0, 'the scene without it'
+    )
+
+
+def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
+    """As pymoveit2: services for plan and kinematics, the action to execute, objects by topic."""
+    # the start is the whole joint state as it was received; factors of 0 are its default
+    request = GetMotionPlan.Request()
+    wanted = request.motion_plan_request
+    wanted.group_name, wanted.num_planning_attempts = 'panda_arm', 5
+    wanted.allowed_planning_time = 5.0
+    wanted.workspace_parameters.header.frame_id = BASE
+    wanted.start_state.joint_state.name = JOINTS
+    wanted.start_state.joint_state.position = READY
+    wanted.start_state.joint_state.velocity = [0.0] * 7
+    wanted.goal_constraints = [joint_goal(MOVED)]
+    response = rig.client.call(GetMotionPlan, '/plan_kinematic_path', request)
+    plan = response.motion_plan_response
+    assert plan.error_code.val == SUCCESS, plan.error_code
+    assert plan.group_name == 'panda_arm'
+    goal = ExecuteTrajectory.Goal()
+    goal.trajectory.joint_trajectory = plan.trajectory.joint_trajectory
+    status, done = rig.run(ExecuteTrajectory, '/execute_trajectory', goal)
+    assert (status, done.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
+    rig.client.spin_for(0.2)
+    # compute_fk and compute_ik there and back, with a state for the start
+    pose = tip(rig)
+    asked = GetPositionIK.Request()
+    asked.ik_request.group_name, asked.ik_request.avoid_collisions = 'panda_arm', True
+    asked.ik_request.robot_state.joint_state.name = JOINTS
+    asked.ik_request.robot_state.joint_state.position = READY
+    asked.ik_request.pose_stamped.header.frame_id = BASE
+    asked.ik_request.pose_stamped.pose = pose
+    solved = rig.client.call(GetPositionIK, '/compute_ik', asked)
+    assert solved.error_code.val == SUCCESS, solved.error_code
+    again = GetPositionFK.Request(fk_link_names=[HAND], robot_state=solved.solution)
+    found = rig.client.call(GetPositionFK, '/compute_fk', again).pose_stamped[0].pose.position
+    assert (found.x, found.y, found.z) == pytest.approx(
+        (pose.position.x, pose.position.y, pose.position.z), abs=1e-4
+    )
+    # allow_collisions(): the scene is read, its matrix widened, and sent back as a whole
+    publisher = rig.client.node.create_publisher(CollisionObject, '/collision_object', 10)
+    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    place = tip(rig).position
+    publisher.publish(box('tool', place.x, place.y, place.z, edge=0.05))
+    reading = GetPlanningScene.Request()
+
+    def scene() -> PlanningScene:
+        return rig.client.call(GetPlanningScene, '/get_planning_scene', reading).scene
+
+    rig.client.spin_until(lambda: bool(scene().world.collision_objects), 30.0, 'the tool')
+    blocked = rig.plan(motion_request(joint_goal(READY)))
+    assert blocked.error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    whole = scene()
+    matrix = whole.allowed_collision_matrix
+    matrix.default_entry_names = [*matrix.default_entry_names, 'tool']
+    matrix.default_entry_values = [*matrix.default_entry_values, True]
+    apply = ApplyPlanningScene.Request(scene=whole)
+    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    allowed = rig.plan(motion_request(joint_goal(READY)))
+    assert allowed.error_code.val == SUCCESS, allowed.error_code
+    # clear_all_collision_objects(): one message without an id
+    publisher.publish(CollisionObject(operation=CollisionObject.REMOVE))
+    rig.client.spin_until(lambda: not scene().world.collision_objects, 30.0, 'an empty scene')
+
+
+NAMES: dict[str, str] = {
+    '/move_action': 'moveit_msgs/action/MoveGroup',
+    '/execute_trajectory': 'moveit_msgs/action/ExecuteTrajectory',
+    '/sequence_move_group': 'moveit_msgs/action/MoveGroupSequence',
+    '/plan_kinematic_path': 'moveit_msgs/srv/GetMotionPlan',
+    '/plan_sequence_path': 'moveit_msgs/srv/GetMotionSequence',
+    '/compute_ik': 'moveit_msgs/srv/GetPositionIK',
+    '/compute_fk': 'moveit_msgs/srv/GetPositionFK',
+    '/compute_cartesian_path': 'moveit_msgs/srv/GetCartesianPath',
+    '/check_state_validity': 'moveit_msgs/srv/GetStateValidity',
+    '/get_planning_scene': 'moveit_msgs/srv/GetPlanningScene',
+    '/apply_planning_scene': 'moveit_msgs/srv/ApplyPlanningScene',
+    '/query_planner_interface': 'moveit_msgs/srv/QueryPlannerInterfaces',
+    '/get_planner_params': 'moveit_msgs/srv/GetPlannerParams',
+    '/set_planner_params': 'moveit_msgs/srv/SetPlannerParams',
+    '/clear_octomap': 'std_srvs/srv/Empty',
+    '/planning_scene': 'moveit_msgs/msg/PlanningScene',
+    '/planning_scene_world': 'moveit_msgs/msg/PlanningSceneWorld',
+    '/collision_object': 'moveit_msgs/msg/CollisionObject',
+    '/attached_collision_object': 'moveit_msgs/msg/AttachedCollisionObject',
+    '/trajectory_execution_event': 'std_msgs/msg/String',
+    '/monitored_planning_scene': 'moveit_msgs/msg/PlanningScene',
+    '/display_planned_path': 'moveit_msgs/msg/DisplayTrajectory',
+    '/robot_description_semantic': 'std_msgs/msg/String',
+}
+"""What clients look for, by name."""
+
+
+def test_names_and_types_are_moveits(rig: MoveGroupRig) -> None:
+    """As the graph has them."""
+    node: Any = rig.client.node
+
+    def found() -> dict[str, str]:
+        pairs = [*node.get_topic_names_and_types(), *node.get_service_names_and_types()]
+        kinds = {name: types[0] for name, types in pairs}
+        for name in ('/move_action', '/execute_trajectory', '/sequence_move_group'):
+            goal = kinds.get(f'{name}/_action/send_goal', '')
+            kinds[name] = goal.removesuffix('_SendGoal')
+        return kinds
+
+    rig.client.spin_until(lambda: NAMES.items() <= found().items(), 30.0, 'all names')
+    assert rig.client.action(MoveGroupSequence, '/sequence_move_group').wait_for_server(20.0)
