@@ -61,7 +61,7 @@ INNER = 0.8
 """Share of a constraint into which a state is led that broke it."""
 
 STEEPEST = 0.5 * np.pi - 0.01
-"""Second of three Euler angles up to which the others are told apart in [rad]."""
+"""Second of three Euler angles up to which the others are distinguished in [rad]."""
 
 MAX_ITERATIONS = 12
 """Newton steps at most."""

@@ -355,4 +355,5 @@ def test_names_and_types_are_moveits(rig: MoveGroupRig) -> None:
         return kinds
 
     rig.client.spin_until(lambda: NAMES.items() <= found().items(), 30.0, 'all names')
-    assert rig.client.action(MoveGroupSequence, '/sequence_move_group').wait_for_server(20.0)
+    sequence = rig.client.action(MoveGroupSequence, '/sequence_move_group')
+    rig.client.spin_until(sequence.server_is_ready, 20.0, 'the action of sequences')

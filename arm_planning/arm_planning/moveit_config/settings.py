@@ -31,7 +31,6 @@ class MoveItSettings:
         planners: Planner configurations.
         default_pipeline: Of requests that name none; empty for ours.
         default_industrial: Planner of requests to Pilz' pipeline that name none.
-        allows_execution: Whether trajectories are executed.
         sensors: Names of updaters of octomaps, whose tables have no effect.
         notes: What has no effect, for the log.
     """
@@ -44,7 +43,6 @@ class MoveItSettings:
     planners: PlannerConfigs = field(default_factory=PlannerConfigs)
     default_pipeline: str = ''
     default_industrial: str = 'PTP'
-    allows_execution: bool = True
     sensors: Sequence[str] = ()
     notes: Sequence[str] = ()
 
@@ -80,7 +78,6 @@ def read_settings(
         planners=_planners(values, places),
         default_pipeline=_pipeline(values, places),
         default_industrial=_industrial(values, places),
-        allows_execution=values.get('allow_trajectory_execution', True) is True,
         sensors=sensors,
         notes=without_effect(list(values), sensors),
     )
