@@ -9,6 +9,9 @@ PYTHON ?=
 DURATION ?=
 # a robot of arm_bringup, or the path of a robot folder
 ROBOT ?= panda
+# 1: demos without the page on which the robot is seen
+NO_VIEW ?=
+export NO_VIEW
 # what pytest gets besides: make test ARGS='-k sync -x'; one after another: ARGS=-n0
 ARGS ?=
 
@@ -21,7 +24,7 @@ PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n au
 .DEFAULT_GOAL := help
 
 help:
-	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm)'
+	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm, NO_VIEW=1 opens no page)'
 	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110)'
 	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20 ends it after that)'
 	@echo 'make test       build everything and run all tests'

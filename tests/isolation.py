@@ -41,8 +41,9 @@ class Isolation:
 
     @property
     def env(self) -> dict[str, str]:
-        """Environment for the test's processes."""
-        env = os.environ | {'ROS_DOMAIN_ID': str(self.domain_id), 'PYTHONUNBUFFERED': '1'}
+        """Environment for the test's processes; bring-ups have no page in it."""
+        own = {'ROS_DOMAIN_ID': str(self.domain_id), 'PYTHONUNBUFFERED': '1', 'NO_VIEW': '1'}
+        env = os.environ | own
         restrict_dds(env)
         return env
 

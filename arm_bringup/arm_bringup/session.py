@@ -14,6 +14,7 @@ import tempfile
 
 from process_supervisor import (
     add_namespace,
+    add_view,
     exclusive,
     Executable,
     find_executable,
@@ -83,6 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
         f'python-can as INTERFACE:CHANNEL@BITRATE (default: {default_bus})',
     )
     add_namespace(parser)
+    add_view(parser)
     add_network(parser)
     add_timeout(parser)
 
@@ -251,6 +253,7 @@ def session(
             master_files(robot, Path(folder), ros),
             ros,
             plan,
+            arguments.view,
         )
         processes = arm_processes(wanted, parameters, find_executable)
         mode_service = stream_mode_service(config)

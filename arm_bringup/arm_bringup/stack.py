@@ -16,6 +16,7 @@ from process_supervisor import (
     ProcessSpec,
     RosOptions,
     state_publisher,
+    view_process,
 )
 
 from .robots import Robot
@@ -46,6 +47,7 @@ class Stack:
         master_files: Parameter files for it beside the usual one.
         ros: Options of all nodes.
         plan: With move_group, which has the files of the master.
+        view: With the page on which the robot is seen.
     """
 
     robot: Robot
@@ -58,6 +60,7 @@ class Stack:
     master_files: Sequence[Path] = ()
     ros: RosOptions = field(default_factory=RosOptions)
     plan: bool = False
+    view: bool = False
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -82,6 +85,7 @@ def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[
             parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
         ),
         _planner(stack, parameters, find),
+        _viewer(stack, find),
     ]
     return [spec for spec in everything if spec is not None]
 
@@ -133,6 +137,14 @@ def _planner(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpe
         notifies_ready=True,
         ready_timeout=stack.ready_timeout,
         stop_order=THEN_LISTENERS,
+    )
+
+
+def _viewer(stack: Stack, find: FindExecutable) -> ProcessSpec | None:
+    if not stack.view:
+        return None
+    return view_process(
+        find, stack.ros, ready_timeout=stack.ready_timeout, stop_order=THEN_LISTENERS
     )
 
 

@@ -139,6 +139,17 @@ def test_hardware_has_no_slaves_and_simulation_has(tmp_path: Path) -> None:
     assert simulated['master'] == real['master']
 
 
+def test_the_page_is_there_when_it_is_asked_for_and_built(tmp_path: Path) -> None:
+    """Everything else is the same."""
+    without = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True), 'robot_viewer')
+    seen = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True, view=True), 'robot_viewer')
+    viewer = seen.pop('viewer')
+    assert seen == without
+    assert viewer.stop_order > seen['master'].stop_order  # STOP is there until then
+    unbuilt = processes(tmp_path, Stack(ROBOT, 'can0', simulate=True, view=True))
+    assert 'viewer' not in unbuilt
+
+
 def test_bus_and_description_reach_the_processes(tmp_path: Path) -> None:
     """The bus as parameters, the description as a parameter file."""
     found = processes(tmp_path, Stack(ROBOT, 'udp_multicast:239.1.2.3:5000', simulate=True))

@@ -42,6 +42,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('protocol', '', 'auto, v2, v1 or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),
     LaunchArgument('namespace', '', 'namespace of all nodes, and prefix of TF frames'),
+    LaunchArgument('no-view', FALSE, 'true: without the page in the browser', flag=True),
     LaunchArgument('network', '', 'interfaces or peers that DDS is opened to'),
 )
 """What the launch file takes; the port is that of the robot's computer."""

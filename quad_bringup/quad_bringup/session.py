@@ -14,6 +14,7 @@ import tempfile
 
 from process_supervisor import (
     add_namespace,
+    add_view,
     exclusive,
     find_executable,
     namespaced_parameters,
@@ -99,6 +100,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'given in --calibration (default: %(default)s)',
     )
     add_namespace(parser)
+    add_view(parser)
     add_network(parser)
     add_timeout(parser)
 
@@ -145,6 +147,7 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
             calibration=calibration and namespaced_parameters(calibration, ros, folder),
             ros=ros,
             ready_timeout=arguments.timeout,
+            view=arguments.view,
         )
         title = f'XGO {wanted.preset}{" with arm" if wanted.arm else ""}' + (
             f', simulated, on {wanted.port}' if wanted.simulate else f' on {wanted.port}'

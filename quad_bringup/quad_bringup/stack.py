@@ -16,6 +16,7 @@ from process_supervisor import (
     RosOptions,
     StartError,
     state_publisher,
+    view_process,
 )
 
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
@@ -38,6 +39,7 @@ class Stack:
         calibration: Parameter file that ``quad_hardware calibrate`` has written.
         ready_timeout: How long each process may take to be ready in [s].
         ros: Options of all nodes.
+        view: With the page on which the robot is seen.
     """
 
     port: str
@@ -51,6 +53,7 @@ class Stack:
     calibration: Path | None = None
     ready_timeout: float = 30.0
     ros: RosOptions = field(default_factory=RosOptions)
+    view: bool = False
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
@@ -72,7 +75,16 @@ def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list
         _controller(stack, parameters, find),
         _state_publisher(stack, parameters, find),
     ]
-    return [_simulator(stack, find), *processes] if stack.simulate else processes
+    if stack.simulate:
+        processes.insert(0, _simulator(stack, find))
+    viewer = _viewer(stack, find)
+    return processes if viewer is None else [*processes, viewer]
+
+
+def _viewer(stack: Stack, find: FindExecutable) -> ProcessSpec | None:
+    if not stack.view:
+        return None
+    return view_process(find, stack.ros, ready_timeout=stack.ready_timeout, stop_order=THEN_BRIDGE)
 
 
 def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:

@@ -177,3 +177,11 @@ def test_a_workspace_that_is_not_built_says_so(tmp_path: Path, missing: str) -> 
     find = underlay(tmp_path, *(name for name in OURS if name != missing))
     with pytest.raises(StartError, match='make build'):
         quad_processes(Stack('p', simulate=True), tmp_path / 'none.yaml', find)
+
+
+def test_the_page_is_there_when_it_is_asked_for(tmp_path: Path) -> None:
+    """Everything else is the same."""
+    without = processes(tmp_path, Stack('/dev/ttyAMA0'))
+    seen = processes(tmp_path, Stack('/dev/ttyAMA0', view=True))
+    assert not seen.pop('viewer').required
+    assert seen == without

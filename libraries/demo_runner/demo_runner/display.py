@@ -162,6 +162,7 @@ class TableDisplay(Generic[FiguresT]):
         self._phase = 'starting'
         self._figures = setting.figures
         self._messages: deque[tuple[float, str]] = deque(maxlen=MESSAGES)
+        self._notes: dict[str, str] = {}
         self._lock = threading.Lock()
         self._live = Live(console=console, auto_refresh=False, redirect_stdout=False)
         self._live.start()
@@ -202,12 +203,16 @@ class TableDisplay(Generic[FiguresT]):
         Args:
             notice: The notice.
         """
-        self._keep(notice.severity, notice.text)
+        if notice.lasting:
+            self._notes[notice.process] = notice.text
+        else:
+            self._notes.pop(notice.process, None)
+            self._keep(notice.severity, notice.text)
         self._refresh()
 
     def close(self) -> None:
         """Leave the last table where it is, without what can no longer be tried."""
-        self._setting = replace(self._setting, commands=())
+        self._setting, self._notes = replace(self._setting, commands=()), {}
         self.phase('ended')
         with self._lock:
             self._live.stop()
@@ -219,7 +224,13 @@ class TableDisplay(Generic[FiguresT]):
         setting = self._setting
         now = time.monotonic()
         messages = [text for end, text in list(self._messages) if now < end]
-        status = DemoStatus(now - self._begun, self._phase, messages, setting.commands)
+        status = DemoStatus(
+            now - self._begun,
+            self._phase,
+            messages,
+            setting.commands,
+            list(self._notes.values()),
+        )
         with self._lock:
             if self._live.is_started:
                 size = self._console.size

@@ -24,12 +24,14 @@ class DemoStatus:
         phase: What is going on.
         messages: The last messages.
         commands: Commands to try in a second terminal.
+        notes: What stays true as long as it runs.
     """
 
     elapsed: float
     phase: str
     messages: Sequence[str] = ()
     commands: Sequence[str] = ()
+    notes: Sequence[str] = ()
 
 
 def compose(
@@ -39,19 +41,20 @@ def compose(
     widths: tuple[int, int],
     room: int,
 ) -> RenderableType:
-    """Put a picture together: title and phase, the body, messages, and commands.
+    """Put a picture together: title and phase, the body, notes, messages, and commands.
 
     Args:
         title: What runs, and where.
         status: What is shown beside the figures.
         body: What the demo drew.
         widths: Columns of the title line and of the terminal.
-        room: Lines that are left for messages and commands; what has no room is left out.
+        room: Lines that are left for what stands below the body; what has no room is left out.
     """
     title_width, width = widths
     parts: list[RenderableType] = [_title_line(title, status, title_width), *body]
     messages = [_message(text) for text in status.messages[-MESSAGE_ROOM:]]
-    for lines in (messages, _commands(status.commands, width)):
+    notes = [Text(text, style='bold green', overflow='fold') for text in status.notes]
+    for lines in (notes, messages, _commands(status.commands, width)):
         if lines and room > 1:
             shown = lines[: room - 1]
             parts += [Text(''), *shown]

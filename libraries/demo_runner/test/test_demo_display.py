@@ -125,3 +125,20 @@ def test_the_table_shows_what_was_said_last_and_stays_when_it_is_closed() -> Non
     length = len(file.getvalue())
     display.show(FIGURES)
     assert len(file.getvalue()) == length
+
+
+def test_what_lasts_stays_in_the_table_until_its_process_says_something_else() -> None:
+    """The URL of a page, until the page is gone; other notices come and go."""
+    file = Utf8()
+    console = Console(file=file, force_terminal=True, width=80, height=40, color_system=None)
+    display = TableDisplay(SETTING, console)
+    display.notice(Notice(Severity.INFO, 'seen at http://localhost:8080', 'viewer', lasting=True))
+    for number in range(20):
+        display.notice(Notice(Severity.INFO, f'notice {number}'))
+    display.phase('waving')
+    assert 'http://localhost:8080' in file.getvalue().split('widgets on vcan0')[-1]
+    display.notice(Notice(Severity.WARNING, 'viewer ended', 'viewer'))
+    last = file.getvalue().split('widgets on vcan0')[-1]
+    assert 'viewer ended' in last
+    assert 'http://localhost:8080' not in last
+    display.close()

@@ -13,18 +13,21 @@ import pytest
 from node_runner import notify_ready
 
 
-@pytest.mark.parametrize('abstract', [True, False])
+@pytest.mark.parametrize(
+    ('abstract', 'status', 'message'),
+    [(True, '', b'READY=1'), (False, '', b'READY=1'), (True, 'seen', b'READY=1\nSTATUS=seen')],
+)
 def test_readiness_is_reported_once(
-    abstract: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    abstract: bool, status: str, message: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To a socket with a file or without one; not from programs that this one starts."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as supervisor:
         supervisor.bind('' if abstract else str(tmp_path / 'notify'))
         name = supervisor.getsockname()
         monkeypatch.setenv('NOTIFY_SOCKET', f'@{name[1:].decode()}' if abstract else name)
-        notify_ready()
-        notify_ready()
-        assert supervisor.recv(100) == b'READY=1'
+        notify_ready(status)
+        notify_ready(status)
+        assert supervisor.recv(100) == message
         with pytest.raises(BlockingIOError):
             supervisor.recv(100)
         assert 'NOTIFY_SOCKET' not in os.environ

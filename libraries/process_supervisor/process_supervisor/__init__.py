@@ -33,6 +33,7 @@ from .runner import Runner
 from .spec import ProcessSpec, STOP_STEPS, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
 from .terminal import is_smart, LineWriter, Painter, severity_of, wants_colour
+from .view import add_view, view_process
 
 __version__ = '0.1.0'
 
@@ -61,6 +62,7 @@ __all__ = [
     'Supervision',
     'SupervisorError',
     'add_namespace',
+    'add_view',
     'exclusive',
     'explain',
     'find_executable',
@@ -73,6 +75,7 @@ __all__ = [
     'severity_of',
     'state_publisher',
     'supervise',
+    'view_process',
     'wants_colour',
     'write_parameters',
 ]

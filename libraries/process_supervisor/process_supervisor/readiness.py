@@ -11,14 +11,20 @@ import socket
 VARIABLE = 'NOTIFY_SOCKET'
 """Names the socket in the environment of the process."""
 _READY = b'READY=1'
+_STATUS = b'STATUS='
 _MAX_MESSAGE = 4096
 
 
 class ReadinessSocket:
-    """Receives what one process reports; others of systemd's messages are passed over."""
+    """Receives what one process reports; others of systemd's messages are passed over.
+
+    Attributes:
+        status: What it said last of itself, for the user.
+    """
 
     def __init__(self) -> None:
         """Open it."""
+        self.status = ''
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         self._socket.bind('')  # the kernel chooses a free name in the abstract namespace
 
@@ -37,7 +43,11 @@ class ReadinessSocket:
         ready = False
         with contextlib.suppress(BlockingIOError):
             while True:
-                ready |= _READY in self._socket.recv(_MAX_MESSAGE).splitlines()
+                lines = self._socket.recv(_MAX_MESSAGE).splitlines()
+                ready |= _READY in lines
+                for line in lines:
+                    if line.startswith(_STATUS):
+                        self.status = line.removeprefix(_STATUS).decode(errors='replace')
         return ready
 
     def close(self) -> None:

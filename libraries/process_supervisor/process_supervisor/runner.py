@@ -213,7 +213,7 @@ class Runner:
     def _check_ready(self, child: _Child) -> None:
         if child.readiness is not None and child.readiness.is_ready():
             self._drain(child)  # what it wrote before that comes first
-            self._supervision.ready(child.name, time.monotonic())
+            self._supervision.ready(child.name, time.monotonic(), child.readiness.status)
 
     def _read(self, child: _Child) -> bool:
         """Read once; false when there is nothing (more) to read."""

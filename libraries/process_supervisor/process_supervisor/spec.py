@@ -45,6 +45,7 @@ class ProcessSpec:
             sd_notify(3), when it is ready. Otherwise it is ready when it is started.
         ready_timeout: How long it may take to be ready in [s]; infinite for no limit.
         required: The whole bring-up ends when this process ends.
+        awaited: All is ready only when this process is.
         stop_order: Those with a lower number are stopped, and gone, before those with a
             higher one.
         stop_steps: How it is stopped.
@@ -56,6 +57,7 @@ class ProcessSpec:
     notifies_ready: bool = False
     ready_timeout: float = 30.0
     required: bool = True
+    awaited: bool = True
     stop_order: int = 0
     stop_steps: tuple[StopStep, ...] = STOP_STEPS
 

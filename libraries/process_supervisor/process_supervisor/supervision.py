@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -51,10 +51,15 @@ class Notice:
     Attributes:
         severity: How loud.
         text: What happened, and what to do when there is something to do.
+        process: The process that it is about; empty for none.
+        lasting: It stays true until there is another notice about its process, so a display keeps
+            it in sight.
     """
 
     severity: Severity
     text: str
+    process: str = ''
+    lasting: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,7 @@ class _Child:
     spec: ProcessSpec
     deadline: float
     ready: bool = False
+    reported: bool = False
     running: bool = False
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
 
@@ -141,8 +147,8 @@ class Supervision:
 
     @property
     def waiting(self) -> tuple[str, ...]:
-        """Names of the processes that are not ready yet."""
-        return tuple(name for name, child in self._children.items() if not child.ready)
+        """Names of the processes that are waited for."""
+        return tuple(name for name in self._late_ones() if self._children[name].spec.awaited)
 
     def begin(self, now: float) -> None:
         """Start everything.
@@ -172,19 +178,22 @@ class Supervision:
         """
         self._children[name].lines.append(text)
 
-    def ready(self, name: str, now: float) -> None:
+    def ready(self, name: str, now: float, status: str = '') -> None:
         """Take in that a process is ready.
 
         Args:
             name: The process that reported it.
             now: Steady time in [s].
+            status: What it says of itself, for the user.
         """
         child = self._children[name]
-        if child.ready:
+        if child.reported:
             return
-        child.ready = True
-        if self.phase is Phase.STARTING:
+        child.ready = child.reported = True
+        if self.phase in {Phase.STARTING, Phase.RUNNING}:
             self._say(f'{name} is ready ({now - self._begun:.1f} s)')
+            if status:
+                self._notify(Notice(Severity.INFO, status, name, lasting=True))
             self._check_ready(now)
 
     def _check_ready(self, now: float) -> None:
@@ -206,7 +215,8 @@ class Supervision:
         if self.phase is Phase.STOPPING:
             self._stopping.exited(name)
             self._say(f'{name} {how}', _severity(returncode))
-            if returncode == -Signals.SIGKILL and self.outcome and not self.outcome.exit_code:
+            killed = returncode == -Signals.SIGKILL and child.spec.required
+            if killed and self.outcome and not self.outcome.exit_code:
                 self.outcome = Outcome(1, f'{name} had to be killed', name, tuple(child.lines))
             self._advance_stop(now)
         elif child.spec.required:
@@ -214,7 +224,7 @@ class Supervision:
             self._fail(name, f'{name} {how}{early}', now)
         else:
             child.ready = True
-            self._say(f'{name} {how}; going on without it', Severity.WARNING)
+            self._go_on_without(name, f'{name} {how}')
             self._check_ready(now)
 
     def interrupt(self, now: float) -> None:
@@ -257,7 +267,7 @@ class Supervision:
         Args:
             now: Steady time in [s].
         """
-        if self.phase is Phase.STARTING:
+        if self.phase in {Phase.STARTING, Phase.RUNNING}:
             self._check_deadlines(now)
         elif self.phase is Phase.STOPPING:
             self._advance_stop(now)
@@ -266,13 +276,14 @@ class Supervision:
         """Steady time in [s] at which :meth:`advance` has something to do, None for never."""
         if self.phase is Phase.STOPPING:
             return self._stopping.next_deadline()
-        if self.phase is not Phase.STARTING:
+        if self.phase not in {Phase.STARTING, Phase.RUNNING}:
             return None
-        deadline = min((self._children[name].deadline for name in self.waiting), default=math.inf)
+        late = self._late_ones()
+        deadline = min((self._children[name].deadline for name in late), default=math.inf)
         return None if math.isinf(deadline) else deadline
 
     def _check_deadlines(self, now: float) -> None:
-        for name in self.waiting:
+        for name in list(self._late_ones()):
             child = self._children[name]
             if now < child.deadline:
                 continue
@@ -282,8 +293,14 @@ class Supervision:
                 self._fail(name, f'{late}; {remedy}', now)
                 return
             child.ready = True
-            self._say(f'{late}; going on without it', Severity.WARNING)
+            self._go_on_without(name, late)
         self._check_ready(now)
+
+    def _go_on_without(self, name: str, why: str) -> None:
+        self._notify(Notice(Severity.WARNING, f'{why}; going on without it', name))
+
+    def _late_ones(self) -> Iterator[str]:
+        return (name for name, child in self._children.items() if not child.ready)
 
     def _advance_stop(self, now: float) -> None:
         self._stopping.advance(now)

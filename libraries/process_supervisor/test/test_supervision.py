@@ -101,7 +101,7 @@ def test_one_that_is_not_required_and_late_is_no_longer_waited_for() -> None:
     bench.supervision.advance(10.0)
     assert bench.supervision.phase is Phase.RUNNING
     late = 'viewer did not get ready within 10 s; going on without it'
-    assert Notice(Severity.WARNING, late) in bench.notices
+    assert Notice(Severity.WARNING, late, 'viewer') in bench.notices
 
 
 def test_an_infinite_timeout_waits_for_ever() -> None:
@@ -232,3 +232,44 @@ def test_a_spec_refuses_what_would_only_fail_later(options: dict[str, object]) -
     values = {'argv': ('true',), **options}
     with pytest.raises(ValueError, match='process master'):
         ProcessSpec('master', **values)  # type: ignore[arg-type]
+
+
+def test_what_is_not_awaited_keeps_nobody_waiting() -> None:
+    """All is ready before it is; what it says of itself then lasts until it ends."""
+    bench = Bench(MASTER, spec('viewer', required=False, awaited=False))
+    assert bench.supervision.waiting == ('master',)
+    bench.supervision.ready('master', 1.0)
+    assert bench.supervision.phase is Phase.RUNNING
+    bench.supervision.ready('viewer', 2.0, 'seen at http://localhost')
+    assert bench.notices[-1] == Notice(
+        Severity.INFO, 'seen at http://localhost', 'viewer', lasting=True
+    )
+    bench.supervision.exited('viewer', 1, 3.0)
+    gone = 'viewer ended with exit code 1; going on without it'
+    assert bench.notices[-1] == Notice(Severity.WARNING, gone, 'viewer')
+    assert bench.supervision.phase is Phase.RUNNING
+
+
+def test_what_is_not_awaited_and_late_is_told_once_and_may_still_come() -> None:
+    """A warning when its time is over, although all is ready; then what it says of itself."""
+    bench = Bench(MASTER, spec('viewer', required=False, awaited=False))
+    bench.supervision.ready('master', 1.0)
+    assert bench.supervision.next_deadline() == 10.0
+    bench.supervision.advance(10.0)
+    late = 'viewer did not get ready within 10 s; going on without it'
+    assert bench.notices[-1] == Notice(Severity.WARNING, late, 'viewer')
+    assert bench.supervision.next_deadline() is None
+    bench.supervision.ready('viewer', 12.0, 'seen')
+    assert bench.notices[-1].text == 'seen'
+
+
+@pytest.mark.parametrize('required', [True, False])
+def test_only_what_is_required_makes_a_failure_of_being_killed(*, required: bool) -> None:
+    """A page that hangs is killed, and the robot has ended well all the same."""
+    bench = Bench(MASTER, spec('viewer', required=required))
+    for name in ('master', 'viewer'):
+        bench.supervision.ready(name, 1.0)
+    bench.supervision.interrupt(2.0)
+    bench.supervision.exited('master', 0, 3.0)
+    bench.supervision.exited('viewer', -Signals.SIGKILL, 4.0)
+    assert bench.outcome.exit_code == (1 if required else 0)

@@ -38,6 +38,7 @@ from node_runner import (
 )
 
 from ..page.robot_page import RobotPage, Status, Twist, Velocity
+from ..robots import of_robot
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -87,6 +88,7 @@ class WebViewer(Node):
             'host', '127.0.0.1', 'the page is bound to it; not loopback: with a token'
         )
         port = read.whole('port', PORT, (1, 65535), 'of the page; else the next free one')
+        self._prefix = read.text('frame_prefix', '', 'before each frame, as of the robot on /tf')
         refuse_misspelt(self)
         self._orders: deque[Callable[[], None]] = deque()
         self._trigger_clients: dict[str, Client] = {}
@@ -108,12 +110,13 @@ class WebViewer(Node):
         sensor = qos_profile_sensor_data
         self.create_subscription(JointState, 'joint_states', self._take_joints, sensor)
         self.create_subscription(TFMessage, '/tf', self._take_transforms, sensor)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._take_statuses, 10)
+        self.create_subscription(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
         self.create_subscription(String, 'controller_node/state', self._take_state, LATCHED)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
-        self.get_logger().info(f'the robot is seen at {self.page.url}')
+        self.seen_at = f'the robot is seen at {self.page.url}'
+        self.get_logger().info(self.seen_at)
 
     # -- what is shown
 
@@ -135,7 +138,7 @@ class WebViewer(Node):
 
     def _take_transforms(self, message: TFMessage) -> None:
         for transform in message.transforms:
-            if transform.child_frame_id == self._root:
+            if transform.child_frame_id == f'{self._prefix}{self._root}':
                 place, turn = transform.transform.translation, transform.transform.rotation
                 self._base = Transform(
                     (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
@@ -187,10 +190,13 @@ class WebViewer(Node):
         self.page.offer_sliders(offered=self._own)
 
     def _find_drives(self, triggers: Collection[str]) -> None:
-        nodes = {name.rpartition('/')[0] for name in triggers if name.endswith('/quick_stop')}
+        topics = (name for name, _ in self.get_topic_names_and_types())
+        own = self.resolve_topic_name('robot_description')
+        stopped = (n.removesuffix('/quick_stop') for n in triggers if n.endswith('/quick_stop'))
+        nodes = of_robot(own, topics, stopped)
         drives = {
             node: [verb for verb in DRIVE_SERVICES if f'{node}/{verb}' in triggers]
-            for node in sorted(nodes)
+            for node in nodes
             if f'{node}/halt' in triggers
         }
         self._drives.update(drives)
@@ -305,7 +311,7 @@ def main() -> int:
 def _serve(stop: threading.Event) -> None:
     node = WebViewer()
     log_as(node)
-    notify_ready()
+    notify_ready(node.seen_at)
     try:
         spin([node], stop)
     finally:

@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import partial
 from html import escape
+import io
 import time
 from typing import Protocol, TypeAlias
 
@@ -119,7 +121,7 @@ class RobotPage:
         """
         self._actions = actions
         gate = Gate(host)
-        with gate.before():
+        with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
         shown = 'localhost' if not gate.token else host
         self.url = f'http://{shown}:{self._server.get_port()}'
@@ -155,7 +157,8 @@ class RobotPage:
 
     def close(self) -> None:
         """Serve it no more."""
-        self._server.stop()
+        with redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def show_robot(self, tree: KinematicTree) -> list[str]:
         """Show another robot; return what of it cannot be shown, in words."""

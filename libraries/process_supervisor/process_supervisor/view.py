@@ -1,0 +1,71 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page on which the robot of a bring-up is seen: a process that the robot never waits for."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from signal import Signals
+
+from .nodes import Executable, FindExecutable, LOG_FORMAT, node_argv
+from .ros_options import RosOptions
+from .spec import ProcessSpec, StopStep
+
+VIEWER = Executable('robot_viewer', 'web_viewer')
+"""Serves the page, and says its URL when it is ready."""
+OFF = 'NO_VIEW'
+"""Variable that leaves the page out, where it is neither empty nor 0."""
+POLITE = ('nice', '-n', '5')
+"""Whatever moves the robot comes first, from the start of the program on."""
+STOP_STEPS = (StopStep(Signals.SIGTERM, 3.0), StopStep(Signals.SIGKILL, 2.0))
+"""It holds nothing that would have to be put down."""
+
+
+def add_view(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--no-view``.
+
+    Args:
+        parser: Where to.
+    """
+    parser.add_argument(
+        '--no-view',
+        dest='view',
+        action='store_false',
+        default=os.environ.get(OFF, '') in {'', '0'},
+        help='without the page on which the robot is seen, whose URL is printed (default: with '
+        f'it, but where the variable {OFF} is 1)',
+    )
+
+
+def view_process(
+    find: FindExecutable, ros: RosOptions, *, ready_timeout: float, stop_order: int
+) -> ProcessSpec | None:
+    """Say which process serves the page.
+
+    Args:
+        find: Finds executables.
+        ros: Options of all nodes.
+        ready_timeout: How long it may take to be ready in [s].
+        stop_order: As in :class:`.ProcessSpec`.
+
+    Returns:
+        The process, without which the bring-up goes on; None where it is not built.
+    """
+    if find(VIEWER.package, VIEWER.name) is None:
+        return None
+    return ProcessSpec(
+        name='viewer',
+        argv=(*POLITE, *node_argv(VIEWER, find, _frames(ros), ros=ros)),
+        environment=LOG_FORMAT,
+        notifies_ready=True,
+        ready_timeout=ready_timeout,
+        required=False,
+        awaited=False,
+        stop_order=stop_order,
+        stop_steps=STOP_STEPS,
+    )
+
+
+def _frames(ros: RosOptions) -> dict[str, str]:
+    return {'frame_prefix': ros.frame_prefix} if ros.frame_prefix else {}

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The page of bring-ups and demos: where it is, and that no robot depends on it."""
+
+from __future__ import annotations
+
+from contextlib import closing
+import socket
+from typing import TYPE_CHECKING
+from urllib.request import urlopen
+
+from processes import executable, RunningProcess
+import psutil
+import pytest
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+
+pytestmark = [pytest.mark.scenario, pytest.mark.timeout(180)]
+
+SEEN = r'the robot is seen at (http://localhost:\d+)$'
+STARTING = 60.0  # [s]
+
+
+def start(
+    isolation: Isolation, package: str, program: str, *arguments: str, no_view: str = ''
+) -> RunningProcess:
+    """Start a bring-up or demo with its page, as a person does."""
+    env = isolation.env | {'NO_VIEW': no_view}
+    return RunningProcess([executable(package, program), *arguments], env)
+
+
+def url_of(robot: RunningProcess) -> str:
+    """Wait for the URL that is printed, and return it."""
+    return robot.wait_for(SEEN, STARTING).rpartition(' ')[2]
+
+
+def viewers_below(robot: RunningProcess) -> list[psutil.Process]:
+    """Return the processes of its page."""
+    return [
+        child
+        for child in psutil.Process(robot.pid).children(recursive=True)
+        if any(word.endswith('/web_viewer') for word in child.cmdline())
+    ]
+
+
+def is_open(url: str) -> bool:
+    """Whether somebody listens there."""
+    with closing(socket.socket()) as client:
+        return client.connect_ex(('127.0.0.1', int(url.rpartition(':')[2]))) == 0
+
+
+def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> None:
+    """Two robots, two pages; the end of one is a warning; the other ends with its bring-up."""
+    arm = ['panda', '--simulate', '--namespace', 'left', '--can', isolation.bus]
+    with (
+        start(isolation, 'arm_bringup', 'bringup', *arm) as left,
+        start(isolation, 'quad_bringup', 'bringup', '--simulate', '--namespace', 'dog') as dog,
+    ):
+        urls = [url_of(left), url_of(dog)]
+        assert urls[0] != urls[1]
+        for url in urls:
+            with urlopen(url, timeout=20.0) as page:
+                assert b'<html' in page.read()
+        left.wait_for('all is ready', STARTING)
+        dog.wait_for('all is ready', STARTING)
+        (viewer,) = viewers_below(left)
+        viewer.kill()
+        left.wait_for('warning: viewer was killed by SIGKILL; going on without it', 20.0)
+        assert left.stop(60.0) == 0, left.output
+        assert is_open(urls[1])
+        assert dog.stop(60.0) == 0, dog.output
+        assert not is_open(urls[1])
+
+
+def test_a_page_that_hangs_does_not_hold_the_end_up(isolation: Isolation) -> None:
+    """It is killed, and the demo has ended well."""
+    arguments = ['panda', '--duration', '6', '--can', isolation.bus]
+    with start(isolation, 'arm_bringup', 'demo', *arguments) as demo:
+        demo_url = url_of(demo)
+        (viewer,) = viewers_below(demo)
+        viewer.suspend()
+        assert demo.wait(STARTING) == 0, demo.output
+    assert not is_open(demo_url)
+
+
+@pytest.mark.parametrize(('option', 'variable'), [(['--no-view'], ''), ([], '1')])
+def test_without_it_there_is_no_process(
+    isolation: Isolation, option: list[str], variable: str
+) -> None:
+    """By option, or by the variable of make."""
+    arguments = ['panda', '--simulate', '--can', isolation.bus, *option]
+    with start(isolation, 'arm_bringup', 'bringup', *arguments, no_view=variable) as arm:
+        arm.wait_for('all is ready', STARTING)
+        assert not viewers_below(arm)
+        assert arm.stop(60.0) == 0, arm.output
+    assert 'viewer' not in arm.output
