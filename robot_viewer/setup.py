@@ -34,7 +34,7 @@ setup(
     version='0.1.0',
     python_requires='>=3.10',
     packages=find_packages(include=['robot_viewer', 'robot_viewer.*']),
-    package_data={'robot_viewer': ['py.typed']},
+    package_data={'robot_viewer': ['py.typed', 'page/overlay.html']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/robot_viewer']),
         ('share/robot_viewer', ['package.xml']),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+import gzip
 from http.client import HTTPConnection
 from urllib.parse import urlsplit
 
@@ -15,6 +16,7 @@ from websockets.typing import Origin, Subprotocol
 
 from robot_viewer.page import gate as page_gate
 from robot_viewer.page.gate import Gate
+from robot_viewer.page.overlay import Overlay, STOP_HEADER
 from robot_viewer.page.robot_page import RobotPage, Twist, Velocity
 
 TIMEOUT = 10.0  # [s]
@@ -22,10 +24,15 @@ EVERYWHERE = '0.0.0.0'  # noqa: S104  # what is tested is that it is guarded
 
 
 class Nothing:
-    """Does nothing that is asked for."""
+    """Does nothing that is asked for, but to count what stops."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self.stops = 0
 
     def stop(self) -> None:
-        """Nothing."""
+        """Count it."""
+        self.stops += 1
 
     def call(self, service: str) -> None:
         """Nothing."""
@@ -43,10 +50,16 @@ class Nothing:
         """Nothing."""
 
 
+@pytest.fixture
+def actions() -> Nothing:
+    """What is done on the page."""
+    return Nothing()
+
+
 @pytest.fixture(params=['127.0.0.1', EVERYWHERE], ids=['loopback', 'open'])
-def page(request: pytest.FixtureRequest) -> Iterator[RobotPage]:
+def page(request: pytest.FixtureRequest, actions: Nothing) -> Iterator[RobotPage]:
     """Serve a page."""
-    made = RobotPage(request.param, 8300, Nothing())
+    made = RobotPage(request.param, 8300, actions)
     yield made
     made.close()
 
@@ -78,6 +91,34 @@ def test_the_printed_url_opens_the_page(page: RobotPage) -> None:
     status, text, _ = get(page, **cookie_of(page))
     assert status == 200
     assert '<html' in text
+    assert 'robot-stop' in text
+
+
+def test_stop_is_for_those_who_may_open_the_page(page: RobotPage, actions: Nothing) -> None:
+    """Only by a request that no other site can send; nobody else learns that it is there."""
+    cookie, header = cookie_of(page), {STOP_HEADER: '1'}
+    assert get(page, '/stop', **cookie)[0] == 403
+    assert get(page, '/stop', Host='evil.example', **header)[0] == 403
+    assert get(page, '/stop', Origin='http://evil.example', **cookie, **header)[0] == 403
+    if cookie:
+        assert get(page, '/stop', **header)[0] == 403
+    assert actions.stops == 0
+    assert get(page, '/stop', **cookie, **header)[0] == 200
+    assert actions.stops == 1
+
+
+@pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
+def test_the_page_has_stop_whether_it_is_packed_or_not(page: RobotPage) -> None:
+    """Browsers take it packed; and none keeps a page of another version."""
+    connection = HTTPConnection('127.0.0.1', urlsplit(page.url).port, timeout=TIMEOUT)
+    try:
+        connection.request('GET', '/', headers={'Accept-Encoding': 'gzip'})
+        answer = connection.getresponse()
+        assert answer.headers['Cache-Control'] == 'no-store'
+        assert answer.headers['Content-Encoding'] == 'gzip'
+        assert gzip.decompress(answer.read()).decode() == get(page)[1]
+    finally:
+        connection.close()
 
 
 @pytest.mark.parametrize('page', [EVERYWHERE], indirect=True)
@@ -118,5 +159,5 @@ def test_another_page_gets_no_connection(page: RobotPage, origin: str) -> None:
 
 def test_a_server_that_is_not_guarded_is_none() -> None:
     """A version of viser that serves otherwise must not open the page to everybody."""
-    with pytest.raises(RuntimeError, match='asks nobody'), Gate('127.0.0.1').before():
+    with pytest.raises(RuntimeError, match='asks nobody'), Gate('127.0.0.1', Overlay(Nothing().stop)).before():
         pass

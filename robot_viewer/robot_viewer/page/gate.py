@@ -24,6 +24,8 @@ import websockets.asyncio.server as websocket_server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from .overlay import Overlay, text_response
+
 COOKIE = 'robot_viewer_token'
 LOOPBACK_NAMES = frozenset({'localhost', '127.0.0.1', '::1'})
 
@@ -51,12 +53,14 @@ class Gate:
         token: What a page from elsewhere needs; empty on loopback.
     """
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, overlay: Overlay) -> None:
         """Make a token where one is needed.
 
         Args:
             host: What the page is bound to.
+            overlay: What lies over the page for those who may open it.
         """
+        self._overlay = overlay
         self.token = '' if is_loopback(host) else secrets.token_urlsafe(24)
         self._serving = False
 
@@ -80,7 +84,7 @@ class Gate:
         if not hmac.compare_digest(given[0].encode(), self.token.encode()):
             return _refusal('open the page by the URL that was printed at its start')
         cookie = f'{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/'
-        return _response(HTTPStatus.SEE_OTHER, '', Location='/', Set_Cookie=cookie)
+        return text_response(HTTPStatus.SEE_OTHER, '', {'Location': '/', 'Set-Cookie': cookie})
 
     def _is_known(self, cookies: list[str]) -> bool:
         jar = SimpleCookie()
@@ -120,22 +124,15 @@ class Gate:
         connection: Any,  # noqa: ANN401
         request: Request,
     ) -> Response | None:
-        refused = self.answer(request.path, request.headers)
-        if refused is not None or next_one is None:
-            return refused
+        answer = self.answer(request.path, request.headers) or self._overlay.answer(request)
+        if answer is not None or next_one is None:
+            return answer
         result = next_one(connection, request)
         if isawaitable(result):
             result = await result
-        answer: Response | None = result
-        return answer
+        page: Response | None = result
+        return page and self._overlay.over(page)
 
 
 def _refusal(reason: str) -> Response:
-    return _response(HTTPStatus.FORBIDDEN, reason)
-
-
-def _response(status: HTTPStatus, text: str, **headers: str) -> Response:
-    body = f'{text}\n'.encode()
-    named = {name.replace('_', '-'): value for name, value in headers.items()}
-    named |= {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
-    return Response(status, status.phrase, Headers(named), body)
+    return text_response(HTTPStatus.FORBIDDEN, reason)

@@ -15,7 +15,6 @@ from typing import Protocol, TypeAlias
 
 from urdf_reader import JointKind, KinematicTree, Transform
 from viser import (
-    CommandHandle,
     GuiButtonHandle,
     GuiDropdownHandle,
     GuiEvent,
@@ -24,12 +23,12 @@ from viser import (
     GuiSliderHandle,
     GuiTabGroupHandle,
     GuiTabHandle,
-    Icon,
     ViserServer,
 )
 
 from .deadman import Deadman, HEARTBEAT
 from .gate import Gate
+from .overlay import Overlay
 from .robot_scene import RobotScene, start_position, travel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
@@ -120,7 +119,7 @@ class RobotPage:
             actions: What people do on it.
         """
         self._actions = actions
-        gate = Gate(host)
+        gate = Gate(host, Overlay(actions.stop))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
         shown = 'localhost' if not gate.token else host
@@ -134,10 +133,6 @@ class RobotPage:
         gui.main_panel.dock_right()
         self._server.scene.set_up_direction('+z')
         self._server.scene.add_grid('/ground', cell_size=0.1, section_size=0.5, width=4, height=4)
-        self._stop = gui.add_button('STOP  (space)', color='red', icon=Icon.HAND_STOP)
-        self._stop.on_click(lambda _: actions.stop())
-        self._key: CommandHandle = gui.add_command('Stop', hotkey='space')
-        self._key.on_trigger(lambda _: actions.stop())
         self._answer = gui.add_html(_line('no robot description yet', COLORS[3]))
         self._tabs: GuiTabGroupHandle = gui.add_tab_group()
         self._pages: dict[str, GuiTabHandle] = {}

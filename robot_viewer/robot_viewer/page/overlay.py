@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What lies over viser's page: STOP in reach of everybody, and buttons that let go.
+
+viser has its controls in a panel, which may be folded, scrolled or busy. STOP goes its own way: a
+request of its own over HTTP, not behind whatever waits in the page's connection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+import gzip
+from http import HTTPStatus
+from pathlib import Path
+
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+STOP_PATH = '/stop'
+STOP_HEADER = 'X-Robot-Stop'
+"""What no page of another site can send without being asked."""
+END = b'</body>'
+
+
+class Overlay:
+    """Answers requests for STOP, and adds itself to the page that viser serves."""
+
+    def __init__(self, stop: Callable[[], None]) -> None:
+        """Take what STOP does.
+
+        Args:
+            stop: Called in the thread of the server; it does not wait.
+        """
+        self._stop = stop
+        self._html = Path(__file__).with_name('overlay.html').read_bytes()
+        self._page = b''
+
+    def answer(self, request: Request) -> Response | None:
+        """Return the answer to a request for STOP; None for others.
+
+        Args:
+            request: One that may come in.
+        """
+        if request.path.partition('?')[0] != STOP_PATH:
+            return None
+        if STOP_HEADER not in request.headers:
+            return text_response(HTTPStatus.FORBIDDEN, f'STOP needs the header {STOP_HEADER}')
+        self._stop()
+        return text_response(HTTPStatus.OK, 'STOP is on its way')
+
+    def over(self, response: Response) -> Response:
+        """Return a response with the overlay in it, if it is the page.
+
+        Args:
+            response: Of viser.
+
+        Raises:
+            RuntimeError: The page has no end; it would be without STOP.
+        """
+        if not response.headers.get('Content-Type', '').startswith('text/html'):
+            return response
+        packed = response.headers.get('Content-Encoding') == 'gzip'
+        if not self._page:
+            body = gzip.decompress(response.body) if packed else bytes(response.body)
+            before, end, after = body.rpartition(END)
+            if not end:
+                raise RuntimeError('the page has no </body>: STOP has no place on it')
+            self._page = gzip.compress(before + self._html + end + after)
+        body = self._page if packed else gzip.decompress(self._page)
+        headers = Headers(response.headers.raw_items())
+        headers['Cache-Control'] = 'no-store'  # a page without STOP may be in a cache
+        del headers['Content-Length']
+        headers['Content-Length'] = str(len(body))
+        return Response(response.status_code, response.reason_phrase, headers, body)
+
+
+def text_response(
+    status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None
+) -> Response:
+    """Make a response of one line.
+
+    Args:
+        status: Its status.
+        text: The line.
+        headers: Others than those of the text.
+    """
+    body = f'{text}\n'.encode()
+    own = {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
+    return Response(status, status.phrase, Headers({**(headers or {}), **own}), body)
