@@ -34,3 +34,17 @@ def test_one_page_at_a_time(beats: list[tuple[int, float]]) -> None:
         if deadman.beat(page, now):
             assert page == holder or now - last >= RELEASED_AFTER
             holder, last = page, now
+
+
+@given(st.integers(1, 90), st.integers(0, 90))
+def test_after_a_stop_a_button_has_to_be_pressed_anew(before: int, held: int) -> None:
+    """Whoever still holds it, of whichever page."""
+    deadman, now = Deadman(), 10.0
+    for _ in range(before):
+        now += HEARTBEAT
+        deadman.beat(1, now)
+    deadman.stop()
+    for number in range(held):
+        now += HEARTBEAT
+        assert not deadman.beat(1 + number % 2, now)
+    assert deadman.beat(1, now + RELEASED_AFTER + HEARTBEAT)

@@ -49,6 +49,9 @@ class Nothing:
     def publish_joints(self, positions: Mapping[str, float]) -> None:
         """Nothing."""
 
+    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
+        """Nothing."""
+
 
 @pytest.fixture
 def actions() -> Nothing:
@@ -159,5 +162,8 @@ def test_another_page_gets_no_connection(page: RobotPage, origin: str) -> None:
 
 def test_a_server_that_is_not_guarded_is_none() -> None:
     """A version of viser that serves otherwise must not open the page to everybody."""
-    with pytest.raises(RuntimeError, match='asks nobody'), Gate('127.0.0.1', Overlay(Nothing().stop)).before():
+    with (
+        pytest.raises(RuntimeError, match='asks nobody'),
+        Gate('127.0.0.1', Overlay(Nothing().stop)).before(),
+    ):
         pass

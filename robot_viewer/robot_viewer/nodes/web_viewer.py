@@ -38,7 +38,9 @@ from node_runner import (
 )
 
 from ..page.robot_page import RobotPage, Status, Twist, Velocity
+from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot
+from .controllers import Controllers
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -101,6 +103,10 @@ class WebViewer(Node):
         self._state = ''
         self._set_mode: Client | None = None
         self._root = ''
+        self._velocities: Mapping[str, float] = {}
+        self._controllers = Controllers(
+            self, lambda text, failed: self.page.say(text, failed=failed)
+        )
         self._base = self._shown_base = Transform()
         self._jogs: Publisher | None = None
         self._walks: Publisher | None = None
@@ -128,6 +134,7 @@ class WebViewer(Node):
             self.page.say(f'robot_description: {error}', failed=True)
             return
         self._root, self._drawn = tree.root, {}
+        self._velocities = greatest_velocities(tree)
         for note in self.page.show_robot(tree):
             self.get_logger().warning(f'not shown: {note}')
 
@@ -147,7 +154,8 @@ class WebViewer(Node):
     def _take_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:
             level = int.from_bytes(status.level, 'little')
-            self._statuses[status.name] = Status(status.name, level, status.message)
+            values = {each.key: each.value for each in status.values}
+            self._statuses[status.name] = Status(status.name, level, status.message, values)
 
     def _take_state(self, message: String) -> None:
         self._state = str(message.data)
@@ -155,6 +163,7 @@ class WebViewer(Node):
     def _serve_page(self) -> None:
         while self._orders:
             self._orders.popleft()()
+        self._controllers.advance(self._velocities)
         if self.page.watched:
             self._draw()
 
@@ -174,6 +183,9 @@ class WebViewer(Node):
         self.page.list_joints(self._positions, 0.0 if self._own else age)
         if self._statuses:
             self.page.show_statuses(list(self._statuses.values()))
+        for name, controller in self._controllers.found.items():
+            self.page.follow(name, busy=controller.busy, positions=controller.positions)
+        self.page.plot(self._controllers.history, time.monotonic())
 
     # -- what the robot offers
 
@@ -181,6 +193,10 @@ class WebViewer(Node):
         services = dict(self.get_service_names_and_types())
         self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
         self._find_jogging()
+        self._controllers.look(self.resolve_topic_name('robot_description'))
+        for name, controller in self._controllers.found.items():
+            if controller.joints:
+                self.page.offer_targets(name, controller.joints)
         self._find_walking(services)
         others = self.count_publishers('joint_states') - (self._joint_states is not None)
         self._own = not others and bool(self._root)
@@ -252,10 +268,15 @@ class WebViewer(Node):
         """Publish joint states, where nobody else does."""
         self._order(partial(self._publish_joints, positions))
 
+    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
+        """Send joints to targets."""
+        self._order(partial(self._controllers.aim, controller, targets, share))
+
     def _order(self, order: Callable[[], None]) -> None:
         self._orders.append(order)
 
     def _stop(self) -> None:
+        self._controllers.stop()
         for drive in self._drives:
             self._call(f'{drive}/halt')
         if self._state.removeprefix('to ') in STEPPING:

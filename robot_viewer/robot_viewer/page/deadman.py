@@ -27,6 +27,11 @@ class Deadman:
         """Begin with no button held."""
         self._holder: Hashable = None
         self._last = -math.inf
+        self._stopped = False
+
+    def stop(self) -> None:
+        """Let no heartbeat count until the button is released, whoever holds it."""
+        self._stopped = True
 
     def beat(self, page: Hashable, now: float) -> bool:
         """Take a heartbeat; return whether it counts.
@@ -36,6 +41,10 @@ class Deadman:
             now: Steady time of its arrival in [s].
         """
         gap = now - self._last
+        if self._stopped and gap < RELEASED_AFTER:
+            self._last = now
+            return False
+        self._stopped = False
         if page != self._holder and gap < RELEASED_AFTER:
             return False
         self._holder, self._last = page, now

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 import io
@@ -26,10 +26,13 @@ from viser import (
     ViserServer,
 )
 
+from .aim import History
 from .deadman import Deadman, HEARTBEAT
+from .drive_table import drive_html
 from .gate import Gate
 from .overlay import Overlay
 from .robot_scene import RobotScene, start_position, travel
+from .target_panel import PlotPanel, TargetPanel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
 Velocity: TypeAlias = tuple[float, float, float]
@@ -74,11 +77,13 @@ class Status:
         name: What.
         level: 0 good, 1 warning, 2 error, 3 stale, as in diagnostic_msgs.
         message: In words.
+        values: What was measured, by name.
     """
 
     name: str
     level: int
     message: str
+    values: Mapping[str, str] = field(default_factory=dict)
 
 
 class Actions(Protocol):
@@ -102,6 +107,9 @@ class Actions(Protocol):
     def publish_joints(self, positions: Mapping[str, float]) -> None:
         """Publish joint states."""
 
+    def aim(self, controller: str, targets: Mapping[str, float], share: float) -> None:
+        """Send the joints of a controller to targets, at a share of their greatest velocity."""
+
 
 class RobotPage:
     """A page in a browser; shows come from one thread, actions leave in any.
@@ -119,7 +127,8 @@ class RobotPage:
             actions: What people do on it.
         """
         self._actions = actions
-        gate = Gate(host, Overlay(actions.stop))
+        self._deadman = Deadman()
+        gate = Gate(host, Overlay(self._stop))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
         shown = 'localhost' if not gate.token else host
@@ -127,7 +136,6 @@ class RobotPage:
         if gate.token:
             self.url += f'/?token={gate.token}'
         self._scene: RobotScene | None = None
-        self._deadman = Deadman()
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
@@ -143,6 +151,10 @@ class RobotPage:
         self._offered: set[str] = set()
         self._drives: dict[str, tuple[str, ...]] = {}
         self._drive_panel: GuiFolderHandle | None = None
+        self._drive: GuiDropdownHandle[str] | None = None
+        self._drive_state: GuiHtmlHandle | None = None
+        self._targets: dict[str, TargetPanel] = {}
+        self._plots: PlotPanel | None = None
         self._tree: KinematicTree | None = None
 
     @property
@@ -198,6 +210,7 @@ class RobotPage:
 
     def show_statuses(self, statuses: Sequence[Status]) -> None:
         """Show how everything is, what is worst first."""
+        self._show_drive(statuses)
         if self._statuses is None:
             with self._tab('Status'):
                 self._statuses = self._server.gui.add_html('')
@@ -240,11 +253,55 @@ class RobotPage:
         with self._tab('Drives'):
             self._drive_panel = gui.add_folder(None)
         with self._drive_panel:
-            drive = gui.add_dropdown('Drive', ('all', *services))
+            self._drive = drive = gui.add_dropdown('Drive', ('all', *services))
+            self._drive_state = gui.add_html('')
             verbs = dict.fromkeys(verb for each in services.values() for verb in each)
             for verb in verbs:
                 button = gui.add_button(verb.replace('_', ' '))
                 button.on_click(partial(self._call, found, drive, verb))
+
+    def _show_drive(self, statuses: Sequence[Status]) -> None:
+        """Show what the chosen drive reports; of all drives those that are not well."""
+        if self._drive is None or self._drive_state is None:
+            return
+        drives = {status.name: status for status in statuses if status.name.endswith(': drive')}
+        buses = [status for status in statuses if status.name.endswith(': bus')]
+        chosen = drives.get(f'{self._drive.value.rpartition("/")[2]}: drive')
+        if chosen is not None:
+            bus = buses[0].values if len(buses) == 1 else {}
+            self._drive_state.content = drive_html(chosen.message, chosen.values, bus)
+            return
+        unwell = [status for status in drives.values() if status.level]
+        self._drive_state.content = ''.join(
+            _line(f'{status.name}: {status.message}', COLORS[min(status.level, 3)])
+            for status in unwell
+        ) or _line('no drive reports anything wrong', COLORS[0])
+
+    def offer_targets(self, controller: str, joints: Sequence[str]) -> bool:
+        """Offer to send the joints of a controller somewhere; whether it could be."""
+        tree = self._tree
+        if tree is None or controller in self._targets:
+            return tree is not None
+        movable = {joint.name: joint for joint in tree.movable()}
+        known = [movable[name] for name in joints if name in movable]
+        with self._tab('Targets'):
+            self._targets[controller] = TargetPanel(
+                self._server, known, partial(self._actions.aim, controller)
+            )
+        return True
+
+    def follow(self, controller: str, *, busy: bool, positions: Mapping[str, float]) -> None:
+        """Let the sliders of a controller show where its joints are."""
+        if controller in self._targets:
+            self._targets[controller].follow(positions, busy=busy)
+
+    def plot(self, history: History, now: float) -> None:
+        """Draw what the joints did until now."""
+        if self._plots is None and history.joints:
+            with self._tab('Plots'):
+                self._plots = PlotPanel(self._server, history.joints)
+        if self._plots is not None:
+            self._plots.show(history, now)
 
     def offer_jog(self) -> None:
         """Offer to jog the tool as long as a button is held."""
@@ -266,6 +323,10 @@ class RobotPage:
             speed = self._speed()
             for title, velocity in WALKS.items():
                 self._held(title, partial(self._walk, speed, velocity))
+
+    def _stop(self) -> None:
+        self._deadman.stop()  # or a button that is held would go on
+        self._actions.stop()
 
     def say(self, text: str, *, failed: bool = False) -> None:
         """Show what became of the last request."""

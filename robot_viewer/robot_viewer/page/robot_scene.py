@@ -169,6 +169,23 @@ def travel(joint: Joint) -> tuple[float, float]:
     return (lower, upper) if ends else (-math.pi, math.pi)
 
 
+def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
+    """Return how fast joints may move in [rad/s] or [m/s], of those whose description says it.
+
+    Args:
+        tree: The robot.
+    """
+    found = {}
+    for joint in tree.movable():
+        try:
+            velocity = joint.range.velocity
+        except DescriptionError:
+            continue
+        if 0.0 < velocity < math.inf:
+            found[joint.name] = velocity
+    return found
+
+
 def start_position(joint: Joint) -> float:
     """Return the position of a joint in [rad] or [m] before anybody says it.
 

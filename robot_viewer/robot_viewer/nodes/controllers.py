@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectory controllers of a robot: what their joints do, and sending them to a target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+import math
+import time
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import qos_profile_sensor_data, QoSProfile
+
+from ..page.aim import History, motion_time
+from ..robots import of_robot
+
+STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
+STATE = '/controller_state'
+COMMAND = '/joint_trajectory'
+NEAR = 0.01
+"""How near to its target in [rad] or [m] a joint has reached it."""
+PATIENCE = 1.0
+"""Time in [s] after the end of a motion at which it is looked at."""
+
+Report = Callable[[str, bool], None]
+"""Takes what became of a motion, and whether it failed."""
+
+
+@dataclass(slots=True)
+class Controller:
+    """A controller that was found.
+
+    Attributes:
+        commands: Where it takes trajectories.
+        joints: Its joints, once it has named them.
+        positions: Where they are in [rad] or [m].
+        wanted: Targets that were not sent yet, and the share of the greatest velocity.
+        targets: Where the joints are on their way to; empty when they are not.
+        ends: Steady time at which they are there in [s].
+    """
+
+    commands: Publisher
+    joints: tuple[str, ...] = ()
+    positions: dict[str, float] = field(default_factory=dict)
+    wanted: tuple[Mapping[str, float], float] | None = None
+    targets: Mapping[str, float] = field(default_factory=dict)
+    ends: float = -math.inf
+
+    @property
+    def busy(self) -> bool:
+        """Whether its joints are on their way."""
+        return bool(self.targets)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether its joints are at their targets."""
+        return all(
+            abs(self.positions.get(name, math.inf) - target) < NEAR
+            for name, target in self.targets.items()
+        )
+
+
+class Controllers:
+    """Those of the robot of a node; everything in the thread of the node.
+
+    Commands are trajectories of one point, on the topic: a later one takes over from the one
+    before, and a controller whose drives are not enabled follows none.
+
+    Attributes:
+        found: By the full name of the controller.
+        history: What their joints did.
+    """
+
+    def __init__(self, node: Node, report: Report) -> None:
+        """Find none yet.
+
+        Args:
+            node: The node of the page.
+            report: Tells people what became of a motion.
+        """
+        self._node, self._report = node, report
+        self.found: dict[str, Controller] = {}
+        self.history = History()
+
+    def look(self, description: str) -> None:
+        """Find the controllers that there are.
+
+        Args:
+            description: Full name of the topic with the description of the robot.
+        """
+        topics = dict(self._node.get_topic_names_and_types())
+        named = [
+            name.removesuffix(STATE)
+            for name, kinds in topics.items()
+            if STATE_TYPE in kinds and name.endswith(STATE)
+        ]
+        for name in of_robot(description, topics, named):
+            if name not in self.found:
+                self.found[name] = self._follow(name)
+
+    def _follow(self, name: str) -> Controller:
+        command = import_module('trajectory_msgs.msg').JointTrajectory
+        state = import_module('control_msgs.msg').JointTrajectoryControllerState
+        publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=1))
+        controller = Controller(publisher)
+        take = partial(self._take, controller)
+        self._node.create_subscription(state, f'{name}{STATE}', take, qos_profile_sensor_data)
+        return controller
+
+    def _take(self, controller: Controller, message: Any) -> None:  # noqa: ANN401
+        controller.joints = tuple(message.joint_names)
+        positions = dict(zip(controller.joints, message.feedback.positions, strict=False))
+        targets = dict(zip(controller.joints, message.reference.positions, strict=False))
+        controller.positions = positions
+        self.history.add(targets, positions, time.monotonic())
+
+    def aim(self, name: str, targets: Mapping[str, float], share: float) -> None:
+        """Have targets sent; of several at once the last one counts.
+
+        Args:
+            name: The controller.
+            targets: By joint in [rad] or [m].
+            share: Of the greatest velocity, above 0 to 1.
+        """
+        self.found[name].wanted = (targets, share)
+
+    def stop(self) -> None:
+        """Send nothing that was not sent yet, and wait for nothing: the robot was stopped."""
+        for controller in self.found.values():
+            controller.wanted, controller.targets = None, {}
+
+    def advance(self, velocities: Mapping[str, float]) -> None:
+        """Send what is wanted, and tell what was reached.
+
+        Args:
+            velocities: Greatest velocity of each joint in [rad/s] or [m/s].
+        """
+        now = time.monotonic()
+        for controller in self.found.values():
+            if controller.wanted is not None and controller.positions:
+                (targets, share), controller.wanted = controller.wanted, None
+                duration = motion_time(controller.positions, targets, velocities, share)
+                # what is not on the page stays where it is
+                controller.targets = {**controller.positions, **targets}
+                controller.ends = now + duration
+                controller.commands.publish(_trajectory(controller, duration))
+            elif controller.busy and controller.arrived:
+                self._conclude(controller, 'target: reached', failed=False)
+            elif controller.busy and now > controller.ends + PATIENCE:
+                why = 'target: not reached; are the drives enabled? /rosout has the reason'
+                self._conclude(controller, why, failed=True)
+
+    def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
+        controller.targets = {}
+        self._report(text, failed)
+
+
+def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401
+    messages = import_module('trajectory_msgs.msg')
+    positions = [controller.targets[joint] for joint in controller.joints]
+    rest = [0.0] * len(positions)
+    point = messages.JointTrajectoryPoint(positions=positions, velocities=rest, accelerations=rest)
+    seconds, nanoseconds = divmod(round(duration * 1e9), 10**9)
+    point.time_from_start.sec, point.time_from_start.nanosec = seconds, nanoseconds
+    return messages.JointTrajectory(joint_names=list(controller.joints), points=[point])
