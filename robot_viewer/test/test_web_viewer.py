@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
@@ -127,3 +129,43 @@ def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
         robot._executor.spin_once(0.02)
     assert len(robot.states) == count
     robot.node.destroy_publisher(other)
+
+
+def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
+    """The last of several counts; what the page does not move stays; a stop forgets it."""
+    sent: list[Any] = []
+    kind = import_module('trajectory_msgs.msg').JointTrajectory  # no dependency of the package
+    state = import_module('control_msgs.msg').JointTrajectoryControllerState()
+    state.joint_names = ['a', 'b']
+    robot.node.create_subscription(kind, 'arm_controller/joint_trajectory', sent.append, 10)
+    states = robot.node.create_publisher(type(state), 'arm_controller/controller_state', 10)
+    controllers = robot.viewer._controllers
+    state.feedback.positions = state.reference.positions = [0.5, -0.25]
+
+    def known() -> bool:
+        states.publish(state)
+        found = controllers.found.get('/arm_controller')
+        return (
+            found is not None
+            and bool(found.joints)
+            and robot.node.count_publishers('arm_controller/joint_trajectory') > 0
+            and found.commands.get_subscription_count() > 0
+        )
+
+    robot.spin_until(known, 'the controller')
+    robot.viewer.aim('/arm_controller', {'a': 0.9}, 0.5)
+    robot.viewer.aim('/arm_controller', {'a': 1.0}, 0.5)
+    robot.spin_until(lambda: bool(sent), 'a trajectory')
+    (point,) = sent[0].points
+    assert list(sent[0].joint_names) == ['a', 'b']
+    assert list(point.positions) == [1.0, -0.25]
+    assert list(point.velocities) == list(point.accelerations) == [0.0, 0.0]
+    assert point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 > 0.9  # 15/8 of 0.5
+    assert controllers.found['/arm_controller'].busy
+    robot.viewer.aim('/arm_controller', {'a': 2.0}, 0.5)
+    robot.viewer.stop()
+    for _ in range(20):
+        robot._executor.spin_once(0.02)
+    assert len(sent) == 1
+    assert not controllers.found['/arm_controller'].busy
+    assert controllers.history.of('a')[-1].target == 0.5

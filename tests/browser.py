@@ -1,0 +1,131 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A real browser on the page of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import importlib.util
+import io
+from pathlib import Path
+import shutil
+import signal
+from typing import TYPE_CHECKING
+
+import psutil
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, BrowserType, Page
+
+NAMES = ('chromium', 'chromium-browser', 'google-chrome')
+"""What distributions call it."""
+OPTIONS = [
+    '--no-sandbox',  # in containers the tests are root
+    '--use-angle=swiftshader',  # WebGL without a graphics card
+    '--enable-unsafe-swiftshader',
+    '--ignore-gpu-blocklist',
+]
+SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
+PATIENCE = 60_000  # [ms] on a busy machine
+PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
+"""Where pictures of the tests are kept, to be looked at."""
+PANEL = 330  # [px] width of the controls at the right
+
+
+def lacking() -> str:
+    """Return why there is no browser; empty where there is one."""
+    if importlib.util.find_spec('playwright') is None:
+        return 'needs playwright (make test installs it)'
+    if not any(map(shutil.which, NAMES)):
+        return f'needs a browser: one of {", ".join(NAMES)}'
+    return ''
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Start one, without a window."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        started = launch(playwright.chromium)
+        try:
+            yield started
+        finally:
+            started.close()
+
+
+def launch(kind: BrowserType) -> Browser:
+    """Start one more."""
+    program = next(filter(None, map(shutil.which, NAMES)))
+    return kind.launch(executable_path=program, args=OPTIONS)
+
+
+def processes() -> list[psutil.Process]:
+    """Return those of all browsers that this process has started."""
+    children = psutil.Process().children(recursive=True)
+    return [child for child in children if 'chrom' in child.name()]
+
+
+@contextmanager
+def asleep() -> Iterator[None]:
+    """Stop the browser as a laptop that is closed does."""
+    stopped = processes()
+    for process in stopped:
+        process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for process in stopped:
+            process.send_signal(signal.SIGCONT)
+
+
+def open_page(browser: Browser, url: str, **options: object) -> Page:
+    """Open a page and wait until it shows the robot's controls."""
+    page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
+    page.set_default_timeout(PATIENCE)
+    page.goto(url)
+    page.get_by_role('tab', name='Joints').wait_for()
+    return page
+
+
+def picture(page: Page, name: str) -> bytes:
+    """Take a picture of the whole page, keep it, and return it as PNG."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    return page.screenshot(path=PICTURES / f'{name}.png')
+
+
+def colors_of_scene(png: bytes) -> int:
+    """Count the pixels of the scene that have a colour: floor and sky are grey."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(png)).convert('HSV')
+    width, height = image.size
+    scene = image.crop((0, 150, width - PANEL, height))  # without STOP and the panel
+    return sum(scene.getchannel('S').histogram()[64:])
+
+
+def hold(page: Page, button: str) -> None:
+    """Press a button of the panel with the mouse, and keep it pressed."""
+    box = page.get_by_role('button', name=button, exact=True).bounding_box()
+    assert box is not None
+    page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    page.mouse.down()
+
+
+def drag(page: Page, slider: int, share: float) -> None:
+    """Drag a slider of the open tab to a share of its way."""
+    thumb = page.locator('[role=slider]:visible').nth(slider)
+    box, track = thumb.bounding_box(), thumb.locator('xpath=..').bounding_box()
+    assert box is not None
+    assert track is not None
+    page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    page.mouse.down()
+    page.mouse.move(track['x'] + share * track['width'], box['y'] + box['height'] / 2, steps=4)
+    page.mouse.up()
+
+
+def slider_value(page: Page, slider: int) -> float:
+    """Return what a slider of the open tab shows."""
+    thumb = page.locator('[role=slider]:visible').nth(slider)
+    return float(thumb.get_attribute('aria-valuenow') or 'nan')
