@@ -27,7 +27,7 @@ OPTIONS = [
     '--ignore-gpu-blocklist',
 ]
 SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
-PATIENCE = 60_000  # [ms] on a busy machine
+PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 330  # [px] width of the controls at the right
@@ -83,7 +83,7 @@ def asleep() -> Iterator[None]:
 def open_page(browser: Browser, url: str, **options: object) -> Page:
     """Open a page and wait until it shows the robot's controls."""
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
-    page.set_default_timeout(PATIENCE)
+    page.set_default_timeout(PAGE_TIMEOUT)
     page.goto(url)
     page.get_by_role('tab', name='Joints').wait_for()
     return page

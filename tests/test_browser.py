@@ -72,7 +72,7 @@ class Seen:
 
     def moves(self) -> bool:
         """Whether it moves at the moment."""
-        return max(map(abs, self.states[-1][1].velocity)) > MOVES
+        return bool(max(map(abs, self.states[-1][1].velocity)) > MOVES)
 
     def rests(self) -> bool:
         """Whether it has not moved for a while."""
@@ -201,13 +201,13 @@ def test_stop_is_in_reach_on_a_phone(seen: Seen) -> None:
     page = context.new_page()
     page.goto(seen.url)
     stop = page.locator('#robot-stop')
-    stop.wait_for(timeout=chromium.PATIENCE)
+    stop.wait_for(timeout=chromium.PAGE_TIMEOUT)
     box = stop.bounding_box()
     assert box is not None
     assert min(box['width'], box['height']) > 48  # [px] what a thumb hits
-    stop.tap()
-    page.get_by_text('received').wait_for(timeout=chromium.PATIENCE)
-    page.get_by_role('tab', name='Joints').wait_for(timeout=chromium.PATIENCE)
+    page.touchscreen.tap(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    page.get_by_text('received').wait_for(timeout=chromium.PAGE_TIMEOUT)
+    page.get_by_role('tab', name='Joints').wait_for(timeout=chromium.PAGE_TIMEOUT)
     chromium.picture(page, 'phone')
     context.close()
 
@@ -219,7 +219,7 @@ def test_a_fault_is_shown_with_its_reason(seen: Seen) -> None:
     answer = seen.client.call(InjectFault, '/fake_slaves/fault', request)
     assert answer.success, answer.message
     page.get_by_text(re.compile('panda_joint3: drive: .*over.?current', re.IGNORECASE)).wait_for()
-    page.get_by_role('textbox', name='Drive').click()
-    page.get_by_role('option', name='panda_joint3').click()
+    page.locator('input:visible').first.click()  # the only one of this tab
+    page.get_by_role('option', name='/panda_joint3', exact=True).click()
     page.get_by_role('cell', name='Fault', exact=True).wait_for()
     chromium.picture(page, 'fault')

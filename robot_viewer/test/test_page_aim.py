@@ -45,7 +45,7 @@ def test_the_slowest_joint_says_how_long() -> None:
 
 
 def test_the_past_is_kept_for_half_a_minute() -> None:
-    """With samples that are not nearer than needed, and of joints that are both told."""
+    """With samples that are not nearer than needed, and of joints that have both."""
     history = History()
     for number in range(5000):
         now = 0.02 * number

@@ -19,7 +19,7 @@ def notify_ready(status: str = '') -> None:
     the first call reports, so it may stand where readiness comes and goes.
 
     Args:
-        status: What the supervisor shall tell the user of this process, in one line.
+        status: What the supervisor shall show the user about this process, in one line.
     """
     address = os.environ.pop(VARIABLE, '')
     if not address:

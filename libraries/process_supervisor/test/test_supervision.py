@@ -250,7 +250,7 @@ def test_what_is_not_awaited_keeps_nobody_waiting() -> None:
     assert bench.supervision.phase is Phase.RUNNING
 
 
-def test_what_is_not_awaited_and_late_is_told_once_and_may_still_come() -> None:
+def test_what_is_not_awaited_and_late_is_reported_once_and_may_still_come() -> None:
     """A warning when its time is over, although all is ready; then what it says of itself."""
     bench = Bench(MASTER, spec('viewer', required=False, awaited=False))
     bench.supervision.ready('master', 1.0)

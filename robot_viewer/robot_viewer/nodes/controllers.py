@@ -24,7 +24,7 @@ STATE = '/controller_state'
 COMMAND = '/joint_trajectory'
 NEAR = 0.01
 """How near to its target in [rad] or [m] a joint has reached it."""
-PATIENCE = 1.0
+SETTLING_TIMEOUT = 1.0
 """Time in [s] after the end of a motion at which it is looked at."""
 
 Report = Callable[[str, bool], None]
@@ -81,7 +81,7 @@ class Controllers:
 
         Args:
             node: The node of the page.
-            report: Tells people what became of a motion.
+            report: Reports to people what became of a motion.
         """
         self._node, self._report = node, report
         self.found: dict[str, Controller] = {}
@@ -135,7 +135,7 @@ class Controllers:
             controller.wanted, controller.targets = None, {}
 
     def advance(self, velocities: Mapping[str, float]) -> None:
-        """Send what is wanted, and tell what was reached.
+        """Send what is wanted, and report what was reached.
 
         Args:
             velocities: Greatest velocity of each joint in [rad/s] or [m/s].
@@ -151,7 +151,7 @@ class Controllers:
                 controller.commands.publish(_trajectory(controller, duration))
             elif controller.busy and controller.arrived:
                 self._conclude(controller, 'target: reached', failed=False)
-            elif controller.busy and now > controller.ends + PATIENCE:
+            elif controller.busy and now > controller.ends + SETTLING_TIMEOUT:
                 why = 'target: not reached; are the drives enabled? /rosout has the reason'
                 self._conclude(controller, why, failed=True)
 

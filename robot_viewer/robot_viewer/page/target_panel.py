@@ -69,7 +69,7 @@ class TargetPanel:
         for name, slider in self._sliders.items():
             position = min(max(positions.get(name, slider.value), slider.min), slider.max)
             if abs(position - slider.value) > slider.step:
-                slider.value = position
+                slider.value = position  # type: ignore[misc]  # it has a setter
 
     def _moved(self, event: GuiEvent[GuiSliderHandle[float]]) -> None:
         if event.client_id is None:  # it follows its joint
