@@ -56,7 +56,7 @@ def view_process(
         return None
     return ProcessSpec(
         name='viewer',
-        argv=(*POLITE, *node_argv(VIEWER, find, _frames(ros), ros=ros)),
+        argv=(*POLITE, *node_argv(VIEWER, find, ros.frame_parameters, ros=ros)),
         environment=LOG_FORMAT,
         notifies_ready=True,
         ready_timeout=ready_timeout,
@@ -65,7 +65,3 @@ def view_process(
         stop_order=stop_order,
         stop_steps=STOP_STEPS,
     )
-
-
-def _frames(ros: RosOptions) -> dict[str, str]:
-    return {'frame_prefix': ros.frame_prefix} if ros.frame_prefix else {}
