@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
+import re
 from typing import Any, TYPE_CHECKING
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
@@ -30,6 +31,8 @@ pytestmark = pytest.mark.scenario
 
 SUCCEEDED, ABORTED = 4, 6
 TARGETS = {'left': [0.4, -0.3, 0.5], 'right': [-0.4, 0.1]}
+MIDDLE = {'left': [-1.57, 0.0, 0.0], 'right': [1.57, 0.0]}
+"""Where the arms would be in each other."""
 
 
 class Robot:
@@ -57,9 +60,9 @@ class Robot:
         self.client.spin_until(sent.done, 60.0, f'an answer of {name}')
         return sent.result().get_result_async()
 
-    def follow(self, arm: str, seconds: int) -> Any:
-        """Send an arm to its target."""
-        point = JointTrajectoryPoint(positions=TARGETS[arm])
+    def follow(self, arm: str, seconds: int, target: list[float] | None = None) -> Any:
+        """Send an arm somewhere, by default to its target."""
+        point = JointTrajectoryPoint(positions=target or TARGETS[arm])
         point.time_from_start.sec = seconds
         trajectory = JointTrajectory(joint_names=list(ARMS[arm]), points=[point])
         goal = FollowJointTrajectory.Goal(trajectory=trajectory)
@@ -94,7 +97,6 @@ def bring_up(isolation: Isolation, folder: Path, *options: str) -> Iterator[Robo
         RosClient(isolation.domain_id) as client,
     ):
         bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
-        assert bringup.output.count('groups left and right are not checked') == 1
         bringup.wait_for('collisions are checked with wheel at 0', 60.0)
         yield Robot(client)
         assert bringup.stop(30.0) == 0, bringup.output
@@ -123,6 +125,19 @@ def test_both_arms_and_the_gripper_move_at_the_same_time(robot: Robot) -> None:
 
     wanted = {f'{name}_link' for name in (*DRIVES, FOLLOWER)}
     robot.client.spin_until(lambda: frames() >= wanted, 60.0, 'frames of all joints')
+
+
+def test_arms_that_move_towards_each_other_stop_and_may_part(robot: Robot) -> None:
+    """The goal of one ends with the pair, as neither is where the other's was planned."""
+    runs = [robot.follow(arm, 4, MIDDLE[arm]) for arm in ARMS]
+    ended = [each for each in robot.results(runs) if each.status == ABORTED]
+    assert ended
+    for each in ended:
+        assert each.result.error_code == FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED
+        assert re.search('left_.*right_|right_.*left_', each.result.error_string)
+    for arm in ('right', 'left'):
+        (back,) = robot.results([robot.follow(arm, 4)])
+        assert back.status == SUCCEEDED, back.result
 
 
 def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Robot) -> None:

@@ -48,7 +48,7 @@ def write_two_arms(folder: Path) -> Path:
         _joint('left_lift', 'revolute', 'left_turn_link', '0.1 0 0.1', '0 1 0', rest=turn),
         _joint('left_roll', 'continuous', 'left_lift_link', '0.2 0 0', '1 0 0', rest=''),
         _joint('right_turn', 'revolute', 'torso', '0 -0.3 0.2', '0 0 1', rest=turn),
-        _joint('right_slide', 'prismatic', 'right_turn_link', '0.1 0 0.1', '0 0 1', rest=slide),
+        _joint('right_slide', 'prismatic', 'right_turn_link', '0.3 0 0.1', '0 0 1', rest=slide),
         _joint(GRIPPER, 'prismatic', 'left_roll_link', '0.1 0.03 0', '0 1 0', rest=finger),
         _joint(
             FOLLOWER,

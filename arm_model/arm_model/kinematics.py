@@ -69,6 +69,7 @@ class Kinematics:
         Raises:
             ModelError: The description makes no kinematic tree.
         """
+        self._tree = tree
         self._full = full = _full(tree)
         mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
         moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
@@ -119,6 +120,14 @@ class Kinematics:
         moved = copy.copy(self)
         moved._stand(others)  # noqa: SLF001  # its own copy
         return moved
+
+    def of_joints(self, joints: Sequence[str]) -> Kinematics:
+        """Return the robot with other joints moving; those that move in neither stay.
+
+        Args:
+            joints: Joints that move.
+        """
+        return Kinematics(self._tree, joints).with_others(self.others)
 
     def expanded(self, positions: Array) -> Array:
         """Return the positions of all columns.

@@ -121,11 +121,6 @@ class RobotModel:
         if self.moved_by_others:
             unknown = frozenset().union(*self.moved_by_others.values())
             self.scene = self.scene.with_allowed(self.allowed.with_entries(unknown, True))
-            notes += [
-                f'groups {" and ".join(sorted((self.group, other)))} are not checked for collision'
-                ' with each other while both move; keep them apart'
-                for other in self.moved_by_others
-            ]
         self.notes = tuple(notes)
         self._clearances = Clearances(self.scene)
         self.reach = self._reach()

@@ -311,18 +311,21 @@ def test_joints_beside_the_group_that_count_where_they_are_not_are_named() -> No
     assert 'torso at 0.2,' in raised.assumption()
 
 
-def test_arms_that_move_by_themselves_are_both_named() -> None:
-    """In the same words by either, so that they are said once; no position is assumed then."""
-    found = []
+def test_arms_that_move_by_themselves_are_left_to_a_scene() -> None:
+    """No position of the other is assumed; a scene between both has what both may bring."""
+    sides = {side: two_arms(side).joints for side in ('left', 'right')}
     for group, other in (('left', 'right'), ('right', 'left')):
-        others = {other: two_arms(other).joints}
-        model = RobotModel(*two_arms_texts(), group, moved_by_others=others)
+        model = RobotModel(*two_arms_texts(), group, moved_by_others={other: sides[other]})
         assert not any(f'{other}_1_link' in pair for pair in model.pairs)
         assert f'{other}_1' not in model.assumption()
         assert all(f'{other}_' in ' '.join(pair) for pair in model.moved_by_others[other])
-        found.append(model.notes[-1])
-    assert found[0] == found[1]
-    assert 'groups left and right are not checked' in found[0]
+        floor = CollisionObject('floor', Plane(offset=0.2))
+        whole = model.scene.with_allowed(model.allowed).with_object(floor)
+        between = whole.between(list(sides.values()))
+        assert set(between.kinematics.joints) == {*sides['left'], *sides['right']}
+        assert between.pairs
+        for pair in between.pairs:
+            assert {name.split('_')[0] for name in pair} == {'left', 'right'}
 
 
 def test_a_model_measures_in_the_scene_that_it_is_given() -> None:

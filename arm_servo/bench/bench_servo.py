@@ -21,10 +21,11 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is imported
 from moveit_servo_model import MoveitServoModel
 import numpy as np
 from servo_arms import moved as moved_by
-from servo_arms import ready, robot, ROBOTS, SPEED
+from servo_arms import ready, robot, ROBOTS, SPEED, two_pandas
 
 from arm_model import Array, RobotModel
 from arm_servo import CoreSettings, Execution, JogRequest, MotionCore, TwistCommand
+from arm_servo.core.moving_arms import MovingArms
 from arm_trajectory import GoalError, GoalPoint, PathCheck, TrajectoryGoal
 
 PERIOD = 0.01
@@ -59,6 +60,36 @@ def time_of_cycles(model: RobotModel) -> tuple[float, float]:
         begin = time.perf_counter()
         core.step(now, 0.002)
         times.append(time.perf_counter() - begin)
+    median, late = np.percentile(times, [50, 99])
+    return 1e6 * float(median), 1e6 * float(late)
+
+
+def time_of_two_arms(turn: float, *, apart: bool) -> tuple[float, float]:
+    """Return median and 99th percentile of the time of a cycle of one of two arms in [us].
+
+    Both are jogged, back and forth, each tool along and across the line between them.
+
+    Args:
+        turn: How far they are turned towards each other before in [rad].
+        apart: Whether they heed each other.
+    """
+    models = two_pandas()
+    cores, times = [MotionCore(model) for model in models], []
+    moving = MovingArms(models)
+    for core, model, sense in zip(cores, models, (-1.0, 1.0), strict=True):
+        if apart:
+            core.keep_apart(moving.neighbours(model.joints))
+        start = np.array(model.poses['ready'])
+        start[0] += sense * turn
+        core.reset(start)
+    for cycle in range(2000):
+        now = cycle * 0.002
+        sense = (-1) ** (cycle // 250)
+        for core, side in zip(cores, (-1.0, 1.0), strict=True):
+            jog(core, sense * side * np.array([0.02, 0.1, 0.0, 0.0, 0.0, 0.1]), now, 0.1)
+            begin = time.perf_counter()
+            core.step(now, 0.002)
+            times.append(time.perf_counter() - begin)
     median, late = np.percentile(times, [50, 99])
     return 1e6 * float(median), 1e6 * float(late)
 
@@ -218,6 +249,15 @@ def main() -> None:
         for label, run in (('random walk', walk), ('random poses', from_random_poses)):
             here, there = run(model, commands)
             print(f'  {label:20} {here}, {here.named} of them named; moveit_servo: {there}')
+    places = {'far apart': 0.0, 'near each other': 0.75, 'held up by each other': 0.9}
+    for label, turn in places.items():
+        alone, late_alone = time_of_two_arms(turn, apart=False)
+        median, late = time_of_two_arms(turn, apart=True)
+        print(f'two Pandas that jog, {label}')
+        print(
+            f'  cycle of one         p50 {median:.0f} us, p99 {late:.0f} us;'
+            f' without heed of the other {alone:.0f} us, {late_alone:.0f} us'
+        )
 
 
 if __name__ == '__main__':

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from functools import cache
+import re
 
 import numpy as np
 import pinocchio as pin
@@ -34,6 +35,32 @@ def texts(name: str) -> tuple[str, str]:
 def robot(name: str) -> RobotModel:
     """Return a robot."""
     return RobotModel(*texts(name), load_limits(installed_robots_folder() / name / 'limits.yaml'))
+
+
+def two_pandas() -> list[RobotModel]:
+    """Return two Pandas of one robot side by side, 0.8 m apart, which move by themselves."""
+    table = load_limits(installed_robots_folder() / 'panda' / 'limits.yaml')
+    descriptions, semantics, limits = [], [], dict[str, dict[str, float]]()
+    for side, place in (('left', 0.4), ('right', -0.4)):
+        urdf, srdf = (
+            re.sub(r'"panda_', f'"{side}_', text.partition('<robot ')[2].partition('>')[2])
+            .removesuffix('\n')
+            .removesuffix('</robot>')
+            for text in texts('panda')
+        )
+        descriptions.append(
+            f'{urdf}<joint name="{side}_base" type="fixed"><origin xyz="0 {place} 0"/>'
+            f'<parent link="base"/><child link="{side}_link0"/></joint>'
+        )
+        semantics.append(srdf)
+        limits |= {name.replace('panda_', f'{side}_'): entry for name, entry in table.items()}
+    whole = f'<robot name="two"><link name="base"/>{"".join(descriptions)}</robot>'
+    groups = f'<robot name="two">{"".join(semantics)}</robot>'
+    joints = {side: [f'{side}_joint{n}' for n in range(1, 8)] for side in ('left', 'right')}
+    return [
+        RobotModel(whole, groups, limits, f'{side}_arm', moved_by_others={other: joints[other]})
+        for side, other in (('left', 'right'), ('right', 'left'))
+    ]
 
 
 def ready(name: str) -> Array:

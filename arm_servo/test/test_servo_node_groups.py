@@ -10,7 +10,7 @@ from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, Plann
 import pytest
 from sensor_msgs.msg import JointState
 from servo_commands import jog
-from servo_drives import Drives
+from servo_drives import Drives, PERIOD
 from servo_scenes import Listener
 
 from arm_model import CommandError, RobotModel
@@ -78,11 +78,12 @@ class Robot:
         self.listener.made._take_joints(JointState(name=['gate'], position=[position]))
 
     def run(self, seconds: float) -> None:
-        """Let time pass: ten cycles between two looks."""
-        for _ in range(round(seconds / 0.1)):
+        """Let time pass: ten cycles of both between two looks."""
+        for cycle in range(round(seconds / PERIOD)):
             for drives in self.arms.values():
-                drives.run(10)
-            self.listener.run(0.1)
+                drives.run()
+            if cycle % 10 == 9:
+                self.listener.run(0.1)
 
     def scene(self, side: str = 'left') -> object:
         """Return the scene that counts for an arm."""

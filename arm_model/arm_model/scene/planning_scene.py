@@ -271,6 +271,31 @@ class PlanningScene:
             self.attached_bodies.values(),
         )
 
+    def between(self, groups: Sequence[Sequence[str]]) -> PlanningScene:
+        """Return what groups that move at the same time may bring together.
+
+        Its joints are those of all the groups. Only pairs are checked that joints of more than one
+        of them move against each other; objects of the world, which no two groups move, are left
+        out.
+
+        Args:
+            groups: Joints of each group; no joint is in two.
+        """
+        kinematics = self.kinematics.of_joints([joint for group in groups for joint in group])
+        shapes, attached = self.link_shapes, self.attached_bodies.values()
+        whole = PlanningScene(kinematics, shapes, self.allowed, (), attached)
+        moved = whole.distance_rate_bounds > 0.0
+        owners = np.array(
+            [
+                moved[:, [name in group for name in kinematics.joints]].any(axis=1)
+                for group in groups
+            ]
+        )
+        alone = (owners.sum(axis=0) < 2).nonzero()[0].tolist()
+        return whole.with_allowed(
+            self.allowed.with_entries((frozenset(whole.pairs[pair]) for pair in alone), True)
+        )
+
     def with_allowed(self, allowed: AllowedCollisionMatrix) -> PlanningScene:
         """Return the scene with another matrix of what may touch.
 

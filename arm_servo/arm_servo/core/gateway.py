@@ -20,6 +20,7 @@ from arm_trajectory import GoalCode
 from ..exceptions import NotReadyError
 from .motion_core import MotionCore
 from .motion_queue import MotionCommand, MotionQueue
+from .moving_arms import Neighbours
 from .orders import CommandOrder, Cycle, OrderQueue
 from .requests import ImmediateRequest, JogRequest, MotionRequest, PauseRequest, StopRequest
 from .scene_exchange import SceneExchange
@@ -168,6 +169,14 @@ class CommandGateway:
         reference = self._snapshot.reference
         return self._scenes.use(scene, None if reference is None else reference.position)
 
+    def keep_apart(self, neighbours: Neighbours) -> None:
+        """Heed from now on how other arms of the robot move; before the first cycle.
+
+        Args:
+            neighbours: The other arms.
+        """
+        self._core.keep_apart(neighbours)
+
     def begin(self, positions: Array) -> None:
         """Begin to command the arm where it stands.
 
@@ -242,6 +251,7 @@ class CommandGateway:
         """
         if self._snapshot.set_point is not None:
             self._order.void(MOTIONS, blocked)
+        self._core.stands(measured)
         self._core.abandon(blocked)  # it ended at the latest when the arm came to rest
         self._motions.report_ends()
         self._orders.carry_out(Cycle(now, self._snapshot.period, blocked))

@@ -33,6 +33,7 @@ from ..report import Cause, Limiter
 from .arbiter import CommandArbiter, Motion
 from .commands import in_base
 from .execution import Execution, Feedback
+from .moving_arms import Neighbours
 from .outcome import Outcome
 from .preparation import CommandBasis, Preparation, Prepared
 from .prepared_scene import PreparedScene
@@ -50,6 +51,9 @@ from .settings import CoreSettings
 
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
+
+ARM_DISTANCE = 0.005
+"""Least distance to another arm that moves, for what is no jog, in [m]."""
 
 MAX_JOINTS = 8
 """Joints of the longest chain that is jogged."""
@@ -194,6 +198,22 @@ class MotionCore:
         self._state = RobotState.at_rest(where)
         self._filter.reset(self._state)
 
+    def keep_apart(self, neighbours: Neighbours) -> None:
+        """Heed from now on how other arms of the robot move; before the first step.
+
+        Args:
+            neighbours: The other arms.
+        """
+        self._filter.keep_apart(neighbours)
+
+    def stands(self, measured: RobotState | None) -> None:
+        """Pass a cycle in which something else has the drives; other arms heed where it is.
+
+        Args:
+            measured: Measured state; None while it is not known.
+        """
+        self._filter.stands(measured)
+
     def prepare_scene(
         self, scene: PlanningScene, version: int, near: Array | None
     ) -> PreparedScene:
@@ -334,7 +354,10 @@ class MotionCore:
             speed_scaling=self.speed_scaling,
             paused=self._paused,
         )
-        after, limiter = self._filter.step(state, wanted, period, self._clearance(state))
+        clearance = self._clearance(state)
+        after, limiter = self._filter.step(
+            state, wanted, period, clearance, now=now, apart=self._apart
+        )
         self._state = after
         if limiter is not None:
             report = report.with_limiter(limiter)
@@ -361,11 +384,23 @@ class MotionCore:
             return None
         return 0.0
 
+    @property
+    def _apart(self) -> float | None:
+        """The distance that other arms must keep on a stop of all in [m]; None is any."""
+        if self._loose:
+            return self._settings.clearance
+        return ARM_DISTANCE if self._settings.check_self_collision else None
+
     def _give_up(self, limiter: Limiter, *, is_at_rest: bool) -> None:
         """End a motion that the safety filter does not let go on; the arm comes to rest."""
         is_target, code = self.source is Source.TARGET, GoalCode.PATH_TOLERANCE_VIOLATED
         if limiter.cause is Cause.COLLISION:
-            if is_target:
+            if self._filter.is_near_neighbour:
+                where = (
+                    'with another arm that moves; begin when that is out of the way, or plan both'
+                    ' together'
+                )
+            elif is_target:
                 where = 'on the way to the target from where the arm is; go around that'
             elif self._unchecked is self.execution:
                 where = 'on the trajectory: the scene changed; lead it around that'

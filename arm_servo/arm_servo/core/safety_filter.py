@@ -4,12 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from arm_model import Array, LeastClearance, Mask, RobotModel, RobotState
 from arm_trajectory import hard_brake, OnlineTrajectoryGenerator, Plan
 
 from ..report import Cause, Limiter
+from .moving_arms import Neighbours
+
+LeastOnStop = Callable[[Plan, float, float], LeastClearance]
+"""Measures a stop, of its begin in [s] and the distance of interest in [m]."""
 
 CONTACT_TOLERANCE = 1e-4
 """Change of a distance that is let pass, in all, in [m]: sliding along is no approach."""
@@ -22,6 +29,75 @@ MAX_STRIDE = 0.1
 
 ROUNDING_TOLERANCE = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
+
+
+class ClearanceFloor:
+    """How near links may come on a stop: as near as asked, or as they cannot help.
+
+    Links that are nearer than they should be may stay as they are, not come nearer.
+    """
+
+    def __init__(self, least: LeastOnStop, brake: Callable[[RobotState], Plan | None]) -> None:
+        """Begin with nothing known.
+
+        Args:
+            least: Measures stops.
+            brake: Plans the shortest stop of a state.
+        """
+        self._least, self._brake = least, brake
+        self._clearance = 0.0  # for which the floor was found
+        self._floor: float | None = None
+
+    def forget(self) -> None:
+        """Measure anew how near links may be."""
+        self._floor = None
+
+    def too_near(
+        self, stop: Plan, begin: float, state: RobotState, now: float, clearance: float | None
+    ) -> LeastClearance | None:
+        """Return which links a stop would bring too near, and how near; None for none.
+
+        Args:
+            stop: The stop.
+            begin: Steady time of its begin in [s].
+            state: The state that is not left yet.
+            now: Steady time of that in [s].
+            clearance: Least distance between links in [m]; None is any.
+        """
+        if clearance is None:
+            self._floor = None
+            return None
+        if clearance != self._clearance:
+            self._clearance, self._floor = clearance, None
+        if self._floor is None:
+            present = self._brake(state)
+            self._floor = clearance if present is None else self._distance(present, now)
+            self._floor = min(self._floor, clearance)
+        near = self._least(stop, begin, clearance)
+        if near.distance < self._floor - CONTACT_TOLERANCE:
+            # what stopping now brings about cannot be had better
+            present = self._brake(state)
+            least = self._floor - CONTACT_TOLERANCE
+            least = least if present is None else min(self._floor, self._distance(present, now))
+            self._floor = min(self._floor, least + CONTACT_TOLERANCE)
+        if near.distance < self._floor - CONTACT_TOLERANCE - ROUNDING_TOLERANCE:
+            return near
+        self._floor = max(self._floor, min(near.distance, clearance))
+        return None
+
+    def allows(self, plan: Plan, begin: float) -> bool:
+        """Whether links stay apart on another stop than the one that was looked at last.
+
+        Args:
+            plan: The stop.
+            begin: Steady time of its begin in [s].
+        """
+        if self._floor is None:
+            return True
+        return self._distance(plan, begin) >= self._floor - CONTACT_TOLERANCE
+
+    def _distance(self, plan: Plan, begin: float) -> float:
+        return self._least(plan, begin, self._clearance).distance
 
 
 class SafetyFilter:
@@ -42,12 +118,34 @@ class SafetyFilter:
         self._model = model
         self._limits = model.limits
         self._generator = generator
-        self._clearance = 0.0  # for which the floor was found
         self._lower: Array = model.limits.lower
         self._upper: Array = model.limits.upper
         self._anywhere: Array = np.full(len(model), np.inf)
-        self._floor: float | None = None
+        self._floor = ClearanceFloor(self._least, generator.brake)
         self._fastest: Array = model.limits.velocity * (1.0 + 1e-6)
+        self._neighbours: Neighbours | None = None
+        self._apart = self._floor
+        self._version = 0
+        self.is_near_neighbour = False
+
+    def keep_apart(self, neighbours: Neighbours) -> None:
+        """Heed from now on how other arms move.
+
+        Args:
+            neighbours: The other arms.
+        """
+        self._neighbours = neighbours
+        self._apart = ClearanceFloor(neighbours.least, self._generator.brake)
+
+    def stands(self, state: RobotState | None) -> None:
+        """Let other arms know where the arm is while something else has its drives.
+
+        Args:
+            state: Its state; None while it is not known.
+        """
+        if self._neighbours is not None:
+            with self._neighbours.lock:
+                self._neighbours.stands(state)
 
     def reset(self, state: RobotState) -> None:
         """Begin at a state.
@@ -57,16 +155,25 @@ class SafetyFilter:
         """
         stop = self._generator.brake(state)
         self._lower, self._upper = -self._anywhere, self._anywhere
-        self._floor = None
+        self._floor.forget()
+        self._apart.forget()
+        self.stands(state)
         if stop is not None:
             self._remember(stop)
 
     def forget(self) -> None:
         """Measure anew how near links may be: what may collide has changed."""
-        self._floor = None
+        self._floor.forget()
 
     def step(
-        self, state: RobotState, wanted: RobotState, period: float, clearance: float | None
+        self,
+        state: RobotState,
+        wanted: RobotState,
+        period: float,
+        clearance: float | None,
+        *,
+        now: float = 0.0,
+        apart: float | None = None,
     ) -> tuple[RobotState, Limiter | None]:
         """Let a step pass, or brake instead.
 
@@ -76,26 +183,47 @@ class SafetyFilter:
             period: Its length in [s].
             clearance: Least distance between links on a stop in [m]; None where what moves the
                 arm keeps to a path that was checked.
+            now: Steady time in [s].
+            apart: Least distance to other arms that move, while all stop, in [m]; None is any.
 
         Returns:
             The state to command, and what held the wanted one up.
         """
-        beyond, stop = self._beyond(wanted)
-        limiter = None
-        if beyond.any():  # these joints brake, each for itself; the others go on
-            limiter = self._limit(wanted, int(np.argmax(beyond)))
-            wanted = _mixed(beyond, self._brake(state, period), wanted)
+        with self._turn():
             beyond, stop = self._beyond(wanted)
-        if stop is not None and not beyond.any():
-            near = self._too_near(stop, state, clearance)
-            if near is None:
-                self._remember(stop)
-                return wanted, limiter
-            limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
-            eased = self._eased(state, period)
-            if eased is not None:
-                return eased, limiter
-        return self._brake(state, period), limiter
+            limiter, end = None, now + period
+            self.is_near_neighbour = False
+            if beyond.any():  # these joints brake, each for itself; the others go on
+                limiter = self._limit(wanted, int(np.argmax(beyond)))
+                wanted = _mixed(beyond, self._brake(state, period, now), wanted)
+                beyond, stop = self._beyond(wanted)
+            if stop is not None and not beyond.any():
+                near = self._floor.too_near(stop, end, state, now, clearance)
+                if near is None and self._neighbours is not None:
+                    near = self._apart.too_near(stop, end, state, now, apart)
+                    self.is_near_neighbour = near is not None
+                if near is None:
+                    self._remember(stop)
+                    self._announce(stop, end)
+                    return wanted, limiter
+                limiter = Limiter(Cause.COLLISION, ' - '.join(near.links), near.distance, 0.0)
+                eased = self._eased(state, period, now)
+                if eased is not None:
+                    return eased, limiter
+            return self._brake(state, period, now), limiter
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        """Look at other arms, if there are any, while none of them steps in another thread."""
+        neighbours = self._neighbours
+        if neighbours is None:
+            yield
+            return
+        with neighbours.lock:
+            if neighbours.version != self._version:
+                self._version = neighbours.version
+                self._apart.forget()
+            yield
 
     def _beyond(self, wanted: RobotState) -> tuple[Mask, Plan | None]:
         """Return which joints could not stop any more within their limits, and how all would."""
@@ -127,64 +255,42 @@ class SafetyFilter:
         self._lower = np.minimum(self._limits.lower, np.maximum(self._lower, lower))
         self._upper = np.maximum(self._limits.upper, np.minimum(self._upper, upper))
 
-    def _too_near(
-        self, stop: Plan, state: RobotState, clearance: float | None
-    ) -> LeastClearance | None:
-        """Return which links a stop would bring too near, and how near; None for none.
+    def _announce(self, stop: Plan, begin: float) -> None:
+        """Let other arms know how this one would come to rest now."""
+        if self._neighbours is not None:
+            self._neighbours.stops(stop, begin)
 
-        Links that are nearer than they should be may stay as they are, not come nearer.
-        """
-        if clearance is None:
-            self._floor = None
-            return None
-        if clearance != self._clearance:
-            self._clearance, self._floor = clearance, None
-        if self._floor is None:
-            now = self._generator.brake(state)
-            self._floor = clearance if now is None else self._least(now).distance
-            self._floor = min(self._floor, clearance)
-        near = self._least(stop)
-        if near.distance < self._floor - CONTACT_TOLERANCE:
-            # what stopping now brings about cannot be had better
-            now = self._generator.brake(state)
-            least = self._floor - CONTACT_TOLERANCE
-            least = least if now is None else min(self._floor, self._least(now).distance)
-            self._floor = min(self._floor, least + CONTACT_TOLERANCE)
-        if near.distance < self._floor - CONTACT_TOLERANCE - ROUNDING_TOLERANCE:
-            return near
-        self._floor = max(self._floor, min(near.distance, clearance))
-        return None
-
-    def _least(self, stop: Plan) -> LeastClearance:
+    def _least(self, stop: Plan, _begin: float, clearance: float) -> LeastClearance:
         """Return the least distance between links on a stop, if it is small."""
-        if self._model.stays_apart(*stop.extremes, self._clearance):
-            return LeastClearance(self._clearance)
+        if self._model.stays_apart(*stop.extremes, clearance):
+            return LeastClearance(clearance)
         way = np.ptp(np.stack(stop.extremes), axis=0).sum()
         looks = min(max(MIN_SAMPLES, round(way / MAX_STRIDE)), MAX_SAMPLES)
         times = np.linspace(0.0, stop.duration, looks + 1)[1:].tolist()
         places = np.array([stop.at(time).position for time in times])
-        return self._model.least_clearance(places, self._clearance)
+        return self._model.least_clearance(places, clearance)
 
-    def _eased(self, state: RobotState, period: float) -> RobotState | None:
+    def _eased(self, state: RobotState, period: float, now: float) -> RobotState | None:
         """Brake with the joints in step, which keeps the direction, where that is clear too."""
         plan = self._generator.to_velocity(state, np.zeros(len(self._limits)))
-        if plan is None or self._floor is None or period >= plan.duration:
+        if plan is None or period >= plan.duration:
             return None
         after = plan.at(period)
         beyond, stop = self._beyond(after)
-        if (
-            stop is None
-            or beyond.any()
-            or self._least(plan).distance < self._floor - CONTACT_TOLERANCE
-        ):
+        if stop is None or beyond.any() or not self._floor.allows(plan, now):
             return None
+        if self._neighbours is not None:
+            if not (self._apart.allows(plan, now) and self._apart.allows(stop, now + period)):
+                return None
+            self._announce(stop, now + period)
         self._remember(stop)
         return after
 
-    def _brake(self, state: RobotState, period: float) -> RobotState:
+    def _brake(self, state: RobotState, period: float, now: float) -> RobotState:
         stop = self._generator.brake(state)
         if stop is None:
             return hard_brake(state, self._limits, period)
+        self._announce(stop, now)
         if period >= stop.duration:
             return RobotState.at_rest(stop.at(stop.duration).position)
         return stop.at(period)

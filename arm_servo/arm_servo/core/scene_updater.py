@@ -3,7 +3,7 @@
 """The scene of one group: what a planner publishes, with the joints beside it where they are.
 
 A group that moves by itself (another arm) is checked against where it came to rest; while it
-moves, links that it moves are not checked. Other joints beside the group (a gripper, a neck, a
+moves, :class:`MovingArms` keeps the two apart. Other joints beside the group (a gripper, a neck, a
 lift) are checked where they are, or were half a second ago.
 """
 
@@ -19,6 +19,7 @@ from arm_model import Array, PlanningScene
 
 from .gateway import CommandGateway
 from .joint_places import JointPlaces, PLACE_TOLERANCE
+from .moving_arms import MovingArms
 
 SceneChange = Callable[[PlanningScene, Array], PlanningScene]
 """Makes a scene of the one before and the positions of the group's joints in [rad]."""
@@ -36,14 +37,21 @@ class SceneUpdater:
         gateway: Commands to the core of the group.
     """
 
-    def __init__(self, gateway: CommandGateway, arms: Mapping[str, Sequence[str]]) -> None:
+    def __init__(
+        self,
+        gateway: CommandGateway,
+        arms: Mapping[str, Sequence[str]],
+        moving: MovingArms | None = None,
+    ) -> None:
         """Begin with the scene of the model.
 
         Args:
             gateway: Commands to the core of the group.
             arms: Joints of the arms that move by themselves, by group.
+            moving: Those arms while they move, where this group brings them their scene.
         """
         self.gateway = gateway
+        self._moving = moving
         model = gateway.model
         self._scene = self._planned = model.scene
         self._moved_by_others = model.moved_by_others
@@ -101,6 +109,8 @@ class SceneUpdater:
         )
         if planned is self._planned and unchecked == self._unchecked:
             return
+        if self._moving is not None:
+            self._moving.use_scene(planned)
         self._planned, self._unchecked = planned, unchecked
         scene = planned
         if unchecked:

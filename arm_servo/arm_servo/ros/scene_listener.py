@@ -21,6 +21,7 @@ from node_runner import LATCHED
 
 from ..core.gateway import CommandGateway
 from ..core.joint_places import JointPlaces
+from ..core.moving_arms import MovingArms
 from ..core.scene_updater import SceneUpdater
 from ..core.set_point import Source
 
@@ -35,6 +36,24 @@ PLACE_TIMEOUT = 1.0
 
 OTHERS_TIMEOUT = 5.0
 """Time for which joints beside a group are awaited without a warning in [s]."""
+
+
+def keep_apart(gateways: Sequence[CommandGateway]) -> MovingArms | None:
+    """Have arms that move by themselves heed each other; before their first cycles.
+
+    Args:
+        gateways: Commands to the core of each group.
+
+    Returns:
+        What they know of each other; None where there is one arm.
+    """
+    arms = [gateway for gateway in gateways if gateway.model.moved_by_others]
+    if not arms:
+        return None
+    moving = MovingArms([gateway.model for gateway in arms])
+    for gateway in arms:
+        gateway.keep_apart(moving.neighbours(gateway.model.joints))
+    return moving
 
 
 class SceneListener:
@@ -67,7 +86,11 @@ class SceneListener:
         self._node, self._clock = node, clock
         self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='scenes')
         arms = {gateway.model.group: gateway.model.joints for gateway in gateways}
-        self._updaters = [SceneUpdater(gateway, arms) for gateway in gateways]
+        moving = keep_apart(gateways)
+        self._updaters = [
+            SceneUpdater(gateway, arms, None if number else moving)
+            for number, gateway in enumerate(gateways)
+        ]
         self._gateways = [*gateways, *unchecked]
         self._received = clock()
         self._unplaced = list(self._updaters)  # those of which no warning has said so

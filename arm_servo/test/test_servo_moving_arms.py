@@ -1,0 +1,302 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Two arms that move at the same time stay apart, whatever each is asked to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cache
+import math
+
+import numpy as np
+import pytest
+
+from arm_model import (
+    ArmError,
+    AttachedBody,
+    Box,
+    CollisionObject,
+    PlanningScene,
+    Pose,
+    RobotModel,
+    RobotState,
+)
+from arm_servo import JogRequest, MotionCore, Outcome, SetPoint
+from arm_servo.core.commands import by_joint
+from arm_servo.core.moving_arms import MovingArms
+from arm_servo.core.requests import TargetRequest
+from arm_servo.jog.servo_source import JointCommand
+from arm_trajectory import GoalCode, GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
+
+PERIOD = 0.01
+CLEARANCE = 0.005
+"""What jogs keep from other links by default, and all else from arms that move, in [m]."""
+TOLERANCE = 2e-4
+ARMS = {'left': ('left_1', 'left_2'), 'right': ('right_1', 'right_2')}
+OUT = (0.9, 0.0)
+"""Away from the other arm."""
+
+
+def _joint(name: str, parent: str, xyz: str) -> str:
+    return (
+        f'<link name="{name}_link"><collision><origin xyz="0.15 0 0"/><geometry>'
+        f'<box size="0.3 0.04 0.04"/></geometry></collision></link><joint name="{name}" '
+        f'type="revolute"><parent link="{parent}"/><child link="{name}_link"/>'
+        f'<origin xyz="{xyz}"/><axis xyz="0 0 1"/>'
+        '<limit lower="-2.5" upper="2.5" velocity="2" effort="1"/></joint>'
+    )
+
+
+@cache
+def texts() -> tuple[str, str]:
+    """Return two arms of two joints that meet in one plane."""
+    joints = [
+        _joint(name, f'{side}_1_link' if number else 'base', '0.32 0 0' if number else place)
+        for side, place in (('left', '0 0.35 0'), ('right', '0 -0.35 0'))
+        for number, name in enumerate(ARMS[side])
+    ]
+    chains = {
+        side: f'<chain base_link="base" tip_link="{names[-1]}_link"/>'
+        for side, names in ARMS.items()
+    }
+    groups = ''.join(f'<group name="{side}">{chain}</group>' for side, chain in chains.items())
+    groups += ''.join(f'<group name="{n}"><joint name="{n}"/></group>' for n in ARMS['right'])
+    both = '<group name="both"><group name="left"/><group name="right"/></group>'
+    touching = ''.join(
+        f'<disable_collisions link1="{one}_link" link2="{other}_link"/>'
+        for one, other in ARMS.values()
+    )
+    return (
+        f'<robot name="two"><link name="base"/>{"".join(joints)}</robot>',
+        f'<robot name="two">{groups}{both}{touching}</robot>',
+    )
+
+
+def model(group: str, others: Mapping[str, Sequence[str]] | None = None) -> RobotModel:
+    """Return one arm, or both."""
+    names = [name for arm in ARMS.values() for name in arm]
+    limits = {name: {'max_acceleration': 5.0, 'max_jerk': 50.0} for name in names}
+    return RobotModel(*texts(), limits, group, moved_by_others=others)
+
+
+class Pair:
+    """Both arms, each under a core of its own.
+
+    Attributes:
+        cores: The cores.
+        moving: What they know of each other.
+        points: The last set-point of each.
+        nearest: Least distance of the two so far in [m].
+        now: Steady time in [s].
+    """
+
+    def __init__(self, left: Sequence[float] = OUT, right: Sequence[float] = OUT) -> None:
+        """Let them stand somewhere; the right one turns the other way."""
+        self.cores = {
+            'left': MotionCore(model('left', {'right': ARMS['right']})),
+            'right': MotionCore(model('right', {'left': ARMS['left']})),
+        }
+        self.moving = MovingArms([core.model for core in self.cores.values()])
+        self._whole = model('both')
+        assert self._whole.joints == (*ARMS['left'], *ARMS['right'])
+        for core in self.cores.values():
+            core.keep_apart(self.moving.neighbours(core.model.joints))
+        self.cores['left'].reset(left)
+        self.cores['right'].reset([-place for place in right])
+        self.points: dict[str, SetPoint] = {}
+        self.now, self.nearest = 10.0, math.inf
+
+    def jog(self, side: str, *velocities: float) -> None:
+        """Jog the joints of an arm from now on, for a minute at most."""
+        core = self.cores[side]
+        numbers = dict(zip(ARMS[side], velocities, strict=True))
+        command = JointCommand(*by_joint(core.model, numbers, 'velocities'))
+        core.commit(core.prepare(JogRequest(command, self.now + 60.0)), self.now)
+
+    def go(self, side: str, positions: Sequence[float], seconds: float) -> None:
+        """Let an arm follow a trajectory."""
+        core = self.cores[side]
+        goal = TrajectoryGoal(core.model.joints, [GoalPoint(seconds, positions)])
+        core.commit(core.prepare(goal, core.basis), self.now)
+
+    def at(self, side: str) -> np.ndarray:
+        """Return where an arm is commanded to be."""
+        return self.cores[side].state.position
+
+    def distance(self) -> float:
+        """Return the distance of the two arms where they are, by all shapes of the robot."""
+        return self._whole.clearance(np.concatenate([self.at('left'), self.at('right')]))
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds / PERIOD)):
+            for side, core in self.cores.items():
+                self.points[side] = core.step(self.now, PERIOD)
+            self.now += PERIOD
+            self.nearest = min(self.nearest, self.distance())
+
+    def named(self, side: str) -> str:
+        """Return what limits an arm."""
+        return str(self.points[side].report)
+
+    def ending(self, side: str) -> Outcome:
+        """Return how the trajectory of an arm has ended."""
+        execution = self.cores[side].execution
+        assert execution is not None
+        assert execution.ending is not None
+        return execution.ending
+
+
+def rests(pair: Pair) -> bool:
+    """Whether both arms stand."""
+    return not any(core.state.moving for core in pair.cores.values())
+
+
+def test_jogs_towards_each_other_stop_and_may_part() -> None:
+    """Both name the pair; neither touches; away from each other they go at once."""
+    pair = Pair()
+    pair.jog('left', -0.8, 0.0)
+    pair.jog('right', 0.8, 0.0)
+    pair.run(4.0)
+    assert rests(pair)
+    for side in ARMS:
+        assert 'collision: ' in pair.named(side)
+        assert {'left', 'right'} <= {word.split('_')[0] for word in pair.named(side).split()}
+    assert CLEARANCE - TOLERANCE <= pair.nearest < 0.03
+    met = pair.at('left').copy()
+    pair.jog('left', 0.8, 0.0)
+    pair.run(0.5)
+    assert pair.at('left')[0] > met[0] + 0.2
+    assert pair.named('left') == 'free'
+
+
+def test_trajectories_towards_each_other_end_before_they_touch() -> None:
+    """With the pair; at least one of them, and both come to rest."""
+    pair = Pair()
+    pair.go('left', [-0.9, 0.0], 2.0)
+    pair.go('right', [0.9, 0.0], 2.0)
+    pair.run(4.0)
+    assert rests(pair)
+    endings = [pair.ending(side) for side in ARMS]
+    ended = [each for each in endings if each.code is GoalCode.PATH_TOLERANCE_VIOLATED]
+    assert ended, endings
+    assert all('left_' in each.reason and 'right_' in each.reason for each in ended)
+    assert all('another arm that moves' in each.reason for each in ended)
+    assert pair.nearest >= CLEARANCE - TOLERANCE
+
+
+def test_a_trajectory_behind_an_arm_that_gives_way_is_not_held_up() -> None:
+    """What counts is where the other is at the same time, not where it was."""
+    pair = Pair(left=(-0.2, 0.0), right=(0.6, 0.0))
+    assert pair.distance() > 0.0
+    pair.go('left', [0.9, 0.0], 2.0)
+    pair.go('right', [0.2, 0.0], 2.0)
+    pair.run(3.0)
+    assert [pair.ending(side).code for side in ARMS] == [GoalCode.SUCCESSFUL] * 2
+    assert pair.at('right')[0] == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_target_ends_where_another_arm_comes_in_its_way() -> None:
+    """Single targets are as jogs and trajectories."""
+    pair = Pair(right=(0.1, 0.0))
+    left = pair.cores['left']
+    prepared = left.prepare(TargetRequest({'left_1': -0.9}), left.basis)
+    left.commit(prepared, pair.now)
+    pair.jog('right', 0.8, 0.0)
+    pair.run(4.0)
+    assert rests(pair)
+    assert pair.nearest >= CLEARANCE - TOLERANCE
+    assert pair.at('left')[0] > -0.9 + 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('seed', range(4))
+def test_arms_that_are_moved_at_random_never_touch(seed: int) -> None:
+    """By jogs and trajectories that change in the middle of each other."""
+    rng = np.random.default_rng(seed)
+    pair = Pair(left=(0.5, 0.0), right=(0.5, 0.0))
+    held_up = 0
+    for _ in range(10):
+        for side, inwards in (('left', -1.0), ('right', 1.0)):
+            if rng.random() < 0.7:
+                pair.jog(side, inwards * rng.uniform(-0.8, 2.0), rng.uniform(-2.0, 2.0))
+            else:
+                with suppress(ArmError):  # too fast from where it is
+                    pair.go(side, [inwards * rng.uniform(-0.2, 1.2), rng.uniform(-1, 1)], 1.5)
+        for _ in range(rng.integers(1, 6)):
+            pair.run(0.1)
+            held_up += any('collision: ' in pair.named(side) for side in ARMS)
+    assert held_up  # they did meet
+    assert pair.nearest >= CLEARANCE - TOLERANCE
+
+
+def test_an_arm_of_which_nothing_is_known_does_not_hold_up_the_others() -> None:
+    """Whatever else it would move is left out, and nothing else."""
+    pair = Pair()
+    groups = ('left', 'right_1', 'right_2')
+    arms = [model(group) for group in groups]
+    moving = MovingArms(arms)
+    left, first, second = (moving.neighbours(arm.joints) for arm in arms)
+    first.stands(RobotState.at_rest(np.array([0.3])))
+    state = RobotState.at_rest(np.array([-0.3, 0.0]))
+    stop = OnlineTrajectoryGenerator(pair.cores['left'].model.limits).brake(state)
+    assert stop is not None
+    assert set(left.least(stop, 0.0, 1.0).links) == {'left_2_link', 'right_1_link'}
+    second.stands(RobotState.at_rest(np.array([0.0])))
+    assert set(left.least(stop, 0.0, 1.0).links) == {'left_2_link', 'right_2_link'}
+
+
+@pytest.mark.parametrize('is_known', [True, False])
+def test_an_arm_whose_drives_others_have_counts_where_it_is(is_known: bool) -> None:
+    """Also while these move it; an arm whose place is not known does not count."""
+    pair = Pair()
+    left, right = pair.cores['left'], pair.cores['right']
+    pair.jog('left', -0.8, 0.0)
+    for cycle in range(300):
+        place = RobotState.at_rest(np.array([0.2 + 0.001 * cycle, 0.0]))
+        right.stands(place if is_known else None)
+        point = left.step(pair.now, PERIOD)
+        pair.now += PERIOD
+    assert ('right_' in str(point.report)) == is_known
+    assert left.state.moving != is_known
+
+
+def scene(pair: Pair) -> PlanningScene:
+    """Return the scene of the left arm in which the right one is checked."""
+    arm = pair.cores['left'].model
+    return arm.scene.with_allowed(arm.allowed)
+
+
+def test_arms_may_touch_where_the_scene_allows_it() -> None:
+    """As a planner has it that lets one take something from the other."""
+    pair = Pair()
+    pair.moving.use_scene(scene(pair).allowing('left_*', 'right_*'))
+    pair.jog('left', -0.8, 0.0)
+    pair.jog('right', 0.8, 0.0)
+    pair.run(2.0)
+    assert pair.nearest < 0.0
+
+
+def test_what_an_arm_holds_counts() -> None:
+    """It is named, and kept from the other arm."""
+    pair = Pair()
+    end = Pose(np.eye(3), np.array([0.28, 0.0, 0.0]))
+    held = CollisionObject('bar', Box(0.04, 0.3, 0.04), pose=end)
+    body = AttachedBody(held, 'left_2_link', frozenset({'left_1_link'}))
+    pair.moving.use_scene(scene(pair).with_attached(body))
+    pair.jog('left', -0.8, 0.0)
+    pair.jog('right', 0.8, 0.0)
+    pair.run(4.0)
+    assert 'bar' in pair.named('left') or 'bar' in pair.named('right')
+    assert pair.nearest > 0.03
+
+
+def test_only_pairs_that_both_arms_move_are_measured() -> None:
+    """All else is in the scenes of each arm already; objects of the world are."""
+    arm = model('left', {'right': ARMS['right']})
+    floor = CollisionObject('floor', Box(1.0, 1.0, 0.1))
+    whole = arm.scene.with_allowed(arm.allowed).with_object(floor)
+    pairs = whole.between(list(ARMS.values())).pairs
+    assert len(pairs) == 4
+    assert all(one.split('_')[0] != other.split('_')[0] for one, other in pairs)
