@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 
 from moveit_msgs.msg import AllowedCollisionEntry, AllowedCollisionMatrix, PlanningScene
+import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
 from servo_commands import jog
@@ -136,6 +137,28 @@ def test_a_joint_without_a_group_counts_where_its_joint_states_have_it(gate: flo
     else:
         with pytest.raises(CommandError, match='left_link and gate_link would collide'):
             command.future.result(0.0)
+
+
+@pytest.mark.parametrize('is_allowed', [True, False])
+def test_arms_that_both_move_meet_only_where_the_scene_of_the_planner_lets_them(
+    is_allowed: bool,
+) -> None:
+    """Each stops in front of the other, and names it."""
+    robot = Robot()
+    entries = [AllowedCollisionEntry(enabled=[is_allowed] * 2) for _ in ARMS]
+    names = [f'{side}_link' for side in ARMS]
+    matrix = AllowedCollisionMatrix(entry_names=names, entry_values=entries)
+    robot.listener.take(PlanningScene(allowed_collision_matrix=matrix))
+    robot.run(0.2)
+    for side, velocity in (('left', -0.5), ('right', 0.5)):
+        jog(robot.arms[side].gateway, {side: velocity}, robot.arms[side].now, 30.0)
+    robot.run(3.2)
+    here = {side: robot.at(side) for side in ARMS} | {'gate': 1.0}
+    distance = RobotModel(*texts(), 'left').with_others(here).clearance(np.array([here['left']]))
+    point = robot.arms['left'].gateway.snapshot.set_point
+    assert point is not None
+    assert ('right_link' in str(point.report)) != is_allowed
+    assert (distance > 0.0) != is_allowed
 
 
 def test_arms_that_move_at_the_same_time_are_checked_once_one_rests() -> None:
