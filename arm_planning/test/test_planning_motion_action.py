@@ -16,7 +16,7 @@ from moveit_msgs.msg import RobotState, RobotTrajectory
 import pytest
 from ros_client import RosClient
 
-from arm_planning import PlanningCode
+from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros.background import Background
 from arm_planning.ros.execution import Done, INVALIDATED
 from arm_planning.ros.motion_action import MotionAction, sequence, single_motion
@@ -33,6 +33,7 @@ class Bench:
         self.client = client
         self.plans = 0
         self.stops = True
+        self.stale = 0
         self.executions: list[Done] = []
         self.background = Background(client.node, 'planning')
         planning: Any = SimpleNamespace(
@@ -47,6 +48,9 @@ class Bench:
         ]
 
     def _prepare(self, count: int, *_: Any) -> Callable[[], PlannedMotion]:
+        if self.stale:
+            self.stale -= 1
+            raise PlanningError(PlanningCode.ROBOT_STATE_STALE, 'nobody knows where it is')
         self.plans += 1
         return lambda: PlannedMotion(RobotState(), [RobotTrajectory()] * count, 0.0)
 
@@ -67,11 +71,16 @@ class Bench:
 
     def begin(self, kind: Any, name: str, goal: Any) -> Any:
         """Send a goal; return its handle when its execution has begun."""
+        handle = self.send(kind, name, goal)
+        self.wait_for_execution(1)
+        return handle
+
+    def send(self, kind: Any, name: str, goal: Any) -> Any:
+        """Send a goal; return its handle."""
         caller = self.client.action(kind, name)
         assert caller.wait_for_server(TIMEOUT)  # type: ignore[no-untyped-call]
         sent = caller.send_goal_async(goal)  # type: ignore[no-untyped-call]
         self.client.spin_until(sent.done, TIMEOUT, 'acceptance')
-        self.wait_for_execution(1)
         return sent.result()
 
     def wait_for_execution(self, number: int) -> None:
@@ -141,10 +150,38 @@ def test_a_sequence_is_not_planned_anew(bench: Bench) -> None:
     """From its middle it is another one."""
     goal = MoveGroupSequence.Goal()
     goal.planning_options.replan = True
-    caller = bench.client.action(MoveGroupSequence, 'sequence_move_group')
-    sent = caller.send_goal_async(goal)  # type: ignore[no-untyped-call]
-    bench.client.spin_until(sent.done, TIMEOUT, 'acceptance')
-    status, result = bench.result(sent.result())
+    status, result = bench.result(bench.send(MoveGroupSequence, 'sequence_move_group', goal))
     assert status == GoalStatus.STATUS_ABORTED
     assert 'replan' in result.response.error_code.message
+    assert not bench.plans
+
+
+def test_a_goal_waits_for_joint_states_that_are_about_to_come(bench: Bench) -> None:
+    """A client that comes with the robot is not refused."""
+    bench.stale = 3
+    handle = bench.begin(MoveGroup, 'move_action', MoveGroup.Goal())
+    bench.executions[0](PlanningCode.SUCCESS, '')
+    assert bench.result(handle)[0] == GoalStatus.STATUS_SUCCEEDED
+    assert (bench.plans, bench.stale) == (1, 0)
+
+
+def test_a_goal_is_refused_where_no_joint_states_come(bench: Bench) -> None:
+    """After a second, with the reason."""
+    bench.stale = 1000
+    status, result = bench.result(bench.send(MoveGroup, 'move_action', MoveGroup.Goal()))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.error_code.val == PlanningCode.ROBOT_STATE_STALE
+    assert result.error_code.message == 'nobody knows where it is'
+    assert 980 < bench.stale < 1000
+
+
+def test_a_goal_that_waits_for_joint_states_can_be_canceled(bench: Bench) -> None:
+    """It is planned no more."""
+    bench.stale = 1000
+    handle = bench.send(MoveGroup, 'move_action', MoveGroup.Goal())
+    answer = handle.cancel_goal_async()
+    bench.client.spin_until(answer.done, TIMEOUT, 'answer to the cancel')
+    status, result = bench.result(handle)
+    assert status == GoalStatus.STATUS_CANCELED
+    assert result.error_code.val == PlanningCode.PREEMPTED
     assert not bench.plans

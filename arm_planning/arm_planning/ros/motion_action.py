@@ -25,6 +25,9 @@ from .planning import PlannedMotion, PlanningThread, sequence_response
 
 REPLAN_ATTEMPTS = 5
 """How often a goal that does not say so is planned anew at most, as in MoveIt."""
+STATE_WAITS, STATE_PERIOD = 10, 0.1
+"""How often joint states that are unknown or too old are looked for again, and time between two
+looks in [s]; MoveIt waits for a second, too."""
 
 
 Prepare = Callable[[Any, bool], Callable[[], PlannedMotion]]
@@ -100,6 +103,7 @@ class _Goal:
     outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
     is_canceled: bool = False
     replans: int = 0
+    state_waits: int = 0
     delay: Timer | None = None
 
 
@@ -137,14 +141,23 @@ class MotionAction:
 
     def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
         goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
+        self._begin_planning(goal)
+
+    def _begin_planning(self, goal: _Goal) -> None:
+        goal.state_waits = 0
+        self._publish(goal, 'PLANNING')
         self._plan(goal)
 
     def _plan(self, goal: _Goal) -> None:
-        self._publish(goal, 'PLANNING')
         try:
             work = self._kind.prepare(goal.handle.request, goal.replans > 0)
         except PlanningError as error:
-            self._end(goal, error.code, str(error))
+            is_stale = error.code is PlanningCode.ROBOT_STATE_STALE
+            if is_stale and goal.state_waits < STATE_WAITS:
+                goal.state_waits += 1
+                self._after(goal, STATE_PERIOD, self._plan)
+            else:
+                self._end(goal, error.code, str(error))
             return
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done))
 
@@ -199,12 +212,16 @@ class MotionAction:
         self._node.get_logger().info(f'{self._kind.name}: {reason}; plans anew')
         goal.replans, goal.begun = goal.replans + 1, 0
         goal.execution = goal.work = goal.planned = None
+        self._after(goal, max(options.replan_delay, 0.0), self._begin_planning)
 
-        def plan() -> None:
+    def _after(self, goal: _Goal, delay: float, plan: Callable[[_Goal], None]) -> None:
+        """Go on with a goal later, unless it is canceled."""
+
+        def go_on() -> None:
             self._end_delay(goal)
-            self._plan(goal)
+            plan(goal)
 
-        goal.delay = self._node.create_timer(max(options.replan_delay, 0.0), plan)
+        goal.delay = self._node.create_timer(delay, go_on)
 
     def _end_delay(self, goal: _Goal) -> None:
         if goal.delay is not None:
@@ -221,7 +238,7 @@ class MotionAction:
                 goal.work.cancel()
             elif goal.delay is not None:
                 self._end_delay(goal)
-                self._end(goal, PlanningCode.PREEMPTED, 'canceled before it was planned anew')
+                self._end(goal, PlanningCode.PREEMPTED, 'canceled before it was planned')
         return CancelResponse.ACCEPT
 
     def _end(self, goal: _Goal, code: PlanningCode, reason: str) -> None:
