@@ -18,6 +18,7 @@ from arm_model import ModelError
 from arm_model.ros import seconds
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros.joint_trajectory import check_trajectory
+from arm_planning.ros.path_watch import path_of
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.robot_state import joints_of, trajectory_message
 from arm_trajectory import Path, Segment
@@ -66,6 +67,19 @@ def test_points_of_a_path_have_times_that_increase(durations: list[float]) -> No
     assert first.positions == pytest.approx([0.0, 0.0], abs=1e-8)
     assert last.positions.tolist() == path.end.position.tolist()
     assert seconds(last.time_from_start) == pytest.approx(path.duration, abs=1e-9)
+
+
+def test_points_of_a_path_are_near_to_each_other_and_make_it() -> None:
+    """Viewers show one after the other; what interpolates them with quintics has the path."""
+    random = np.random.default_rng(0)
+    for duration in (0.05, 0.73, 2.0):
+        path = Path([Segment(0.0, duration, random.uniform(-1.0, 1.0, (6, 3)))])
+        trajectory = trajectory_message(['a', 'b', 'c'], path, 'base').joint_trajectory
+        times = [seconds(point.time_from_start) for point in trajectory.points]
+        assert np.diff(times).max() <= 0.1 + 1e-9
+        again = path_of(trajectory)
+        looks = np.linspace(0.0, path.duration, 500)
+        assert again.positions(looks) == pytest.approx(path.positions(looks), abs=1e-6)
 
 
 def test_an_unknown_group_is_refused_with_the_known_ones() -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain, pairwise
 import math
 from typing import Any
 
@@ -19,6 +20,9 @@ from arm_model.ros import duration_fields
 from arm_trajectory import Path
 
 from ..exceptions import PlanningCode, PlanningError
+
+POINT_PERIOD = 0.1
+"""Longest time between two points of a trajectory in [s]: that of MoveIt's plans."""
 
 
 def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noqa: ANN401
@@ -67,8 +71,9 @@ def state_message(joints: Sequence[str], positions: Array, root: str) -> StateMe
 def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTrajectory:
     """Return a path as a moveit_msgs/RobotTrajectory.
 
-    Its points are the ends of the path's polynomials, with velocities and accelerations: a quintic
-    between two of them is the path itself.
+    Its points are the ends of the path's polynomials and some in between, with velocities and
+    accelerations: a quintic between two of them is the path itself, and a viewer that shows one
+    point after the other shows a motion.
 
     Args:
         joints: Names of the joints.
@@ -77,9 +82,17 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
     """
     # of ends in the same nanosecond the last one: points of equal time are no trajectory
     ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}
+    times = list(ends.values())
+    parts = [_split(begin, end) for begin, end in pairwise(times)]
     trajectory = JointTrajectory(header=Header(frame_id=root), joint_names=list(joints))
-    trajectory.points = [_point(path, time) for time in ends.values()]
+    trajectory.points = [_point(path, time) for time in (*chain(*parts), times[-1])]
     return RobotTrajectory(joint_trajectory=trajectory)
+
+
+def _split(begin: float, end: float) -> Sequence[float]:
+    """Return times from a begin up to an end, which is left out, that are near to each other."""
+    count = math.ceil((end - begin) / POINT_PERIOD)
+    return [begin + number * (end - begin) / count for number in range(count)]
 
 
 def _point(path: Path, time: float) -> JointTrajectoryPoint:
