@@ -17,6 +17,7 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.msg import RobotState as StateMessage
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
+import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Empty
@@ -37,6 +38,9 @@ DEPTH = 100
 
 STATE_TIMEOUT = 1.0
 """Age at which joint states count no more in [s]."""
+
+REST_PERIOD, REST_TOLERANCE = 0.25, 1e-3
+"""A robot whose joints move by less in such a time in [s] rests, in [rad] or [m]."""
 
 
 class SceneMonitor:
@@ -77,7 +81,9 @@ class SceneMonitor:
         node.create_service(GetPlanningScene, 'get_planning_scene', self._get)
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         node.create_service(Empty, 'clear_octomap', self._clear_octomap)
+        self._shown = self._seen = self.positions()
         self._publish()
+        node.create_timer(REST_PERIOD, self._publish_rest)
 
     def on_change(self, listener: Callable[[], None]) -> None:
         """Have something called after each change of the scene.
@@ -192,7 +198,19 @@ class SceneMonitor:
             listener()
         return True
 
+    def _publish_rest(self) -> None:
+        """Publish the scene when the robot has come to rest elsewhere: viewers show it there.
+
+        Not while it moves, as MoveIt may: whoever reads the scene in a cycle would read it all
+        the time.
+        """
+        here, before = self.positions(), self._seen
+        self._seen = here
+        if _near(here, before) and not _near(here, self._shown):
+            self._publish()
+
     def _publish(self) -> None:
+        self._shown = self.positions()
         self._published.publish(scene_message(self.snapshot, self.robot.name, self.state()))
 
     def _get(
@@ -207,3 +225,7 @@ class SceneMonitor:
     ) -> ApplyPlanningScene.Response:
         response.success = self._change('apply_planning_scene', apply_scene, request.scene)
         return response
+
+
+def _near(one: Array, other: Array) -> bool:
+    return bool(np.abs(one - other).max(initial=0.0) < REST_TOLERANCE)

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What viewers get of the scene, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from moveit_msgs.msg import PlanningScene
+from planning_messages import panda, QuietNode
+from sensor_msgs.msg import JointState
+
+from arm_planning.ros.scene_monitor import SceneMonitor
+
+JOINT = 'panda_joint1'
+
+
+class TickingNode(QuietNode):
+    """A node whose topics and timers are in the hands of the test."""
+
+    def __init__(self) -> None:
+        self.published: list[PlanningScene] = []
+        self.hear: dict[str, Callable[[Any], None]] = {}
+        self.tick: Callable[[], None] = lambda: None
+
+    def create_publisher(self, *_: Any) -> Any:
+        """Keep what is published."""
+        return SimpleNamespace(publish=self.published.append)
+
+    def create_subscription(self, _kind: Any, topic: str, callback: Any, _depth: Any) -> None:
+        """Keep who listens."""
+        self.hear[topic] = callback
+
+    def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
+        """Keep the timer."""
+        self.tick = callback
+
+    def get_clock(self) -> Any:
+        """Return a clock that stands."""
+        stamp = PlanningScene().robot_state.joint_state.header.stamp
+        return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: stamp))
+
+    def at(self, position: float) -> None:
+        """Have the first joint somewhere, and look."""
+        self.hear['joint_states'](JointState(name=[JOINT], position=[position]))
+        self.tick()
+
+
+def test_a_robot_that_has_come_to_rest_is_shown_there_once() -> None:
+    """Not on its way, and not again where it stays; noise is no motion."""
+    node = TickingNode()
+    SceneMonitor(node, panda())  # type: ignore[arg-type]
+    assert len(node.published) == 1
+    for position in (0.1, 0.2, 0.3):
+        node.at(position)
+    assert len(node.published) == 1
+    for position in (0.3001, 0.3, 0.2999):
+        node.at(position)
+    assert len(node.published) == 2
+    scene = node.published[-1]
+    state = scene.robot_state.joint_state
+    assert dict(zip(state.name, state.position, strict=True))[JOINT] == 0.3001
+    assert not scene.is_diff
