@@ -55,6 +55,10 @@ PREPARED_STATE_TOLERANCE = 0.01
 ARM_DISTANCE = 0.005
 """Least distance to another arm that moves, for what is no jog, in [m]."""
 
+UNCHECKED_CLEARANCE = 0.002
+"""Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
+that is stopped there is not in contact, not even as measured, and can be led away."""
+
 MAX_JOINTS = 8
 """Joints of the longest chain that is jogged."""
 
@@ -379,10 +383,11 @@ class MotionCore:
         self._loose = jogged or (self._loose and state.moving and self._arbiter.brakes)
         if self._loose:
             return self._settings.clearance
-        is_clear = self._arbiter.on_path and self._unchecked is not self.execution
+        is_unchecked = self._unchecked is not None and self._unchecked is self.execution
+        is_clear = self._arbiter.on_path and not is_unchecked
         if is_clear or not self._settings.check_self_collision:
             return None
-        return 0.0
+        return UNCHECKED_CLEARANCE if is_unchecked else 0.0
 
     @property
     def _apart(self) -> float | None:
