@@ -20,12 +20,13 @@ IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 # some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
 
-.PHONY: help demo demo-arm demo-quad test check build lint bench chaos soak setup pins clean distclean
+.PHONY: help demo demo-arm demo-plan demo-quad test check build lint bench chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
 	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm, NO_VIEW=1 opens no page)'
 	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110)'
+	@echo 'make demo-plan  have it pick and place among obstacles, with move_group (ROBOT=prbt, DURATION=20)'
 	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20 ends it after that)'
 	@echo 'make test       build everything and run all tests'
 	@echo 'make check      lint, types, and the tests that take no time: between two edits'
@@ -50,6 +51,10 @@ demo-quad: system
 demo-arm: system
 	@$(WORKSPACE) build arm_bringup arm_servo
 	@$(IN_ENVIRONMENT) ros2 run arm_bringup motion_demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
+
+demo-plan: system
+	@$(WORKSPACE) build arm_bringup arm_servo arm_planning
+	@$(IN_ENVIRONMENT) ros2 run arm_bringup plan_demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 test: system
 	@$(WORKSPACE) build --dev

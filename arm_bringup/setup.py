@@ -15,6 +15,7 @@ EXECUTABLES = [
     'check = arm_bringup.check:main',
     'demo = arm_bringup.demos.wave.main:main',
     'motion_demo = arm_bringup.demos.motion:main',
+    'plan_demo = arm_bringup.demos.plan:main',
     'wave_master = arm_bringup.demos.wave.master:main',
 ]
 
