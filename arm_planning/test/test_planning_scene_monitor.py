@@ -22,7 +22,7 @@ class TickingNode(QuietNode):
 
     def __init__(self) -> None:
         self.published: list[PlanningScene] = []
-        self.hear: dict[str, Callable[[Any], None]] = {}
+        self.receive: dict[str, Callable[[Any], None]] = {}
         self.tick: Callable[[], None] = lambda: None
 
     def create_publisher(self, *_: Any) -> Any:
@@ -31,7 +31,7 @@ class TickingNode(QuietNode):
 
     def create_subscription(self, _kind: Any, topic: str, callback: Any, _depth: Any) -> None:
         """Keep who listens."""
-        self.hear[topic] = callback
+        self.receive[topic] = callback
 
     def create_timer(self, _period: float, callback: Callable[[], None]) -> None:
         """Keep the timer."""
@@ -44,7 +44,7 @@ class TickingNode(QuietNode):
 
     def at(self, position: float) -> None:
         """Have the first joint somewhere, and look."""
-        self.hear['joint_states'](JointState(name=[JOINT], position=[position]))
+        self.receive['joint_states'](JointState(name=[JOINT], position=[position]))
         self.tick()
 
 

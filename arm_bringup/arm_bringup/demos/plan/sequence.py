@@ -123,12 +123,16 @@ class PlanSequence:
         self.enter('home, by free motion')
         order = MotionOrder(model.group, by_joint(model, home), speed=FREE)
         watch, deadline = self.client.observer.watch(), self.clock() + START_TIMEOUT
-        while True:
-            run = self._send(order)
-            self._wait(lambda run=run: run.done, MOTION_TIMEOUT, 'the end of a motion (home)')
-            if run.end().code != UNKNOWN_STATE or self.clock() > deadline:
-                break
+        run = self._attempt(order)
+        while run.end().code == UNKNOWN_STATE and self.clock() < deadline:
+            run = self._attempt(order)
         self._finish('home', order, run, watch)
+
+    def _attempt(self, order: MotionOrder) -> MotionRun:
+        """Send a motion, and wait for its end, whatever that is."""
+        run = self._send(order)
+        self._wait(lambda: run.done, MOTION_TIMEOUT, 'the end of a motion')
+        return run
 
     def run(self) -> None:
         """Run every part once.
@@ -308,9 +312,7 @@ class PlanSequence:
         observer = self.client.observer
         before = self._positions()
         pairs = observer.contacts(observer.row(order.joints))
-        run = self._send(order)
-        self._wait(lambda: run.done, MOTION_TIMEOUT, 'the refusal')
-        end = run.end()
+        end = self._attempt(order).end()
         self.client.show(f'{end.code}: {end.message}', end.planning_time)
         self._watch_for(0.5)
         moved = float(np.abs(self._positions() - before).max())
