@@ -57,6 +57,7 @@ IMPORTED = [
     'quad_teleop',
     'realtime_loop',
     'robot_viewer',
+    'rosbag_files',
     'urdf_reader',
     'xgo_lib2',
 ]

@@ -30,15 +30,17 @@ PACKAGES = {
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
 DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
-ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
-ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
+ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'mcap', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
+ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro', 'zstandard'}
 ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
 """Keys of rosdep for them."""
 OF_TESTS = {
     'canopen': 'canopen-pip',
     'hypothesis': 'python3-hypothesis',
+    'mcap_ros2': 'mcap-ros2-support',
     'onnx': 'python3-onnx-pip',
     'pytest': 'python3-pytest',
+    'rosbags': 'python3-rosbags-pip',
 }
 """Keys of rosdep for what only tests import."""
 PROGRAMS = {'iproute2', 'tmux'}

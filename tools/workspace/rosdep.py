@@ -13,6 +13,7 @@ KEYS: dict[str, str] = {
     'coal': 'coal',
     'daqp': 'python3-daqp-pip',
     'evdev': 'python3-evdev',
+    'mcap': 'python3-mcap-pip',
     'msgpack': 'python3-msgpack',
     'mujoco-core': 'python3-mujoco-pip',
     'onnxruntime': 'python3-onnxruntime-pip',
@@ -25,6 +26,7 @@ KEYS: dict[str, str] = {
     'viser': 'python3-viser-pip',
     'websockets': 'python3-websockets',
     'xacro': 'xacro',
+    'zstandard': 'python3-zstandard',
 }
 """The key of each distribution on PyPI; numpy is not among them, it is that of the ROS below."""
 

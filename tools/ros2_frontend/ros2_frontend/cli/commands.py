@@ -62,6 +62,15 @@ COMMANDS: Mapping[str, Command | Group] = {
             'type': Command("Print a action's type", 'action:type_of'),
         },
     ),
+    'bag': Group(
+        'Various rosbag related sub-commands',
+        {
+            'info': Command('Print information about a bag to the screen', 'bag_info:info'),
+            'play': Command('Play back ROS data from a bag', 'bag_play:play'),
+            'record': Command('Record ROS data to a bag', 'bag_record:record'),
+            'reindex': Command('Reconstruct metadata file for a bag', 'bag_info:reindex'),
+        },
+    ),
     'doctor': Command('Check ROS setup and other potential issues', 'doctor:doctor'),
     'interface': Group(
         'Show information about ROS interfaces',

@@ -1,0 +1,233 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""metadata.yaml of a recording, as rosbag2 of Jazzy writes it (version 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from .exceptions import BagError
+from .qos import OfferedQos, read_qos
+
+METADATA_FILE = 'metadata.yaml'
+STORAGE = 'mcap'
+_VERSION = 9
+_ROOT = 'rosbag2_bagfile_information'
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A recorded topic.
+
+    Attributes:
+        name: Its absolute name.
+        type: Name of its messages, `package/msg/Name`.
+        definition: Text of their definition with those of all nested types (`ros2msg`); empty
+            where it could not be found.
+        type_hash: Hash of the type, `RIHS01_...`.
+        qos: What its publishers offered.
+        serialization: Format of its messages.
+    """
+
+    name: str
+    type: str
+    definition: str = ''
+    type_hash: str = ''
+    qos: tuple[OfferedQos, ...] = ()
+    serialization: str = 'cdr'
+
+    def qos_dicts(self) -> list[dict[str, Any]]:
+        """The QoS profiles as metadata.yaml has them."""
+        return [profile.to_dict() for profile in self.qos]
+
+
+@dataclass(frozen=True, slots=True)
+class TopicCount:
+    """A topic, and how many messages of it there are."""
+
+    topic: Topic
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class BagFile:
+    """One file of a recording: its path in the folder, start and duration in [ns], messages."""
+
+    path: str
+    start: int
+    duration: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class BagMetadata:
+    """What a recording has.
+
+    Attributes:
+        files: Its files in order.
+        topics: Its topics with their counts.
+        compression_format: `zstd` or empty.
+        compression_mode: `FILE`, `MESSAGE` or empty.
+        distro: The ROS that it was recorded with.
+        custom: What the user wrote down with it.
+        storage: How its files are written.
+    """
+
+    files: tuple[BagFile, ...]
+    topics: tuple[TopicCount, ...]
+    compression_format: str = ''
+    compression_mode: str = ''
+    distro: str = 'jazzy'
+    custom: Mapping[str, str] | None = None
+    storage: str = STORAGE
+
+    @property
+    def start(self) -> int:
+        """Time of the first message in [ns since 1970]; 0 when there is none."""
+        return min((file.start for file in self.files if file.count), default=0)
+
+    @property
+    def duration(self) -> int:
+        """Time from the first message to the last in [ns]."""
+        ends = [file.start + file.duration for file in self.files if file.count]
+        return max(ends, default=0) - self.start
+
+    @property
+    def count(self) -> int:
+        """How many messages there are."""
+        return sum(each.count for each in self.topics)
+
+    def to_yaml(self) -> str:
+        """The text of metadata.yaml."""
+        information = {
+            'version': _VERSION,
+            'storage_identifier': self.storage,
+            'duration': {'nanoseconds': self.duration},
+            'starting_time': {'nanoseconds_since_epoch': self.start},
+            'message_count': self.count,
+            'topics_with_message_count': [_topic_dict(each) for each in self.topics],
+            'compression_format': self.compression_format,
+            'compression_mode': self.compression_mode,
+            'relative_file_paths': [file.path for file in self.files],
+            'files': [_file_dict(file) for file in self.files],
+            'custom_data': dict(self.custom) if self.custom else None,
+            'ros_distro': self.distro,
+        }
+        return yaml.safe_dump({_ROOT: information}, sort_keys=False, allow_unicode=True)
+
+    def save(self, folder: Path) -> None:
+        """Write metadata.yaml of a folder, whole or not at all."""
+        half = folder / f'.{METADATA_FILE}.part'
+        half.write_text(self.to_yaml(), encoding='utf-8')
+        half.replace(folder / METADATA_FILE)
+
+
+def _topic_dict(each: TopicCount) -> dict[str, Any]:
+    topic = each.topic
+    return {
+        'topic_metadata': {
+            'name': topic.name,
+            'type': topic.type,
+            'serialization_format': topic.serialization,
+            'offered_qos_profiles': topic.qos_dicts(),
+            'type_description_hash': topic.type_hash,
+        },
+        'message_count': each.count,
+    }
+
+
+def _file_dict(file: BagFile) -> dict[str, Any]:
+    return {
+        'path': file.path,
+        'starting_time': {'nanoseconds_since_epoch': file.start},
+        'duration': {'nanoseconds': file.duration},
+        'message_count': file.count,
+    }
+
+
+def load_metadata(path: Path) -> BagMetadata:
+    """Read a metadata.yaml; of any version up to 9.
+
+    Raises:
+        BagError: It cannot be read or has not what it needs to have.
+    """
+    try:
+        document = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise BagError(f'{path}: {error}') from None
+    try:
+        return _parse(document[_ROOT], path)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise BagError(f'{path}: not the metadata of a recording ({error!r})') from None
+
+
+def _parse(information: Mapping[str, Any], path: Path) -> BagMetadata:
+    version = int(information['version'])
+    if version > _VERSION:
+        raise BagError(f'{path}: version {version}; up to {_VERSION} can be read')
+    mode = str(information.get('compression_mode') or '')
+    return BagMetadata(
+        tuple(_files(information)),
+        tuple(_topic(each, path) for each in information['topics_with_message_count']),
+        str(information.get('compression_format') or ''),
+        '' if mode.upper() == 'NONE' else mode.upper(),
+        str(information.get('ros_distro') or 'unknown'),
+        information.get('custom_data') or None,
+        str(information['storage_identifier']),
+    )
+
+
+def _files(information: Mapping[str, Any]) -> Sequence[BagFile]:
+    paths = [str(each) for each in information['relative_file_paths']]
+    listed = information.get('files')
+    if not listed:  # before version 5
+        start = int(information['starting_time']['nanoseconds_since_epoch'])
+        duration = int(information['duration']['nanoseconds'])
+        count = int(information['message_count'])
+        return [BagFile(path, start, duration, count if path == paths[0] else 0) for path in paths]
+    return [
+        BagFile(
+            path,
+            int(each['starting_time']['nanoseconds_since_epoch']),
+            int(each['duration']['nanoseconds']),
+            int(each['message_count']),
+        )
+        for path, each in zip(paths, listed, strict=True)
+    ]
+
+
+def _topic(each: Mapping[str, Any], path: Path) -> TopicCount:
+    values = each['topic_metadata']
+    profiles = parse_profiles(values.get('offered_qos_profiles'), f'{path}: {values["name"]}')
+    topic = Topic(
+        str(values['name']),
+        str(values['type']),
+        '',
+        str(values.get('type_description_hash') or ''),
+        profiles,
+        str(values['serialization_format']),
+    )
+    return TopicCount(topic, int(each['message_count']))
+
+
+def parse_profiles(profiles: object, where: str) -> tuple[OfferedQos, ...]:
+    """Read a list of QoS profiles; before version 9 it was YAML in a text.
+
+    Raises:
+        BagError: It is no such list.
+    """
+    if isinstance(profiles, str):
+        try:
+            profiles = yaml.safe_load(profiles)
+        except yaml.YAMLError as error:
+            raise BagError(f'{where}: {error}') from None
+    if not profiles:
+        return ()
+    if not isinstance(profiles, list):
+        raise BagError(f'{where}: QoS profiles are a list, not {profiles!r}')
+    return tuple(read_qos(profile, where) for profile in profiles)

@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Reads a recording, also one that was not finished."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+import contextlib
+from dataclasses import dataclass, replace
+import heapq
+from pathlib import Path
+import re
+import struct
+import tempfile
+from typing import IO
+
+from mcap.exceptions import McapError
+from mcap.reader import make_reader
+from mcap.records import Channel, Message, Schema
+from mcap.stream_reader import StreamReader
+import zstandard
+
+from .exceptions import BagError
+from .metadata import (
+    BagFile,
+    BagMetadata,
+    load_metadata,
+    METADATA_FILE,
+    parse_profiles,
+    STORAGE,
+    Topic,
+    TopicCount,
+)
+
+# a file that ends in the midst of a record, or has something else in the place of one
+_DAMAGE = (McapError, ValueError, LookupError, EOFError, struct.error, zstandard.ZstdError)
+_ZSTD_MAGIC = b'\x28\xb5\x2f\xfd'  # CDR begins with 0
+_NO_SCHEMA = Schema(id=0, data=b'', encoding='', name='')
+_NUMBER = re.compile(r'(\d+)\.mcap(?:\.zstd)?\Z')
+
+
+@dataclass(frozen=True, slots=True)
+class BagMessage:
+    """A recorded message; times in [ns since 1970], sequence is the number of its publisher."""
+
+    topic: str
+    data: bytes
+    log_time: int
+    publish_time: int
+    sequence: int
+
+
+class BagReader:
+    """A recording: a folder, or a single MCAP file.
+
+    Attributes:
+        folder: Where it is.
+        metadata: What it has.
+        finished: Whether it has a metadata.yaml; without, its files were read through for it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Look at a recording.
+
+        Raises:
+            BagError: There is none, or it is not written as MCAP.
+        """
+        self.folder = path if path.is_dir() else path.parent
+        self.finished = (path / METADATA_FILE).is_file()
+        if self.finished:
+            self.metadata = self._with_definitions(load_metadata(path / METADATA_FILE))
+        elif path.is_dir():
+            self.metadata = scan(path, recording_files(path))
+        elif path.is_file():
+            self.metadata = scan(self.folder, [path])
+        else:
+            raise BagError(f"Bag path '{path}' does not exist!")
+
+    def size(self) -> int:
+        """Size of all files in [byte]."""
+        return sum((self.folder / file.path).stat().st_size for file in self.metadata.files)
+
+    def messages(
+        self, topics: Collection[str] | None = None, start: int | None = None
+    ) -> Iterator[BagMessage]:
+        """Yield the messages in the order in which they were received.
+
+        Args:
+            topics: Which topics; None for all.
+            start: Earliest time in [ns since 1970].
+
+        Raises:
+            BagError: A file is missing.
+        """
+        by_message = self.metadata.compression_mode == 'MESSAGE'
+        unpack = zstandard.ZstdDecompressor().decompress if by_message else bytes
+        files = [self._file_messages(file, topics, start, unpack) for file in self.metadata.files]
+        # files of a split overlap a little: a message of another topic may come late
+        yield from heapq.merge(*files, key=lambda message: message.log_time)
+
+    def _file_messages(
+        self,
+        file: BagFile,
+        topics: Collection[str] | None,
+        start: int | None,
+        unpack: Callable[[bytes], bytes],
+    ) -> Iterator[BagMessage]:
+        if not file.count or (start is not None and file.start + file.duration < start):
+            return
+        with opened(self.folder / file.path) as stream:
+            for channel, message in _in_order(stream, topics, start):
+                yield BagMessage(
+                    channel.topic,
+                    unpack(message.data),
+                    message.log_time,
+                    message.publish_time,
+                    message.sequence,
+                )
+
+    def _with_definitions(self, metadata: BagMetadata) -> BagMetadata:
+        """Add the definitions of messages, which the files have."""
+        if metadata.storage != STORAGE:
+            raise BagError(f"{self.folder}: storage '{metadata.storage}'; only MCAP can be read")
+        definitions: dict[str, str] = {}
+        for file in metadata.files:
+            with opened(self.folder / file.path) as stream:
+                definitions |= _definitions(stream)
+        topics = (
+            replace(
+                each, topic=replace(each.topic, definition=definitions.get(each.topic.type, ''))
+            )
+            for each in metadata.topics
+        )
+        return replace(metadata, topics=tuple(topics))
+
+
+def recording_files(folder: Path) -> list[Path]:
+    """The files of a recording in their order.
+
+    Raises:
+        BagError: There is none.
+    """
+    found = [path for path in folder.iterdir() if _NUMBER.search(path.name)]
+    if not found:
+        raise BagError(f"'{folder}' holds no recording: neither {METADATA_FILE} nor MCAP files")
+    return sorted(found, key=lambda path: int(_number(path)))
+
+
+def _number(path: Path) -> str:
+    match = _NUMBER.search(path.name)
+    return match[1] if match else '0'
+
+
+def scan(folder: Path, paths: list[Path]) -> BagMetadata:
+    """Find out by reading files what metadata.yaml would say; how they are compressed, too."""
+    files: list[BagFile] = []
+    topics: dict[str, Topic] = {}
+    counts: Counter[str] = Counter()
+    by_message = False
+    for path in paths:
+        start = end = count = 0
+        with opened(path) as stream:
+            for record in records(stream):
+                if isinstance(record, Topic):
+                    topics[record.name] = record
+                    continue
+                channel, message = record
+                counts[channel.topic] += 1
+                by_message = by_message or message.data.startswith(_ZSTD_MAGIC)
+                start = min(start, message.log_time) if count else message.log_time
+                end, count = max(end, message.log_time), count + 1
+        files.append(
+            BagFile(str(path.relative_to(folder)), start, end - start if count else 0, count)
+        )
+    by_file = any(path.suffix == '.zstd' for path in paths)
+    return BagMetadata(
+        tuple(files),
+        tuple(TopicCount(topic, counts[name]) for name, topic in topics.items()),
+        'zstd' if by_file or by_message else '',
+        'FILE' if by_file else 'MESSAGE' if by_message else '',
+    )
+
+
+def records(stream: IO[bytes]) -> Iterator[Topic | tuple[Channel, Message]]:
+    """Yield topics and messages as they stand in a file, up to where it is damaged."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    with contextlib.suppress(*_DAMAGE):
+        for record in StreamReader(stream).records:
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel) and record.id not in channels:
+                channels[record.id] = record
+                yield _topic(record, schemas.get(record.schema_id, _NO_SCHEMA))
+            elif isinstance(record, Message):
+                yield channels[record.channel_id], record
+
+
+def _topic(channel: Channel, schema: Schema) -> Topic:
+    where = f'topic {channel.topic}'
+    return Topic(
+        channel.topic,
+        schema.name,
+        schema.data.decode(),
+        channel.metadata.get('topic_type_hash', ''),
+        parse_profiles(channel.metadata.get('offered_qos_profiles'), where),
+        channel.message_encoding,
+    )
+
+
+def _in_order(
+    stream: IO[bytes], topics: Collection[str] | None, start: int | None
+) -> Iterator[tuple[Channel, Message]]:
+    """Yield messages by their time: by the index, or where there is none from memory."""
+    if has_index(stream):
+        found = make_reader(stream).iter_messages(topics, starting_at=start)
+        yield from ((channel, message) for _, channel, message in found)
+        return
+    stream.seek(0)
+    messages = [record for record in records(stream) if not isinstance(record, Topic)]
+    for channel, message in sorted(messages, key=lambda record: record[1].log_time):
+        wanted = topics is None or channel.topic in topics
+        if wanted and (start is None or message.log_time >= start):
+            yield channel, message
+
+
+def has_index(stream: IO[bytes]) -> bool:
+    """Whether the messages of a file can be found by time without reading all of it."""
+    try:
+        summary = make_reader(stream).get_summary()
+    except _DAMAGE:
+        return False
+    return summary is not None and bool(summary.chunk_indexes)
+
+
+def _definitions(stream: IO[bytes]) -> dict[str, str]:
+    schemas: list[Schema] = []
+    with contextlib.suppress(*_DAMAGE):
+        summary = make_reader(stream).get_summary()
+        schemas = list(summary.schemas.values()) if summary else []
+    return {schema.name: schema.data.decode() for schema in schemas}
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[IO[bytes]]:
+    """Open a file of a recording, decompressed where it is compressed as a whole."""
+    try:
+        source = path.open('rb')
+    except OSError as error:
+        raise BagError(f"Cannot read '{path}': {error.strerror}") from None
+    with source:
+        if path.suffix != '.zstd':
+            yield source
+            return
+        with tempfile.TemporaryFile() as unpacked:
+            with contextlib.suppress(zstandard.ZstdError):  # cut off: as far as it goes
+                zstandard.ZstdDecompressor().copy_stream(source, unpacked)
+            unpacked.seek(0)
+            yield unpacked

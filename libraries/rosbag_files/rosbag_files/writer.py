@@ -1,0 +1,292 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writes a recording: a folder with MCAP files and, at its end, metadata.yaml.
+
+What `BagWriter.flush` has written is readable whatever becomes of the process: a chunk of MCAP
+carries its schemas, channels and messages. Only the index at the end of the file and metadata.yaml
+are missing then; `BagReader` does without, and `repair` adds them.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from pathlib import Path
+import shutil
+
+from mcap.writer import CompressionType, Writer
+import yaml
+import zstandard
+
+from .exceptions import BagError
+from .metadata import BagFile, BagMetadata, Topic, TopicCount
+
+_MESSAGE_OVERHEAD = 31  # [byte] of a message record of MCAP besides its data
+_CHUNK = 768 * 1024  # [byte], as rosbag2 has it
+_LARGE_CHUNK = 4 * 1024 * 1024  # [byte]
+_SEQUENCES = 2**32
+_LIBRARY = 'rosbag_files'
+
+
+class Compression(Enum):
+    """What zstd compresses, after rosbag2's `--compression-mode`."""
+
+    NONE = ''
+    FILE = 'FILE'
+    MESSAGE = 'MESSAGE'
+
+
+class Preset(Enum):
+    """How MCAP files are written, after rosbag2's `--storage-preset-profile`."""
+
+    NONE = 'none'
+    """Chunks with an index, not compressed."""
+    FAST_WRITE = 'fastwrite'
+    """No chunks, no index."""
+    ZSTD_FAST = 'zstd_fast'
+    """Compressed chunks."""
+    ZSTD_SMALL = 'zstd_small'
+    """Large compressed chunks."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriterOptions:
+    """How to write a recording.
+
+    Attributes:
+        max_size: Size in [byte] from which a new file begins; 0 for no limit.
+        max_duration: Duration in [ns] from which a new file begins; 0 for no limit.
+        compression: What is compressed, besides the preset.
+        preset: How MCAP files are written.
+        distro: The ROS that is recorded.
+        custom: What the user writes down with it.
+    """
+
+    max_size: int = 0
+    max_duration: int = 0
+    compression: Compression = Compression.NONE
+    preset: Preset = Preset.NONE
+    distro: str = 'jazzy'
+    custom: Mapping[str, str] | None = None
+
+
+class BagWriter:
+    """Writes one recording; `close` it at the end.
+
+    Attributes:
+        folder: Where it is.
+    """
+
+    def __init__(self, folder: Path, options: WriterOptions | None = None) -> None:
+        """Make the folder and its first file.
+
+        Raises:
+            BagError: The folder exists, or cannot be made.
+        """
+        self.folder = folder
+        self._options = options or WriterOptions()
+        self._topics: dict[str, Topic] = {}
+        self._counts: Counter[str] = Counter()
+        self._done: list[BagFile] = []
+        compressor = zstandard.ZstdCompressor()
+        by_message = self._options.compression is Compression.MESSAGE
+        self._pack = compressor.compress if by_message else bytes
+        try:
+            folder.mkdir(parents=True)
+            self._file = self._open()
+        except FileExistsError:
+            raise BagError(f"Output folder '{folder}' already exists.") from None
+        except OSError as error:
+            raise BagError(f"Cannot write to '{folder}': {error.strerror}") from None
+
+    def set_topic(self, topic: Topic) -> None:
+        """Announce a topic before its first message, or renew what is known of it.
+
+        Of one that is known, QoS profiles are renewed: in metadata.yaml, and in the next file.
+        """
+        if topic.name not in self._topics:
+            self._file.add_topic(topic)
+        self._topics[topic.name] = topic
+
+    def write(
+        self, name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0
+    ) -> None:
+        """Add a message.
+
+        Args:
+            name: A topic that was announced.
+            data: The serialized message.
+            log_time: When it was received in [ns since 1970].
+            publish_time: When it was published in [ns since 1970].
+            sequence: Number that its publisher gave it; MCAP keeps 32 bits of it.
+
+        Raises:
+            BagError: It cannot be written.
+        """
+        try:
+            if self._is_full(log_time):
+                self._finish_file()
+                self._file = self._open()
+            self._file.write(name, self._pack(data), log_time, publish_time, sequence % _SEQUENCES)
+        except OSError as error:
+            raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
+        self._counts[name] += 1
+
+    def flush(self) -> None:
+        """Hand everything to the operating system, so that it outlives this process.
+
+        Raises:
+            BagError: It cannot be written.
+        """
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
+
+    def close(self) -> BagMetadata:
+        """Finish the last file and write metadata.yaml.
+
+        Raises:
+            BagError: It cannot be written.
+        """
+        try:
+            self._finish_file()
+            metadata = self._metadata(self._done)
+            metadata.save(self.folder)
+        except OSError as error:
+            raise BagError(f"Cannot write to '{self.folder}': {error.strerror}") from None
+        return metadata
+
+    def _is_full(self, log_time: int) -> bool:
+        options, file = self._options, self._file
+        if not file.count:
+            return False
+        long = options.max_duration and log_time - file.start >= options.max_duration
+        return bool(long) or bool(options.max_size and file.size() >= options.max_size)
+
+    def _open(self) -> McapFile:
+        path = self.folder / f'{self.folder.name}_{len(self._done)}.mcap'
+        file = McapFile(path, self._options.preset)
+        for topic in self._topics.values():
+            file.add_topic(topic)
+        return file
+
+    def _finish_file(self) -> None:
+        file = self._file
+        found = BagFile(file.path.name, file.start, file.duration, file.count)
+        file.close(self._metadata([found], file.counts).to_yaml())
+        if self._options.compression is Compression.FILE:
+            found = replace(found, path=_compress(file.path).name)
+        self._done.append(found)
+
+    def _metadata(
+        self, files: list[BagFile], counts: Mapping[str, int] | None = None
+    ) -> BagMetadata:
+        counts = self._counts if counts is None else counts
+        mode = self._options.compression
+        return BagMetadata(
+            tuple(files),
+            tuple(TopicCount(topic, counts.get(name, 0)) for name, topic in self._topics.items()),
+            '' if mode is Compression.NONE else 'zstd',
+            mode.value,
+            self._options.distro,
+            self._options.custom,
+        )
+
+
+class McapFile:
+    """One MCAP file with rosbag2's profile.
+
+    Attributes:
+        path: Where it is.
+        start: Earliest time in it in [ns].
+        counts: How many messages of each topic there are.
+    """
+
+    def __init__(self, path: Path, preset: Preset) -> None:
+        self.path = path
+        self.start = 0
+        self.counts: Counter[str] = Counter()
+        self._end = 0
+        self._stream = path.open('xb')
+        compressed = preset in {Preset.ZSTD_FAST, Preset.ZSTD_SMALL}
+        self._mcap = Writer(
+            self._stream,
+            chunk_size=_LARGE_CHUNK if preset is Preset.ZSTD_SMALL else _CHUNK,
+            compression=CompressionType.ZSTD if compressed else CompressionType.NONE,
+            use_chunking=preset is not Preset.FAST_WRITE,
+        )
+        self._mcap.start('ros2', _LIBRARY)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._written = 0  # [byte] that the stream had at the last message
+        self._pending = 0  # [byte] of messages that are in no chunk yet
+
+    @property
+    def count(self) -> int:
+        """How many messages there are."""
+        return self.counts.total()
+
+    @property
+    def duration(self) -> int:
+        """Time from the earliest message to the latest in [ns]."""
+        return self._end - self.start
+
+    def size(self) -> int:
+        """Size in [byte], with what is in no chunk yet."""
+        return self._stream.tell() + self._pending
+
+    def add_topic(self, topic: Topic) -> None:
+        """Register a topic and, once, the type of its messages."""
+        if topic.type not in self._schemas:
+            encoding = 'ros2msg' if topic.definition else ''
+            self._schemas[topic.type] = self._mcap.register_schema(
+                topic.type, encoding, topic.definition.encode()
+            )
+        self._channels[topic.name] = self._mcap.register_channel(
+            topic.name,
+            topic.serialization,
+            self._schemas[topic.type],
+            {
+                'offered_qos_profiles': yaml.safe_dump(topic.qos_dicts(), sort_keys=False),
+                'topic_type_hash': topic.type_hash,
+            },
+        )
+
+    def write(
+        self, name: str, data: bytes, log_time: int, publish_time: int, sequence: int
+    ) -> None:
+        """Add a message."""
+        first = not self.counts
+        self.start = log_time if first else min(self.start, log_time)
+        self._end = log_time if first else max(self._end, log_time)
+        self._mcap.add_message(self._channels[name], log_time, data, publish_time, sequence)
+        self.counts[name] += 1
+        written = self._stream.tell()
+        self._pending = (
+            self._pending + len(data) + _MESSAGE_OVERHEAD if written == self._written else 0
+        )
+        self._written = written
+
+    def flush(self) -> None:
+        """End the chunk."""
+        self._mcap.flush()
+        self._written, self._pending = self._stream.tell(), 0
+
+    def close(self, metadata: str) -> None:
+        """Write the index."""
+        with self._stream:
+            self._mcap.add_metadata('rosbag2', {'serialized_metadata': metadata})
+            self._mcap.finish()
+
+
+def _compress(path: Path) -> Path:
+    """Compress a file; the original goes when that is done."""
+    packed = path.with_name(f'{path.name}.zstd')
+    with path.open('rb') as source, packed.open('xb') as sink:
+        zstandard.ZstdCompressor().copy_stream(source, sink)
+    shutil.copymode(path, packed)
+    path.unlink()
+    return packed

@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""QoS of recordings: what was offered, what fits all publishers, what is offered again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..aliases import QosProfile
+from ..bag.files import OfferedQos, UNLIMITED
+
+RECORD_DEPTH = 10_000
+"""Messages of a topic that may wait for the recorder: ten seconds at 1 kHz."""
+
+PLAY_DEPTH = 10
+
+_COMMON = ('reliability', 'durability', 'deadline', 'lifespan')
+
+
+def offered(profile: QosProfile) -> OfferedQos:
+    """Write down what a publisher offers."""
+    return OfferedQos(
+        profile.history.name.lower(),
+        profile.depth,
+        profile.reliability.name.lower(),
+        profile.durability.name.lower(),
+        profile.deadline.nanoseconds,
+        profile.lifespan.nanoseconds,
+        profile.liveliness.name.lower(),
+        profile.liveliness_lease_duration.nanoseconds,
+        profile.avoid_ros_namespace_conventions,
+    )
+
+
+def to_profile(qos: OfferedQos) -> QosProfile:
+    """Make a profile of rclpy."""
+    from rclpy import qos as rclpy_qos
+    from rclpy.duration import Duration
+
+    durations = {
+        name: Duration(nanoseconds=getattr(qos, name))
+        for name in ('deadline', 'lifespan', 'liveliness_lease_duration')
+        if getattr(qos, name) != UNLIMITED
+    }
+    return rclpy_qos.QoSProfile(
+        history=rclpy_qos.HistoryPolicy[qos.history.upper()],
+        depth=qos.depth,
+        reliability=rclpy_qos.ReliabilityPolicy[qos.reliability.upper()],
+        durability=rclpy_qos.DurabilityPolicy[qos.durability.upper()],
+        liveliness=rclpy_qos.LivelinessPolicy[qos.liveliness.upper()],
+        avoid_ros_namespace_conventions=qos.avoid_ros_namespace_conventions,
+        **durations,
+    )
+
+
+def for_recording(publishers: Sequence[OfferedQos]) -> OfferedQos:
+    """What connects to all publishers, and gets what they kept where all of them keep."""
+    reliable = all(each.reliability == 'reliable' for each in publishers)
+    latched = all(each.durability == 'transient_local' for each in publishers)
+    return OfferedQos(
+        'keep_last',
+        RECORD_DEPTH,
+        'reliable' if reliable else 'best_effort',
+        'transient_local' if latched and publishers else 'volatile',
+    )
+
+
+def for_playing(publishers: Sequence[OfferedQos]) -> OfferedQos:
+    """What the publishers of a recording offered, where they agreed; else the default."""
+    default = OfferedQos('keep_last', PLAY_DEPTH)
+    if not publishers:
+        return default
+    first = publishers[0]
+    depth = max(PLAY_DEPTH, *(each.depth for each in publishers))
+    common = {
+        name: getattr(first, name)
+        for name in _COMMON
+        if all(getattr(each, name) == getattr(first, name) for each in publishers)
+    }
+    return replace(default, depth=depth, **common)
+
+
+def overridden(qos: OfferedQos, depth: int) -> OfferedQos:
+    """A profile of a file with overrides, with the history that a file may leave out."""
+    if qos.history in {'unknown', 'system_default'}:
+        return replace(qos, history='keep_last', depth=qos.depth or depth)
+    return qos
+
+
+def is_compatible(requested: OfferedQos, publisher: OfferedQos) -> bool:
+    """Whether a subscription gets what a publisher sends."""
+    if requested.reliability == 'reliable' and publisher.reliability == 'best_effort':
+        return False
+    return not (requested.durability == 'transient_local' and publisher.durability == 'volatile')

@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 bag record`."""
+
+from __future__ import annotations
+
+from argparse import ArgumentTypeError, Namespace
+from pathlib import Path
+import sys
+import time
+
+from ..bag.files import bag_errors, BagWriter, Compression, load_overrides, Preset, WriterOptions
+from ..bag.selection import topic_filter
+from ..cli.arguments import unsigned_int
+from ..cli.errors import FrontendError
+from ..cli.interrupts import deferred_interrupts
+from ..cli.keyboard import keys
+from ..cli.verb import argument, flag, verb
+from ..ros.graph import Graph
+from ..ros.recorder import Recorder, RecordOptions
+from ..ros.session import open_session
+
+_NANO = 1_000_000_000
+
+
+def _key_value(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition('=')
+    if not key or not equals:
+        raise ArgumentTypeError(f'{text!r} is not KEY=VALUE')
+    return key, value
+
+
+_OUTPUT = (
+    argument(
+        '-o',
+        '--output',
+        help='Destination of the bagfile to create, defaults to a timestamped folder in the '
+        'current directory.',
+    ),
+    argument('-s', '--storage', default='mcap', choices=['mcap'], help='Storage identifier: mcap'),
+)
+_TOPICS = (
+    argument('topic_names', nargs='*', metavar='Topic', help='Topics to record'),
+    argument('--topics', default=[], metavar='Topic', nargs='+', help='List of topics to record.'),
+    argument(
+        '--topic-types', default=[], metavar='TopicType', nargs='+', help='Topic types to record.'
+    ),
+    flag('-a', '--all', help='Record all topics (hidden ones excluded).'),
+    flag('--all-topics', help='Record all topics (hidden ones excluded).'),
+    argument(
+        '-e',
+        '--regex',
+        default='',
+        help='Record only topics containing provided regular expression. --all overrides it.',
+    ),
+    argument(
+        '-x',
+        '--exclude-regex',
+        '--exclude',
+        default='',
+        help='Exclude topics containing provided regular expression.',
+    ),
+    argument(
+        '--exclude-topics', default=[], metavar='Topic', nargs='+', help='Topics to leave out.'
+    ),
+    argument(
+        '--exclude-topic-types',
+        default=[],
+        metavar='TopicType',
+        nargs='+',
+        help='Topic types to leave out.',
+    ),
+    flag('--include-unpublished-topics', help='Record topics which have no publisher, too.'),
+    flag('--include-hidden-topics', help='Record hidden topics, too.'),
+    flag('--no-discovery', help='Record only topics that are there at the start.'),
+    argument(
+        '-p',
+        '--polling-interval',
+        type=unsigned_int,
+        default=100,
+        metavar='MS',
+        help='Time [ms] between two looks for new topics (default: 100)',
+    ),
+    flag('--ignore-leaf-topics', help='Ignore topics without a subscription.'),
+    argument(
+        '--qos-profile-overrides-path',
+        metavar='FILE',
+        help='YAML file with QoS profiles for specific topics.',
+    ),
+)
+_FILES = (
+    argument(
+        '-b',
+        '--max-bag-size',
+        type=unsigned_int,
+        default=0,
+        metavar='BYTES',
+        help='Size from which the bagfile is split (default: 0, never)',
+    ),
+    argument(
+        '-d',
+        '--max-bag-duration',
+        type=unsigned_int,
+        default=0,
+        metavar='S',
+        help='Duration [s] from which the bagfile is split (default: 0, never)',
+    ),
+    argument(
+        '--max-cache-size',
+        type=unsigned_int,
+        default=100 * 1024 * 1024,
+        metavar='BYTES',
+        help='Messages that may wait for the disk; more are dropped and counted. 0 for no limit '
+        '(default: 104857600)',
+    ),
+    argument(
+        '--storage-preset-profile',
+        default=Preset.NONE.value,
+        choices=[each.value for each in Preset],
+        help='How MCAP is written; zstd_fast and zstd_small compress chunks, which every reader '
+        'of MCAP understands',
+    ),
+    argument(
+        '--compression-mode',
+        default='none',
+        choices=[each.name.lower() for each in Compression],
+        help='What zstd compresses (default: none)',
+    ),
+    argument('--compression-format', default='', choices=['', 'zstd'], help='zstd'),
+    argument(
+        '--custom-data',
+        type=_key_value,
+        metavar='KEY=VALUE',
+        nargs='*',
+        default=[],
+        help='Data to write into metadata.yaml.',
+    ),
+)
+_BEHAVIOUR = (
+    flag('--start-paused', help='Start the recorder in a paused state; SPACE resumes.'),
+    flag('--disable-keyboard-controls', help='Leave the keyboard alone.'),
+    argument('--node-name', default='rosbag2_recorder', help='Name of the recorder node.'),
+    flag(
+        '--use-sim-time',
+        dest='sim_time',
+        help='Stamp messages with /clock; nothing is recorded before its first message.',
+    ),
+)
+
+
+@verb(*_OUTPUT, *_TOPICS, *_FILES, *_BEHAVIOUR)
+def record(args: Namespace) -> None:
+    """Record until Ctrl-C or SIGTERM.
+
+    Raises:
+        FrontendError: When nothing is chosen, or the recording cannot be written.
+    """
+    options = _record_options(args)
+    folder = Path(args.output or time.strftime('rosbag2_%Y_%m_%d-%H_%M_%S'))
+    with open_session(args, args.node_name) as session:
+        with bag_errors():
+            writer = BagWriter(folder, _writer_options(args))
+        recorder = Recorder(Graph(session), writer, options)
+        recorder.paused = args.start_paused
+        log = session.node.get_logger()
+        with keys(not args.disable_keyboard_controls) as typed:
+
+            def poll() -> None:
+                if typed().count(' ') % 2:
+                    recorder.paused = not recorder.paused
+                    log.info('Pausing recording.' if recorder.paused else 'Resuming recording.')
+
+            try:
+                log.info('Press SPACE for pausing/resuming')
+                recorder.run(poll)
+            except KeyboardInterrupt:  # the one way to end a recording
+                pass
+            finally:
+                _stop(recorder)
+        total = sum(recorder.counts.values())
+        session.node.get_logger().info(f"Recording stopped: {total} messages in '{folder}'")
+
+
+def _stop(recorder: Recorder) -> None:
+    try:
+        with deferred_interrupts():
+            recorder.stop()
+    except KeyboardInterrupt:  # once more, while the files were being finished
+        pass
+
+
+def _record_options(args: Namespace) -> RecordOptions:
+    if args.topic_names:
+        print("Positional argument 'topics' is deprecated. Use --topics instead.", file=sys.stderr)
+    args.topics = [*args.topic_names, *args.topics]
+    everything = args.all or args.all_topics
+    if not (everything or args.topics or args.topic_types or args.regex):
+        raise FrontendError(
+            'Need to specify at least one option out of --all, --all-topics, --topics, '
+            '--topic-types or --regex'
+        )
+    if args.compression_mode != 'none' and not args.compression_format:
+        raise FrontendError(
+            'Invalid choice: Cannot specify compression mode without a compression format.'
+        )
+    return RecordOptions(
+        topic_filter(args, everything, args.include_hidden_topics),
+        args.include_unpublished_topics,
+        not args.ignore_leaf_topics,
+        not args.no_discovery,
+        args.polling_interval / 1000.0,
+        args.max_cache_size,
+        load_overrides(args.qos_profile_overrides_path),
+        args.sim_time,
+    )
+
+
+def _writer_options(args: Namespace) -> WriterOptions:
+    return WriterOptions(
+        args.max_bag_size,
+        args.max_bag_duration * _NANO,
+        Compression[args.compression_mode.upper()],
+        Preset(args.storage_preset_profile),
+        custom=dict(args.custom_data),
+    )

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""`ros2 bag` with real processes over DDS, read by implementations that are not ours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+import signal
+import sys
+import time
+
+from frontend_cli import PROGRAM, Ros2, with_frontend
+from isolation import reserve
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from processes import RunningProcess
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import get_typestore, Stores
+
+pytestmark = pytest.mark.scenario
+
+SOURCE = Path(__file__).with_name('frontend_source.py')
+RECORDING = 'Recording...'
+TIMEOUT = 30.0  # [s]
+
+
+@pytest.fixture
+def env(monkeypatch: pytest.MonkeyPatch) -> Iterator[Mapping[str, str]]:
+    """Give an environment with a ROS domain of its own; this process is in it, too."""
+    with reserve() as isolation:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(isolation.domain_id))
+        yield with_frontend(isolation.env)
+
+
+def record(env: Mapping[str, str], folder: Path, *words: str) -> RunningProcess:
+    """Start `ros2 bag record`."""
+    return RunningProcess([*PROGRAM, 'bag', 'record', '-o', str(folder), *words], env)
+
+
+def source(env: Mapping[str, str], count: int, period: float = 0.001) -> RunningProcess:
+    """Start the publisher."""
+    return RunningProcess([sys.executable, str(SOURCE), str(count), str(period)], env)
+
+
+def until(condition: Callable[[], bool], process: RunningProcess) -> None:
+    """Wait for what a process that runs brings about."""
+    deadline = time.monotonic() + TIMEOUT
+    while not condition():
+        assert process.is_running, process.output
+        assert time.monotonic() < deadline, process.output
+        time.sleep(0.05)
+
+
+def read(folder: Path) -> dict[str, list[object]]:
+    """Return the values of each topic, read by rosbags from metadata.yaml on."""
+    found: dict[str, list[object]] = {}
+    with AnyReader([folder], default_typestore=get_typestore(Stores.EMPTY)) as reader:
+        for connection, _, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            found.setdefault(connection.topic, []).append(getattr(message, 'data', None))
+        assert reader.message_count == sum(map(len, found.values()))
+    return found
+
+
+def test_every_message_is_recorded(env: Mapping[str, str], tmp_path: Path) -> None:
+    """Of topics that appear later, and what a latched one kept: as many as were published."""
+    folder = tmp_path / 'bag'
+    with record(env, folder, '-a') as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 3000) as publisher:
+            publisher.wait_for('published')
+            assert recorder.stop() == 0
+    found = read(folder)
+    assert found['/numbers'] == list(range(3000))
+    assert found['/loose'] == list(range(3000))
+    assert found['/latched'] == ['kept']
+    assert 'lost' not in recorder.output
+    assert f'Recording stopped: {sum(map(len, found.values()))} messages' in recorder.output
+    with (folder / 'bag_0.mcap').open('rb') as stream:
+        decoded = make_reader(stream, decoder_factories=[DecoderFactory()])
+        numbers = [each.decoded_message.data for each in decoded.iter_decoded_messages('/numbers')]
+    assert numbers == list(range(3000))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_a_whole_recording(
+    env: Mapping[str, str], tmp_path: Path, number: signal.Signals
+) -> None:
+    """While messages arrive."""
+    with record(env, tmp_path / 'bag', '--topics', '/numbers', '/loose') as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 100_000) as publisher:
+            publisher.wait_for('connected')
+            recorder.signal(number)
+            assert recorder.wait() == 0
+    numbers = read(tmp_path / 'bag').get('/numbers', [])
+    assert numbers == list(range(len(numbers)))
+
+
+def test_after_a_kill_all_but_the_last_second_is_there(
+    env: Mapping[str, str], tmp_path: Path, ros2: Ros2
+) -> None:
+    """`info` and `play` read it as it is, `reindex` finishes it for others."""
+    folder = tmp_path / 'bag'
+    with record(env, folder, '-a') as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 1000) as publisher:
+            publisher.wait_for('published')
+            file = folder / 'bag_0.mcap'
+            until(lambda: b'/numbers' in file.read_bytes(), recorder)
+            recorder.signal(signal.SIGKILL)
+            recorder.wait()
+    outcome = ros2('bag', 'info', str(folder))
+    assert outcome.code == 0
+    assert 'Topic: /numbers | Type: std_msgs/msg/UInt32 | Count: ' in outcome.out
+    assert 'was not finished' in outcome.err
+    assert ros2('bag', 'reindex', str(folder)).code == 0
+    numbers = read(folder)['/numbers']
+    assert numbers == list(range(len(numbers)))
+    assert numbers
+
+
+def test_what_is_recorded_is_played(env: Mapping[str, str], tmp_path: Path) -> None:
+    """Recording what is played gives what was recorded: bytes, order, QoS; under another name."""
+    first, second = tmp_path / 'first', tmp_path / 'second'
+    with record(env, first, '-a', '-x', 'rosout|parameter') as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 300) as publisher:
+            publisher.wait_for('published')
+            recorder.stop()
+    topics = ['--topics', '/counted', '/loose', '/latched']
+    with record(env, second, *topics) as recorder:
+        recorder.wait_for(RECORDING)
+        words = ['bag', 'play', str(first), '--remap', '/numbers:=/counted', '--delay', '2']
+        with RunningProcess([*PROGRAM, *words], env) as player:
+            assert player.wait(60.0) == 0
+        recorder.stop()
+    before, after = read(first), read(second)
+    assert after['/counted'] == before['/numbers'] == list(range(300))
+    assert after['/loose'] == before['/loose']
+    assert after['/latched'] == ['kept']
+
+
+def test_play_chooses_a_part_and_a_rate(
+    env: Mapping[str, str], tmp_path: Path, ros2: Ros2
+) -> None:
+    """From an offset on, of one topic, a thousand times faster; in a loop until it is ended."""
+    first, second = tmp_path / 'first', tmp_path / 'second'
+    with record(env, first, '-e', 'numbers|loose') as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 100, 0.02) as publisher:
+            publisher.wait_for('published')
+            recorder.stop()
+    with record(env, second, '--topics', '/numbers', '/clock') as recorder:
+        recorder.wait_for(RECORDING)
+        words = ['bag', 'play', str(first), '--topics', '/numbers', '--start-offset', '1']
+        words += ['-r', '1000', '-l', '--delay', '1', '--clock', '100']
+        with RunningProcess([*PROGRAM, *words], env) as player:
+            recorder.wait_for("Subscribed to topic '/numbers'")
+            recorder.wait_for("Subscribed to topic '/clock'")
+            assert player.is_running
+            until(lambda: '/clock' in ros2('topic', 'list').lines, player)
+            ros2('topic', 'echo', '/numbers', '--once')
+            player.signal(signal.SIGINT)
+            assert player.wait() == 0
+        recorder.stop()
+    found = read(second)
+    assert 99 in found['/numbers']
+    numbers = [number for number in found['/numbers'] if isinstance(number, int)]
+    assert min(numbers) > 10
+    assert found['/clock']
+
+
+def test_a_split_recording_with_compression(
+    env: Mapping[str, str], tmp_path: Path, ros2: Ros2
+) -> None:
+    """Several files, which is one recording for a reader."""
+    folder = tmp_path / 'bag'
+    words = ['--topics', '/numbers', '/loose', '--max-bag-size', '20000']
+    words += ['--compression-mode', 'file', '--compression-format', 'zstd']
+    with record(env, folder, *words) as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 1000) as publisher:
+            publisher.wait_for('published')
+            recorder.stop()
+    assert len(list(folder.glob('*.mcap.zstd'))) > 2
+    assert read(folder)['/numbers'] == list(range(1000))
+    lines = ros2('bag', 'info', '-v', str(folder)).lines
+    assert any('Size Contribution: 7.8 KiB' in line for line in lines)
+    assert ros2('bag', 'info', '-t', str(folder)).lines == ['/loose', '/numbers']
+
+
+def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_path: Path) -> None:
+    """A recorder that keeps ten messages is stopped while a thousand come."""
+    overrides = tmp_path / 'qos.yaml'
+    overrides.write_text('/numbers: {history: keep_last, depth: 10}\n')
+    folder = tmp_path / 'bag'
+    words = ['--topics', '/numbers', '/loose', '--qos-profile-overrides-path', str(overrides)]
+    with record(env, folder, *words) as recorder:
+        recorder.wait_for(RECORDING)
+        with source(env, 2000) as publisher:
+            recorder.wait_for("Subscribed to topic '/numbers'")
+            publisher.wait_for('connected')
+            recorder.signal(signal.SIGSTOP)
+            publisher.wait_for('published')
+            recorder.signal(signal.SIGCONT)
+            recorder.wait_for("messages of '/numbers' were lost")
+            recorder.stop()
+    numbers = read(folder)['/numbers']
+    lost = 2000 - len(numbers)
+    assert lost > 0
+    assert f'/numbers: {lost}' in recorder.output
+
+
+@pytest.mark.parametrize(
+    ('words', 'problem'),
+    [
+        (('record',), 'Need to specify at least one option'),
+        (('record', '-e', '['), "'[' is no regular expression"),
+        (('record', '-a', '--compression-mode', 'file'), 'Cannot specify compression mode'),
+        (('record', '-a', '-o', '.'), 'already exists'),
+        (('info', '/nothing'), "Bag path '/nothing' does not exist!"),
+        (('play', '/nothing'), "Bag path '/nothing' does not exist!"),
+        (('reindex', '/'), 'holds no recording'),
+    ],
+)
+def test_refusals(
+    env: Mapping[str, str], ros2: Ros2, words: tuple[str, ...], problem: str
+) -> None:
+    """One sentence, and exit code 1."""
+    outcome = ros2('bag', *words)
+    assert outcome.code == 1
+    assert problem in outcome.err

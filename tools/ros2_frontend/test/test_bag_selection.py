@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which topics are recorded, what was lost of them, and what `info` prints."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from hypothesis import given, strategies
+import pytest
+
+from ros2_frontend.bag.files import BagMetadata, OfferedQos, Topic
+from ros2_frontend.bag.info_text import info_text, size_text
+from ros2_frontend.bag.losses import LossCounter
+from ros2_frontend.bag.selection import TopicFilter
+from ros2_frontend.index.definition import concatenated
+from ros2_frontend.ros.bag_qos import for_playing, for_recording, is_compatible
+from rosbag_files import BagFile, TopicCount
+
+TYPE = 'std_msgs/msg/String'
+ONE = {b'one'}
+
+
+@pytest.mark.parametrize(
+    ('options', 'accepted'),
+    [
+        ({'everything': True}, ['/chatter', '/arm/joint_states']),
+        ({'everything': True, 'hidden': True}, ['/chatter', '/arm/joint_states', '/_hidden']),
+        ({'topics': frozenset(['/chatter', '/_hidden'])}, ['/chatter', '/_hidden']),
+        ({'types': frozenset([TYPE])}, ['/chatter', '/arm/joint_states']),
+        ({'regex': re.compile('joint')}, ['/arm/joint_states']),
+        ({'everything': True, 'excluded_regex': re.compile('^/arm')}, ['/chatter']),
+        ({'everything': True, 'excluded_topics': frozenset(['/chatter'])}, ['/arm/joint_states']),
+        ({'everything': True, 'excluded_types': frozenset([TYPE])}, []),
+        ({}, []),
+    ],
+)
+def test_topics_are_chosen_and_left_out(options: Any, accepted: list[str]) -> None:
+    """As rosbag2 does; what is left out wins."""
+    wanted = TopicFilter(**options)
+    names = ['/chatter', '/arm/joint_states', '/_hidden']
+    assert [name for name in names if wanted.accepts(name, TYPE)] == accepted
+
+
+@given(strategies.sets(strategies.integers(min_value=1, max_value=60), min_size=1))
+def test_every_missing_number_is_counted(received: set[int]) -> None:
+    """Between the first and the last that came, whenever the graph is looked at."""
+    counter = LossCounter()
+    counter.confirm(ONE)
+    for number in sorted(received):
+        counter.receive(number)
+        if number % 3 == 0:
+            counter.confirm(ONE)
+    counter.confirm(ONE)
+    assert counter.lost == max(received) - min(received) + 1 - len(received)
+
+
+def test_another_publisher_is_no_loss() -> None:
+    """Its numbers are its own, also before the graph shows it; what was counted stays."""
+    counter = LossCounter()
+    counter.confirm(ONE)
+    for number in (1, 2, 5):
+        counter.receive(number)
+    assert counter.confirm(ONE) == 2
+    for number in (900, 6, 901):
+        counter.receive(number)
+    assert counter.confirm({b'one', b'two'}) == 0
+    counter.receive(2000)
+    assert counter.confirm({b'two'}) == 0
+    assert counter.lost == 2
+
+
+def test_a_publisher_that_begins_again_is_no_loss() -> None:
+    """It counts from 1."""
+    counter = LossCounter()
+    counter.confirm(ONE)
+    for number in (50, 51, 1, 2):
+        counter.receive(number)
+    assert counter.confirm(ONE) == 0
+
+
+def test_a_middleware_without_numbers_counts_nothing() -> None:
+    """Other than Fast DDS."""
+    counter = LossCounter()
+    counter.confirm(ONE)
+    counter.receive(None)
+    counter.receive(7)
+    assert counter.confirm(ONE) == 0
+
+
+def test_info_has_the_form_of_rosbag2() -> None:
+    """To the letter; times in the local zone are left to the pattern."""
+    files = (BagFile('bag_0.mcap', 10**18, 2_500_000_000, 3), BagFile('bag_1.mcap', 0, 0, 0))
+    topics = tuple(TopicCount(Topic(name, TYPE), count) for name, count in (('/b', 1), ('/a', 2)))
+    text = info_text(BagMetadata(files, topics), 2048, {'/a': 500})
+    topic = r'Topic: {} \| Type: std_msgs/msg/String \| Count: {} \| Size Contribution: {} B \| '
+    assert re.fullmatch(
+        r'\nFiles:             bag_0.mcap\n'
+        r'                   bag_1.mcap\n'
+        r'Bag size:          2.0 KiB\n'
+        r'Storage id:        mcap\n'
+        r'ROS Distro:        jazzy\n'
+        r'Duration:          2.500000000s\n'
+        r'Start:             Sep +\d 2001 ..:..:40.000000000 \(1000000000.000000000\)\n'
+        r'End:               Sep +\d 2001 ..:..:42.500000000 \(1000000002.500000000\)\n'
+        r'Messages:          3\n'
+        rf'Topic information: {topic.format("/a", 2, 500)}Serialization Format: cdr\n'
+        rf'                   {topic.format("/b", 1, 0)}Serialization Format: cdr\n'
+        r'Service:           0\n'
+        r'Service information: ',
+        text,
+    ), text
+
+
+@pytest.mark.parametrize(
+    ('size', 'text'), [(0, '0 B'), (1023, '1023 B'), (1536, '1.5 KiB'), (2**50, '1024.0 TiB')]
+)
+def test_sizes(size: int, text: str) -> None:
+    """In the unit that suits them."""
+    assert size_text(size) == text
+
+
+def test_definitions_are_concatenated() -> None:
+    """Each nested type once, below its name; of the same package or another."""
+    texts = {
+        'a/msg/Top': 'Nested one\nb/Other[] others\nuint8 X=1 # Nested\n',
+        'a/msg/Nested': 'b/Other other\n',
+        'b/msg/Other': 'float64 x\n',
+    }
+    line = '=' * 80
+    assert concatenated('a/msg/Top', texts.__getitem__) == (
+        f'{texts["a/msg/Top"]}\n{line}\nMSG: a/msg/Nested\n{texts["a/msg/Nested"]}\n'
+        f'{line}\nMSG: b/msg/Other\n{texts["b/msg/Other"]}'
+    )
+
+
+RELIABLE, LATCHED = OfferedQos(), OfferedQos(durability='transient_local')
+BEST_EFFORT = OfferedQos(reliability='best_effort')
+OFFERS = strategies.lists(strategies.sampled_from([RELIABLE, LATCHED, BEST_EFFORT]), min_size=1)
+
+
+@given(OFFERS)
+def test_a_recorder_connects_to_all_publishers(offers: list[OfferedQos]) -> None:
+    """And gets what was kept, and repeated, where all publishers offer that."""
+    qos = for_recording(offers)
+    assert all(is_compatible(qos, offer) for offer in offers)
+    assert (qos.durability == 'transient_local') == all(offer == LATCHED for offer in offers)
+    assert (qos.reliability == 'reliable') == (BEST_EFFORT not in offers)
+
+
+@given(OFFERS)
+def test_a_player_offers_what_was_offered(offers: list[OfferedQos]) -> None:
+    """A subscription of then that all publishers served is served now."""
+    qos = for_playing(offers)
+    if len(set(offers)) == 1:
+        assert (qos.reliability, qos.durability) == (offers[0].reliability, offers[0].durability)
+    else:
+        assert qos.durability == 'volatile' or all(offer == LATCHED for offer in offers)
