@@ -79,7 +79,6 @@ def test_all_of_arm_and_quadruped_is_recorded(isolation: Isolation, tmp_path: Pa
         assert {
             name: topic.msgcount for name, topic in reader.topics.items() if topic.msgcount
         } == {name: len(each) for name, each in numbers.items()}
-        offered = {each.topic: len(each.ext.offered_qos_profiles) for each in reader.connections}
     cyclic = ['/joint_states', '/imu', *(f'/{joint}/joint_states' for joint in JOINTS)]
     for name in cyclic:
         assert len(numbers[name]) > DURATION * RATE, name
@@ -90,4 +89,3 @@ def test_all_of_arm_and_quadruped_is_recorded(isolation: Isolation, tmp_path: Pa
     nodes = len(JOINTS) + 10
     for name in SEVERAL & set(numbers):
         assert lost or runs(numbers[name]) <= nodes, name
-    assert offered['/joint_states'] == 1

@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 import pytest
-from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from sample_bag import add, COUNT, EPOCH, message, plain, read_by_rosbags, SECOND, TEXT, write
 import yaml
@@ -87,6 +87,7 @@ def test_rosbags_reads_it(tmp_path: Path, compression: Compression, preset: Pres
         (connection,) = (each for each in reader.connections if each.topic == TEXT.name)
         assert connection.digest == TEXT.type_hash
         assert connection.msgdef.data == TEXT.definition
+        assert isinstance(connection.ext, ConnectionExtRosbag2)
         first, second = connection.ext.offered_qos_profiles
         assert first.durability == QosDurability.TRANSIENT_LOCAL
         assert second.reliability == QosReliability.BEST_EFFORT

@@ -48,7 +48,7 @@ def until(condition: Callable[[], bool], process: RunningProcess) -> None:
     """Wait for what a process that runs brings about."""
     deadline = time.monotonic() + TIMEOUT
     while not condition():
-        assert process.is_running, process.output
+        assert process.is_running(), process.output
         assert time.monotonic() < deadline, process.output
         time.sleep(0.05)
 
@@ -160,7 +160,7 @@ def test_play_chooses_a_part_and_a_rate(
         with RunningProcess([*PROGRAM, *words], env) as player:
             recorder.wait_for("Subscribed to topic '/numbers'")
             recorder.wait_for("Subscribed to topic '/clock'")
-            assert player.is_running
+            assert player.is_running()
             until(lambda: '/clock' in ros2('topic', 'list').lines, player)
             ros2('topic', 'echo', '/numbers', '--once')
             player.signal(signal.SIGINT)
