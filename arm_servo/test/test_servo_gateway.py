@@ -496,7 +496,7 @@ def test_when_the_core_raises_every_command_ends_with_words(
     for command in commands:
         command.ended.add_done_callback(lambda future: ends.append(future.result().reason))
 
-    def fail(*_: object) -> None:
+    def fail(*_: object, **_kwargs: object) -> None:
         raise ArithmeticError('no number')
 
     monkeypatch.setattr(SafetyFilter, 'step', fail)
