@@ -62,10 +62,7 @@ class TfFrames:
         with self._lock:
             self._read()
             now = time.monotonic()
-            found = self._tree.pose(frame, root, now)
-            if found is not None:
-                return found
-            for link in self._kinematics.frames:
+            for link in (root, *self._kinematics.frames):
                 in_link = self._tree.pose(frame, link, now)
                 if in_link is not None:
                     return combined(self._kinematics.link_pose(link, positions), in_link)
