@@ -30,8 +30,9 @@ PACKAGES = {
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
 DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
-ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'mcap', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
-ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro', 'zstandard'}
+ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
+ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
+ON_PYPI |= {'mcap', 'zstandard'}
 ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
 """Keys of rosdep for them."""
 OF_TESTS = {

@@ -9,7 +9,7 @@ from .exceptions import BagError
 from .metadata import BagFile, BagMetadata, METADATA_FILE, Topic, TopicCount
 from .qos import OfferedQos, read_qos, UNLIMITED
 from .reader import BagMessage, BagReader
-from .repair import repair
+from .recovery import repair
 from .writer import BagWriter, Compression, Preset, WriterOptions
 
 __all__ = [

@@ -236,7 +236,7 @@ class McapFile:
 
     def size(self) -> int:
         """Size in [byte], with what is in no chunk yet."""
-        return self._stream.tell() + self._pending
+        return self._stream.tell() + self._pending  # codespell:ignore
 
     def add_topic(self, topic: Topic) -> None:
         """Register a topic and, once, the type of its messages."""
@@ -264,7 +264,7 @@ class McapFile:
         self._end = log_time if first else max(self._end, log_time)
         self._mcap.add_message(self._channels[name], log_time, data, publish_time, sequence)
         self.counts[name] += 1
-        written = self._stream.tell()
+        written = self._stream.tell()  # codespell:ignore
         self._pending = (
             self._pending + len(data) + _MESSAGE_OVERHEAD if written == self._written else 0
         )
@@ -273,7 +273,7 @@ class McapFile:
     def flush(self) -> None:
         """End the chunk."""
         self._mcap.flush()
-        self._written, self._pending = self._stream.tell(), 0
+        self._written, self._pending = self._stream.tell(), 0  # codespell:ignore
 
     def close(self, metadata: str) -> None:
         """Write the index."""
