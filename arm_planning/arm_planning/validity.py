@@ -2,26 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether an arm may be somewhere, or follow a path: limits of position, and contact.
 
-A path is laid out in places between which no shape moves by more than twice :data:`MARGIN`
-against another. A pair that is measured at one of them stays apart for as long as its shapes
-cannot have moved by its distance, by the scene's distance rate bounds; there it is measured again,
-and must have :data:`MARGIN` left. So nothing touches between two places either, and pairs that are
-far apart are measured a few times on the whole path.
+A path is halved again and again. In the middle of each part the pairs are measured that are not
+yet known to stay apart there: their shapes could move by their distance within that part, by the
+scene's distance rate bounds. Each must have :data:`MARGIN` left where it is measured. So nothing
+touches between two looks either, and pairs that are far apart are measured a few times.
 
 Where start or goal are nearer to contact than that, the pair may be as near on the way as it is
-there, and the places are denser; a contact of less than :data:`MIN_MARGIN` can then remain.
+there, and the looks are denser; a contact of less than :data:`MIN_MARGIN` can then remain.
 """
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
+from itertools import pairwise
 import math
 
 import numpy as np
 import pinocchio as pin
 
-from arm_model import Array, Clearances, Contact, JointLimits, Places, PlanningScene
+from arm_model import Array, Clearances, Contact, JointLimits, PlanningScene
 from arm_trajectory import Path
 
 MARGIN = 1e-3
@@ -35,6 +36,12 @@ LIMIT_TOLERANCE = 1e-6
 
 DEGREE = 5
 """Of the polynomials of a path."""
+
+CELLS = 8
+"""Parts of a segment of a path of which each has its own bound of the motion."""
+
+FIRST_PART = 1.0
+"""Motion of a shape within the parts of a path that are looked at first in [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +73,10 @@ class ValidityCheck:
         """
         self._limits = limits
         self._clearances = Clearances(scene)
-        self._data = scene.kinematics.native.createData()
+        self._kinematics, self._geometry = scene.kinematics, scene.geometry
+        self._native, self._data = scene.kinematics.native, scene.kinematics.native.createData()
         self._results = scene.geometry.createData()
+        self._found = list(self._results.distanceResults)  # they refer to it
 
     @property
     def scene(self) -> PlanningScene:
@@ -82,13 +91,38 @@ class ValidityCheck:
         """
         return self._beyond(positions, positions, 0.0) or self._touching(positions, 0.0)
 
-    def least_margin(self, positions: Array) -> float:
-        """Return the distance that every pair has, :data:`MARGIN` at most, in [m].
+    def required(self, *ends: Array) -> Array:
+        """Return the distance that each pair keeps on motions between some states in [m] (k).
 
         Args:
-            positions: Joint positions in [rad] (n).
+            ends: Joint positions in [rad] (n).
         """
-        return float(self._clearances.least(positions, MARGIN).min(initial=MARGIN))
+        least = [self._clearances.least(each, MARGIN).copy() for each in ends]
+        required: Array = np.clip(np.min(least, axis=0), 0.0, MARGIN) - LIMIT_TOLERANCE
+        return required
+
+    def near(self, begin: Array, end: Array, required: Sequence[float]) -> Array | None:
+        """Return a place of a straight motion at which a pair is nearer than it may be, or None.
+
+        Args:
+            begin: Joint positions in [rad] (n).
+            end: Joint positions in [rad] (n).
+            required: Distance that each pair keeps in [m] (k).
+        """
+        way = end - begin
+        motions = (self._clearances.distance_rate_bounds @ np.abs(way)).tolist()
+        parts = deque([(0.5, 0.5, range(len(required)))])  # their middle, half their length
+        while parts:
+            middle, half, pairs = parts.popleft()
+            place = begin + middle * way
+            left = self._doubtful(place, pairs, required, motions, half)
+            if left is None:
+                return place
+            if left:
+                half *= 0.5
+                parts.append((middle - half, half, left))
+                parts.append((middle + half, half, left))
+        return None
 
     def waypoints(self, places: Array) -> Violation | None:
         """Return what is wrong with the straight lines between places; None for nothing.
@@ -99,14 +133,12 @@ class ValidityCheck:
         lower, upper = places.min(axis=0), places.max(axis=0)
         if (beyond := self._beyond(lower, upper, 0.0)) is not None:
             return beyond
-        required, spacing = self._required(places[0], places[-1])
-        motions = self._motions(np.abs(np.diff(places, axis=0)))
-        counts = np.ceil(motions / spacing).astype(int) + 1
-        segments, shares = _laid_out(counts)
-        rows = places[segments] + shares[:, None] * np.diff(places, axis=0)[segments]
-        rows = np.concatenate((rows, places[-1:]))
-        place = self._first_near(rows, np.abs(np.diff(rows, axis=0)), required)
-        return None if place is None else self._near(rows[place], 0.0)
+        required = self.required(places[0], places[-1]).tolist()
+        for begin, end in pairwise(places):
+            place = self.near(begin, end, required)
+            if place is not None:
+                return self._near(place, 0.0)
+        return None
 
     def path(self, path: Path) -> Violation | None:
         """Return what is wrong with a path, of its positions; None for nothing.
@@ -122,60 +154,75 @@ class ValidityCheck:
         for segment in np.flatnonzero(outside.any(axis=1)).tolist():
             time = float(path.starts[segment])
             return self._beyond(lower[segment], upper[segment], time)
-        required, spacing = self._required(path.at(0.0).position, path.end.position)
-        most = DEGREE * np.abs(np.diff(control, axis=1)).max(axis=1)  # bounds the way of a segment
-        bend = (DEGREE - 1) * DEGREE * np.abs(np.diff(control, 2, axis=1)).max(axis=1)
-        counts = np.maximum(np.ceil(self._motions(most) / spacing).astype(int), 1)
-        segments, shares = _laid_out(counts)
-        times = path.starts[segments] + path.durations[segments] * shares
-        times = np.append(times, path.duration)
-        rows = path.positions(times)
-        # what turns back between two rows, by the second derivative
-        turned = 0.5 * (bend / counts[:, None] ** 2)[segments]
-        place = self._first_near(rows, np.abs(np.diff(rows, axis=0)) + turned, required)
-        return None if place is None else self._near(rows[place], float(times[place]))
+        time = self._near_time(path, control)
+        return None if time is None else self._near(path.at(time).position, time)
 
-    def _motions(self, ways: Array) -> Array:
-        """Return how far a shape moves against another at most in [m] (m) on ways (m, n)."""
-        motions: Array = (ways @ self._clearances.distance_rate_bounds.T).max(axis=1, initial=0.0)
-        return motions
-
-    def _required(self, start: Array, goal: Array) -> tuple[Array, float]:
-        """Return the distance that each pair must keep in [m] (k), and that of the places."""
-        ends = np.minimum(*(self._clearances.least(each, MARGIN).copy() for each in (start, goal)))
-        required = np.clip(ends, 0.0, MARGIN)
-        margin = max(float(required.min(initial=MARGIN)), MIN_MARGIN)
-        return required - LIMIT_TOLERANCE, 2.0 * margin
-
-    def _first_near(self, rows: Array, ways: Array, required: Array) -> int | None:
-        """Return a row at which a pair is nearer than it may be; None for none.
+    def _near_time(self, path: Path, control: Array) -> float | None:
+        """Return a time at which a pair is nearer than it may be; None where none is.
 
         Args:
-            rows: Joint positions in [rad] (m, n).
-            ways: How far each joint turns at most from a row to the next in [rad] (m - 1, n).
-            required: Distance of each pair in [m] (k).
+            path: The path.
+            control: Control values of its segments.
         """
-        scene, last = self.scene, len(rows) - 1
-        native, geometry = scene.kinematics.native, scene.geometry
-        moved = np.zeros((len(required), len(rows)))
-        np.cumsum(scene.distance_rate_bounds @ ways.T, axis=1, out=moved[:, 1:])
-        due = [(0, pair) for pair in range(len(required))]  # a heap: where to measure which pair
-        here = -1
-        while due:
-            row, pair = heappop(due)
-            if row != here:
-                here = row
-                expanded = scene.kinematics.expanded(rows[row])
-                pin.forwardKinematics(native, self._data, expanded)
-                pin.updateGeometryPlacements(native, self._data, geometry, self._results)
-            distance = pin.computeDistance(geometry, self._results, pair).min_distance
-            if distance < required[pair]:
-                return row
-            along = moved[pair]
-            reach = int(along.searchsorted(along[row] + distance, 'right')) - 1
-            if reach < last:
-                heappush(due, (max(reach, row + 1), pair))
+        times, turned = _cells(path, control)
+        rates, cells = self._clearances.distance_rate_bounds, np.arange(float(len(times)))
+        required = self.required(path.at(0.0).position, path.end.position).tolist()
+        along = turned @ rates.max(axis=0, initial=0.0)  # halves of a part move alike
+        ends = np.linspace(0.0, along[-1], max(math.ceil(along[-1] / FIRST_PART), 1) + 1)
+        parts = np.stack((ends[:-1], ends[1:]), axis=1)
+        pairs: list[Sequence[int]] = [range(len(required))] * len(parts)
+        while len(parts):
+            looks = np.insert(parts, 1, parts.mean(axis=1), axis=1)
+            places = np.interp(looks, along, cells)
+            when = np.interp(places[:, 1], cells, times)
+            turns = np.diff(_interpolated(turned, places), axis=1).max(axis=1)
+            motions = (turns @ rates.T).tolist()
+            rows = zip(when.tolist(), path.positions(when), pairs, motions, looks, strict=True)
+            halves, doubtful = [], []
+            for time, row, here, moved, (first, middle, last) in rows:
+                left = self._doubtful(row, here, required, moved, 1.0)
+                if left is None:
+                    return time
+                if left:
+                    halves += [(first, middle), (middle, last)]
+                    doubtful += [left, left]
+            parts, pairs = np.array(halves), doubtful
         return None
+
+    def _doubtful(
+        self,
+        place: Array,
+        pairs: Sequence[int],
+        required: Sequence[float],
+        motions: Sequence[float],
+        share: float,
+    ) -> list[int] | None:
+        """Return the pairs that may come near within a part; None where one is too near.
+
+        Args:
+            place: The middle of the part in [rad] (n).
+            pairs: Those that are measured.
+            required: Distance of each pair in [m] (k).
+            motions: How far the shapes of each move at most on some way in [m] (k).
+            share: Of that way, from the middle to an end of the part.
+        """
+        geometry, results, found = self._geometry, self._results, self._found
+        expanded = self._kinematics.expanded(place)
+        pin.updateGeometryPlacements(self._native, self._data, geometry, results, expanded)
+        if len(pairs) == len(found):  # all at once, which is quicker than one by one
+            pin.computeDistances(geometry, results)
+        else:
+            for pair in pairs:
+                pin.computeDistance(geometry, results, pair)
+        left = []
+        for pair in pairs:
+            distance = found[pair].min_distance
+            if distance < required[pair]:
+                return None
+            moved = share * motions[pair]
+            if moved > distance and moved > MIN_MARGIN:
+                left.append(pair)
+        return left
 
     def _beyond(self, lower: Array, upper: Array, time: float) -> Violation | None:
         limits = self._limits
@@ -215,11 +262,34 @@ class ValidityCheck:
         return Violation(reason, positions, None, time)
 
 
-def _laid_out(counts: Places) -> tuple[Places, Array]:
-    """Return segments that are cut into counts of parts: their numbers, and where each begins."""
-    segments = np.repeat(np.arange(len(counts)), counts)
-    numbers = np.arange(len(segments)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return segments, numbers / counts[segments]
+def _cells(path: Path, control: Array) -> tuple[Array, Array]:
+    """Return the times (c) that cut a path into cells, and how far the joints turned until then.
+
+    Within a cell the latter grows evenly, and nowhere less than a joint turns: it is bounded by
+    the velocity at the ends of the cell and how much it changes between them.
+
+    Args:
+        path: The path.
+        control: Control values of its segments.
+    """
+    count = len(path.durations)
+    segments = np.repeat(np.arange(count), CELLS)
+    lasts = np.repeat(path.durations / CELLS, CELLS)
+    offsets = np.tile(np.arange(CELLS) / CELLS, count) * path.durations[segments]
+    ends = [np.abs(path.derived(1, segments, each)) for each in (offsets, offsets + lasts)]
+    bend = (DEGREE - 1) * DEGREE * np.abs(np.diff(control, 2, axis=1)).max(axis=1)
+    bend /= path.durations[:, None] ** 2
+    most = np.maximum(*ends) + 0.5 * lasts[:, None] * bend[segments]
+    turned = np.concatenate((np.zeros((1, most.shape[1])), np.cumsum(most * lasts[:, None], 0)))
+    return np.append(path.starts[segments] + offsets, path.duration), turned
+
+
+def _interpolated(rows: Array, places: Array) -> Array:
+    """Return rows (m, n) at places between their numbers."""
+    before = np.minimum(places.astype(int), len(rows) - 2)
+    share = (places - before)[..., None]
+    found: Array = rows[before] + share * (rows[before + 1] - rows[before])
+    return found
 
 
 def _control_values(path: Path) -> Array:

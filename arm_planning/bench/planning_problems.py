@@ -20,7 +20,7 @@ from arm_model import (
     Pose,
     RobotModel,
 )
-from arm_planning.free.motion_check import MotionCheck
+from arm_planning import ValidityCheck
 
 CLEARANCE = 0.01
 """Least distance at start and goal in [m]."""
@@ -119,7 +119,7 @@ def problem(model: RobotModel, kind: str, seed: int) -> Problem:
         place = Pose(ORIGIN.rotation, frozen(position))
         scene = scene.with_object(CollisionObject(f'{kind}_{number}', shape, pose=place))
     scene = _without_mounting(model, scene)
-    clearances = Clearances(scene)
+    clearances, check = Clearances(scene), ValidityCheck(model.limits, scene)
     lower, upper = np.maximum(model.limits.lower, -3.0), np.minimum(model.limits.upper, 3.0)
     states: list[Array] = []
     for _ in range(MAX_DRAWS):
@@ -132,7 +132,7 @@ def problem(model: RobotModel, kind: str, seed: int) -> Problem:
         if tip[0] < 0.3 and len(states) == 0:  # begins among the obstacles
             continue
         states.append(frozen(state))
-        if len(states) == 2 and MotionCheck(scene).clear(*states):
+        if len(states) == 2 and check.waypoints(np.array(states)) is None:
             states.pop()  # no problem: the straight motion is free
         if len(states) == 2:
             return Problem(kind, seed, scene, *states)

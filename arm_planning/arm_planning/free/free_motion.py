@@ -56,8 +56,7 @@ class FreeMotion:
         Raises:
             PlanningError: No path was found in time.
         """
-        margin = min(self._check.least_margin(each) for each in (start, *goals))
-        motions = MotionCheck(self._check.scene, margin, self._constraints)
+        motions = MotionCheck(self._check, (start, *goals), self._constraints)
         check = ConstrainedCheck(self._check, self._constraints)
         near: Violation | None = None
         while not expired():
@@ -69,7 +68,6 @@ class FreeMotion:
             if path is not None:
                 return path
             near = check.waypoints(places)
-            motions.refine()
         hint = '' if near is None else f'; the last one was refused: {near.reason}'
         raise PlanningError(
             PlanningCode.TIMED_OUT,

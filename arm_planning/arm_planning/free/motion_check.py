@@ -1,27 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether straight motions look free, quickly: the search asks it thousands of times.
+"""Whether straight motions are free, quickly: the search asks it hundreds of times.
 
-It answers yes or no, by pinocchio's broad phase over the geometry of the scene, at places between
-which no shape moves by more than a resolution. What it lets pass is measured afterwards by
-:class:`arm_planning.validity.ValidityCheck`, which has the last word.
+Most that are not free are found by a few looks far apart, which pinocchio's broad phase answers
+with yes or no. What passes them is measured by :class:`arm_planning.validity.ValidityCheck`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 import math
 
 import numpy as np
 import pinocchio as pin
 
-from arm_model import Array, PlanningScene
+from arm_model import Array
 
 from ..constraints import ConstraintCheck
-from ..validity import MARGIN
+from ..validity import ValidityCheck
 
-RESOLUTION = 0.03
-"""Greatest motion of a shape against another between two places in [m]."""
+PROBE = 0.25
+"""Greatest motion of a shape against another between two looks of the broad phase in [m]."""
 
 STRIDE = 0.15
 """Length of a motion between two states that heed constraints in [rad]."""
@@ -32,61 +32,56 @@ MIN_PROGRESS = 0.01
 LOOK = 0.03
 """Turn of all joints together between two looks at constraints in [rad]."""
 
-MIN_RESOLUTION = 0.002
-"""Finest resolution: from there on the places are those of the validity check."""
-
 
 class MotionCheck:
     """Collision checks of one search; belongs to one thread.
 
     Attributes:
-        resolution: Greatest motion of a shape against another between two places in [m].
         constraints: What holds everywhere; None for nothing.
     """
 
     def __init__(
         self,
-        scene: PlanningScene,
-        margin: float = MARGIN,
+        check: ValidityCheck,
+        ends: Sequence[Array],
         constraints: ConstraintCheck | None = None,
     ) -> None:
         """Prepare.
 
         Args:
-            scene: What may collide.
-            margin: Distance that every pair keeps in [m].
+            check: Measures in the scene of the search.
+            ends: Starts and goals: on the way a pair may be as near as it is there.
             constraints: What holds everywhere; None for nothing.
         """
-        self.resolution, self.constraints = RESOLUTION, constraints
+        self.constraints, self._check = constraints, check
+        self._required = check.required(*ends).tolist()
+        scene = check.scene
         self._kinematics = scene.kinematics
         self._model, self._data = scene.kinematics.native, scene.kinematics.native.createData()
         self._rates = scene.distance_rate_bounds
         results = scene.geometry.createData()
         for request in results.collisionRequests:
-            request.security_margin = margin
+            request.security_margin = min(self._required, default=0.0)
         self._scene, self._results = scene, results  # the broad phase refers to them
         self._broad_phase = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
             self._model, scene.geometry, results
         )
-        self._exact = False
 
     def free(self, positions: Array) -> bool:
-        """Whether no pair is nearer than the margin.
+        """Whether no pair touches, as far as the broad phase sees.
+
+        It passes over pairs which are nearer than they may be while their boxes do not touch.
 
         Args:
             positions: Joint positions in [rad] (n).
         """
         expanded = self._kinematics.expanded(positions)
-        if self._exact:
-            return not pin.computeCollisions(
-                self._model, self._data, self._scene.geometry, self._results, expanded, True
-            )
         return not pin.computeCollisions(
             self._model, self._data, self._broad_phase, expanded, True
         )
 
     def clear(self, begin: Array, end: Array) -> bool:
-        """Whether all places looked at behind the begin of a straight motion are free.
+        """Whether a straight motion is free everywhere.
 
         Args:
             begin: Joint positions in [rad] (n), known to be free.
@@ -94,11 +89,12 @@ class MotionCheck:
         """
         way = end - begin
         motion = float((self._rates @ np.abs(way)).max(initial=0.0))
-        shares = _coarse_first(math.ceil(motion / self.resolution) + 1)
-        places = begin + shares[:, None] * way
+        places = begin + _coarse_first(math.ceil(motion / PROBE) + 1)[:, None] * way
         if not all(map(self.free, places)):
             return False
-        return self.constraints is None or _heeded(self.constraints, begin, way)
+        if self.constraints is not None and not _heeded(self.constraints, begin, way):
+            return False
+        return self._check.near(begin, end, self._required) is None
 
     def towards(self, begin: Array, target: Array) -> Array | None:
         """Return the next state on a motion that heeds the constraints; None where it ends.
@@ -115,14 +111,6 @@ class MotionCheck:
             return None
         left = float(np.linalg.norm(target - end))
         return end if left < length - MIN_PROGRESS or left == 0.0 else None
-
-    def refine(self) -> None:
-        """Look twice as densely from now on, and without the broad phase.
-
-        That passes over pairs which are nearer than the margin while their boxes do not touch.
-        """
-        self.resolution = max(0.5 * self.resolution, MIN_RESOLUTION)
-        self._exact = True
 
 
 def _heeded(constraints: ConstraintCheck, begin: Array, way: Array) -> bool:

@@ -12,13 +12,13 @@ from arm_model import Array
 
 from .motion_check import MotionCheck
 
-MAX_TRIALS = 60
+MAX_TRIALS = 30
 """Shortcuts that are tried at most."""
 
-MAX_FAILURES = 15
+MAX_FAILURES = 8
 """Shortcuts that fail in a row before the path counts as short."""
 
-MIN_GAIN = 0.01
+MIN_GAIN = 0.05
 """Length that a shortcut saves at least in [rad]."""
 
 
