@@ -176,6 +176,12 @@ class Kinematics:
                 places[full.idx_qs[full.getJointId(name)]] = place
         self.native: Native = pin.buildReducedModel(full, self._locked, places)
         self.relative_motion = lru_cache(maxsize=None)(self._relative_motion)
+        self.moves = lru_cache(maxsize=None)(self._moves)
+
+    def _moves(self, body: int, other: int) -> bool:
+        """Whether a joint of the group moves two bodies, by the joints that move these."""
+        sign = self.relative_motion(body, other).sign
+        return bool(self.bounded(np.abs(sign)).any())
 
     def _relative_motion(self, body: int, other: int) -> RelativeMotion:
         """Return how the joints between two bodies move them, by the joints that move these.

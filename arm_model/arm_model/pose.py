@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 
 import numpy as np
 import pinocchio as pin
@@ -58,7 +59,7 @@ def rotation_of(quaternion: Sequence[float]) -> Array:
     Raises:
         CommandError: A number is not finite, or the length is not one.
     """
-    length = float(np.linalg.norm(quaternion))
+    length = math.hypot(*quaternion)
     if not abs(length - 1.0) < UNIT_LENGTH_TOLERANCE:
         raise CommandError(f'orientation {list(quaternion)}: its length is {length:.4g}, not 1')
     matrix: Array = pin.Quaternion(np.array(quaternion) / length).toRotationMatrix()

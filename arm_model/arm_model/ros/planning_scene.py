@@ -341,7 +341,8 @@ class _Draft:
     def _pose(self, message: ObjectMessage) -> Pose:
         """Return where an object is, in the root link."""
         place = _pose(message.pose, message.id)
-        return combined(self._frame(message.id, message.header.frame_id), place)
+        frame = self._frame(message.id, message.header.frame_id)
+        return place if frame is ORIGIN else combined(frame, place)
 
     def _frame(self, name: str, frame: str) -> Pose:
         kinematics = self.before.kinematics

@@ -118,9 +118,12 @@ class Clearances:
         native = self._kinematics.native
         pin.forwardKinematics(native, self._data, self._kinematics.expanded(positions))
         pin.updateGeometryPlacements(native, self._data, scene.geometry, results)
-        for pair in doubtful.tolist():
-            result = pin.computeDistance(scene.geometry, results, pair)
-            bounds[pair] = result.min_distance
+        if doubtful.size == bounds.size:  # all at once, which is quicker than one by one
+            pin.computeDistances(scene.geometry, results)
+            bounds[:] = [result.min_distance for result in self._found]
+        else:
+            for pair in doubtful.tolist():
+                bounds[pair] = pin.computeDistance(scene.geometry, results, pair).min_distance
         self._distances[doubtful] = bounds[doubtful]
         self._places[doubtful] = positions
         return bounds

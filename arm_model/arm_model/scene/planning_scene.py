@@ -388,8 +388,7 @@ class PlanningScene:
     def _checks(self, first: _Body, second: _Body) -> bool:
         if first.may_touch(second) or second.may_touch(first):
             return False
-        sign = self.kinematics.relative_motion(first.joint, second.joint).sign
-        if not self.kinematics.bounded(np.abs(sign)).any():
+        if not self.kinematics.moves(first.joint, second.joint):
             return False
         return not self.allowed.allows(first.name, second.name)
 

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+import math
 
 import coal
 import numpy as np
@@ -140,7 +141,7 @@ def _half_space(plane: Plane) -> Native:
 
 
 def _primitive(shape: Box | Sphere | Cylinder | Capsule | Cone) -> Native:
-    lengths = astuple(shape)
-    if not all(np.isfinite(length) and length > 0.0 for length in lengths):
+    lengths = [float(getattr(shape, name)) for name in shape.__match_args__]
+    if not all(0.0 < length < math.inf for length in lengths):
         raise SceneError(f'{shape}: every length must be positive and finite')
     return getattr(coal, type(shape).__name__)(*lengths)
