@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 import os
 
 from model_robots import ready, robot, ROBOTS
@@ -35,6 +37,12 @@ TIMEOUT = 60.0
 
 LENGTH, LINE_TOLERANCE = 0.2, 1e-4
 """A straight way of the tip, and how far it may be off, in [m]."""
+
+NEARBY = 0.12
+"""How far a motion leads in [m] or [rad]."""
+
+JUMP = 1e-6
+"""Of a position in [rad] or its derivatives, where one motion follows another."""
 
 AROUND = 0.9
 """How far a goal may be from the ready pose in [rad]."""
@@ -190,6 +198,31 @@ def test_the_planner_id_chooses_the_pipeline() -> None:
         middle = planner.fk(plan.path.at(0.5 * plan.path.duration).position).position
         off = np.cross(middle - begin.position, (goal.pose.position - begin.position) / LENGTH)
         assert (float(np.linalg.norm(off)) < LINE_TOLERANCE) == (name == 'LIN')
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+@pytest.mark.parametrize('seed', SEEDS)
+def test_motions_one_after_the_other_meet_at_rest(name: str, seed: int) -> None:
+    """Each begins where the one before it ends, without a jump of position or its derivatives."""
+    model, planner = robot(name), Planner(robot(name), seed=seed)
+    draw, paths, here = np.random.default_rng(seed), [], ready(name)
+    for kind in draw.permutation(['PTP', 'LIN', 'RRTConnect', 'PTP', 'LIN']).tolist():
+        pose = planner.fk(here)
+        away = frozen(pose.position + draw.uniform(-NEARBY, NEARBY, 3))
+        goal: JointGoal | PoseGoal = PoseGoal(Pose(pose.rotation, away))
+        if kind != 'LIN':
+            goal = JointGoal(frozen(here + draw.uniform(-NEARBY, NEARBY, len(model))))
+        asked = MotionRequest(here, [goal], planner_id=kind, timeout=TIMEOUT)
+        with suppress(PlanningError):  # out of reach, or in contact
+            paths.append(planner.plan(asked).path)
+            here = paths[-1].end.position
+    assert len(paths) > 1
+    for before, after in pairwise(paths):
+        ends = (before.end, before.at(before.duration), after.at(0.0))
+        for end in ends:
+            assert np.abs(end.position - ends[0].position).max() < JUMP
+            assert np.abs(end.velocity).max() < JUMP
+            assert np.abs(end.acceleration).max() < JUMP
 
 
 def test_a_pose_out_of_reach_is_refused() -> None:
