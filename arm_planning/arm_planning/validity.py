@@ -111,7 +111,8 @@ class ValidityCheck:
         """
         way = end - begin
         motions = (self._clearances.distance_rate_bounds @ np.abs(way)).tolist()
-        parts = deque([(0.5, 0.5, range(len(required)))])  # their middle, half their length
+        every: Sequence[int] = range(len(required))
+        parts = deque([(0.5, 0.5, every)])  # their middle, half their length
         while parts:
             middle, half, pairs = parts.popleft()
             place = begin + middle * way
@@ -154,8 +155,8 @@ class ValidityCheck:
         for segment in np.flatnonzero(outside.any(axis=1)).tolist():
             time = float(path.starts[segment])
             return self._beyond(lower[segment], upper[segment], time)
-        time = self._near_time(path, control)
-        return None if time is None else self._near(path.at(time).position, time)
+        found = self._near_time(path, control)
+        return None if found is None else self._near(path.at(found).position, found)
 
     def _near_time(self, path: Path, control: Array) -> float | None:
         """Return a time at which a pair is nearer than it may be; None where none is.
@@ -178,11 +179,12 @@ class ValidityCheck:
             turns = np.diff(_interpolated(turned, places), axis=1).max(axis=1)
             motions = (turns @ rates.T).tolist()
             rows = zip(when.tolist(), path.positions(when), pairs, motions, looks, strict=True)
-            halves, doubtful = [], []
-            for time, row, here, moved, (first, middle, last) in rows:
+            halves: list[tuple[float, float]] = []
+            doubtful: list[Sequence[int]] = []
+            for when_there, row, here, moved, (first, middle, last) in rows:
                 left = self._doubtful(row, here, required, moved, 1.0)
                 if left is None:
-                    return time
+                    return float(when_there)
                 if left:
                     halves += [(first, middle), (middle, last)]
                     doubtful += [left, left]

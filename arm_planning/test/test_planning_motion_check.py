@@ -65,7 +65,8 @@ def test_what_overlaps_is_not_free(scene: PlanningScene) -> None:
 def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(scene: PlanningScene) -> None:
     """Nothing passes that touches between two looks, and nothing is refused that has room."""
     check = MotionCheck(ValidityCheck(robot('panda').limits, scene), [ready('panda')])
-    draw, answers = np.random.default_rng(5), []
+    draw = np.random.default_rng(5)
+    answers: list[bool] = []
     while len(answers) < MOTIONS:
         begin = ready('panda') + draw.uniform(-0.4, 0.4, 7)
         end = begin + draw.uniform(-1.2, 1.2, 7)
