@@ -1,64 +1,103 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Free motion on generated scenes: success, time and length; beside plain OMPL where it is.
+"""Free motion on generated scenes: success, time and length; beside plain OMPL and roboplan.
 
-Run it with a count of problems per scene. Time of planning is that of the whole pipeline: search,
-shortening, timing and the proof that nothing touches. Plain OMPL is its RRT-Connect and its own
-simplification on the same scene, without timing: its state check is called back, one at a time.
-A path is invalid where the validity check refuses it: a pair touches, or is nearer than 1 mm.
+Run: ``python arm_planning/bench/bench_planning.py`` in the sourced workspace, with ``--all`` for
+the 100 problems of each scene instead of the first 10.
+
+Each planner has a process of its own. OMPL and roboplan are no part of the environment; they are
+measured with ``--wheels DIR``, after ``pip install --target DIR ompl roboplan``.
+
+- Ours is the whole pipeline: search, shortening, timing and the proof that nothing touches.
+- OMPL is its RRT-Connect and its own simplification on the same scene, without timing: its check
+  of a state is called back, one at a time.
+- roboplan is its RRT-Connect and its own shortcuts, in C++, without timing.
+
+Times are those of the processor: other programs do not count. Lengths are by those of a long run
+(long_run.py). A path is invalid where a sampler that looks at it every milliradian, and asks
+nothing but pinocchio, finds a contact.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import cache
+from itertools import combinations, pairwise
+import json
 import os
+from pathlib import Path
+import subprocess
+import sys
 import time
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # before numpy is imported
 
 import numpy as np
 import pinocchio as pin
-from planning_problems import KINDS, Problem, problem
+from planning_problems import KINDS, panda, Problem, problem, PROBLEMS
 
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
-from arm_model import Array, load_limits, RobotModel
+from arm_model import Array, Box, PlanningScene, RobotModel
 from arm_planning import JointGoal, MotionRequest, Planner, PlanningError, ValidityCheck
 
 try:
     from ompl import base, geometric, util
 except ImportError:
     base = None
+try:
+    import roboplan.core as roboplan
+    import roboplan.rrt as roboplan_rrt
+except ImportError:
+    roboplan = None
 
 TIMEOUT = 1.0
 """Time for one problem in [s]."""
 
+FEW = 10
+"""Problems of each scene, unless all are asked for."""
+
+DENSE = 1e-3
+"""Motion of a joint from one look of the sampler to the next in [rad]."""
+
+SAMPLES = 2000
+"""Places of a timed path that are compared."""
+
 RESOLUTION = 0.01
 """Of OMPL's motion check, as a share of the space: MoveIt's longest_valid_segment_fraction."""
 
-Answer = Array | None
-"""Places of a path (m, n); None where none was found in time."""
+BEST_LENGTHS = Path(__file__).with_name('best_lengths.json')
+
+Planning = Callable[[], Array | None]
+"""What is timed: gives the places of a path (m, n), or None where none was found in time."""
 
 
-def panda() -> RobotModel:
-    """Return the Panda."""
-    folder = installed_robots_folder() / 'panda'
-    urdf, srdf = expand_xacro(folder / 'panda.urdf.xacro'), (folder / 'panda.srdf').read_text()
-    return RobotModel(urdf, srdf, load_limits(folder / 'limits.yaml'))
-
-
-def ours(model: RobotModel, asked: Problem) -> Answer:
+def ours(model: RobotModel, asked: Problem) -> Planning:
     """Plan with the whole pipeline."""
     request = MotionRequest(asked.start, [JointGoal(asked.goal)], timeout=TIMEOUT)
-    try:
-        path = Planner(model, seed=asked.seed).plan(request, asked.scene).path
-    except PlanningError:
-        return None
-    return path.positions(np.linspace(0.0, path.duration, 500))
+
+    def plan() -> Array | None:
+        try:
+            path = Planner(model, seed=asked.seed).plan(request, asked.scene).path
+        except PlanningError:
+            return None
+        return path.positions(np.linspace(0.0, path.duration, SAMPLES))
+
+    return plan
 
 
-def plain_ompl(model: RobotModel, asked: Problem) -> Answer:
+def proof(model: RobotModel, asked: Problem) -> float:
+    """Return the time that the proof of our path takes in [s]."""
+    request = MotionRequest(asked.start, [JointGoal(asked.goal)], timeout=60.0)
+    path = Planner(model, seed=asked.seed).plan(request, asked.scene).path
+    check = ValidityCheck(model.limits, asked.scene)
+    began = time.process_time()
+    check.path(path)
+    return time.process_time() - began
+
+
+def plain_ompl(model: RobotModel, asked: Problem) -> Planning:
     """Plan with RRT-Connect of OMPL, as its users write it in Python."""
     scene = asked.scene
     native, geometry = scene.kinematics.native, scene.geometry
@@ -88,59 +127,154 @@ def plain_ompl(model: RobotModel, asked: Problem) -> Answer:
         ends.append(state)
     setup.setStartAndGoalStates(*ends)
     setup.setPlanner(geometric.RRTConnect(setup.getSpaceInformation()))
-    setup.solve(TIMEOUT)
-    if not setup.haveExactSolutionPath():
-        return None
-    setup.simplifySolution(TIMEOUT)
-    path = setup.getSolutionPath()
-    return np.array([numbers(state) for state in path.getStates()])
+
+    def plan() -> Array | None:
+        setup.solve(TIMEOUT)
+        if not setup.haveExactSolutionPath():
+            return None
+        setup.simplifySolution(TIMEOUT)
+        return np.array([numbers(state) for state in setup.getSolutionPath().getStates()])
+
+    return plan
 
 
-def measure(
-    model: RobotModel,
-    name: str,
-    plan: Callable[[RobotModel, Problem], Answer],
-    problems: list[Problem],
-) -> None:
-    """Print what a planner does with the problems of one kind."""
-    times, busy, lengths, invalid = [], [], [], 0
-    for asked in problems:
-        began, worked = time.perf_counter(), time.process_time()
-        places = plan(model, asked)
-        times.append(time.perf_counter() - began)
-        busy.append(time.process_time() - worked)
-        if places is None:
-            continue
-        straight = float(np.linalg.norm(asked.goal - asked.start))
-        lengths.append(float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()) / straight)
-        invalid += ValidityCheck(model.limits, asked.scene).waypoints(places) is not None
-    p50, p95 = (1e3 * np.percentile(times, (50, 95))).tolist()
-    c50, c95 = (1e3 * np.percentile(busy, (50, 95))).tolist()
-    print(
-        f'{problems[0].kind:6} {name:10} {len(lengths):4}/{len(problems):<4} {p50:8.1f} {p95:8.1f}'
-        f' {c50:8.1f} {c95:8.1f} {np.median(lengths):8.2f} {invalid:8}'
+@cache
+def _panda_of_roboplan() -> tuple[str, str]:
+    folder = installed_robots_folder() / 'panda'
+    return expand_xacro(folder / 'panda.urdf.xacro'), (folder / 'panda.srdf').read_text()
+
+
+def with_roboplan(model: RobotModel, asked: Problem) -> Planning:
+    """Plan with RRT-Connect and the shortcuts of roboplan, with its own settings."""
+    urdf, srdf = _panda_of_roboplan()
+    scene = roboplan.Scene('panda', roboplan.loadUrdfSceneDescriptionFromXml(urdf))
+    scene.importSrdf(srdf)
+    for name, thing in asked.scene.objects.items():
+        place = np.eye(4, order='F')
+        place[:3, 3] = thing.pose.position
+        (placed,) = thing.shapes
+        if not isinstance(placed.shape, Box):
+            raise TypeError(f'{name} is a {type(placed.shape).__name__}; only boxes are taken')
+        box = roboplan.Box(placed.shape.x, placed.shape.y, placed.shape.z)
+        scene.addBoxGeometry(name, 'universe', box, place, np.ones(4))
+    # what stands still does not collide: neither objects with each other, nor the base
+    checked = set(map(frozenset, asked.scene.pairs))
+    bodies = (*asked.scene.link_shapes, *asked.scene.objects)
+    for pair in combinations(bodies, 2):
+        if frozenset(pair) not in checked and pair[1] in asked.scene.objects:
+            scene.setCollisions(*pair, False)
+    options = roboplan_rrt.RRTOptions(
+        group_name=model.group, rrt_connect=True, max_planning_time=TIMEOUT, max_nodes=100_000
     )
+    planner = roboplan_rrt.RRT(scene, options)
+    planner.setRngSeed(asked.seed)
+    short = roboplan.PathShortcuttingOptions(group_name=model.group, seed=asked.seed)
+    shortcuts, names = roboplan.PathShortcutter(scene, short), list(model.joints)
+    start, goal = (roboplan.JointConfiguration(names, each) for each in (asked.start, asked.goal))
+
+    def plan() -> Array | None:
+        try:
+            path = shortcuts.shortcut(planner.plan(start, goal))
+        except RuntimeError:
+            return None
+        return np.array(path.positions)
+
+    return plan
+
+
+def touches(places: Array, scene: PlanningScene) -> bool:
+    """Whether anything touches on a path, as pinocchio alone sees it every milliradian."""
+    native, data = scene.kinematics.native, scene.kinematics.native.createData()
+    results = scene.geometry.createData()
+    for begin, end in pairwise(places):
+        count = int(np.ceil(np.abs(end - begin).max() / DENSE)) + 1
+        for place in np.linspace(begin, end, count):
+            if pin.computeCollisions(native, data, scene.geometry, results, place, True):
+                return True
+    return False
+
+
+PLANNERS: dict[str, Callable[[RobotModel, Problem], Planning]] = {
+    'ours': ours,
+    'OMPL': plain_ompl,
+    'roboplan': with_roboplan,
+}
+
+
+def measured(name: str, count: int) -> None:
+    """Print what a planner does with the problems of each scene, a line of JSON for each."""
+    if {'OMPL': base, 'roboplan': roboplan}.get(name, True) is None:
+        print(json.dumps({'missing': name}))
+        return
+    if base is not None:
+        util.setLogLevel(util.LogLevel.LOG_ERROR)
+    best, model, prepared = json.loads(BEST_LENGTHS.read_text('utf-8')), panda(), PLANNERS[name]
+    for kind in KINDS:
+        figures: dict[str, list[float]] = {'times': [], 'lengths': [], 'invalid': [], 'proof': []}
+        known = [seed for seed, length in enumerate(best[kind][:count]) if length is not None]
+        for seed in known:
+            asked = problem(model, kind, seed)
+            plan = prepared(model, asked)
+            began = time.process_time()
+            places = plan()
+            figures['times'].append(time.process_time() - began)
+            if places is None:
+                continue
+            length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+            figures['lengths'].append(length / best[kind][seed])
+            figures['invalid'].append(touches(places, asked.scene))
+            if name == 'ours':
+                figures['proof'].append(proof(model, asked))
+        print(json.dumps({'kind': kind, 'problems': len(known), **figures}), flush=True)
+
+
+def row(label: str, found: list[dict[str, list[float]]]) -> str:
+    """Return a line of the table."""
+    times, lengths, invalid, proofs = (
+        np.concatenate([each[key] for each in found])
+        for key in ('times', 'lengths', 'invalid', 'proof')
+    )
+    p50, p95 = (1e3 * np.percentile(times, (50, 95))).tolist()
+    cost = f'{1e3 * np.median(proofs):9.1f}' if len(proofs) else ' ' * 9
+    return (
+        f'{label:16} {len(lengths):4}/{len(times):<4} {p50:8.1f} {p95:8.1f}'
+        f' {np.median(lengths):7.2f} {np.percentile(lengths, 95):7.2f}'
+        f' {int(invalid.sum()):8} {cost}'
+    )
+
+
+def _places(wheels: Path) -> list[Path]:
+    """Return where Python finds wheels that pip has put into a folder."""
+    return [wheels, *wheels.glob('cmeel.prefix/lib/python*/site-packages')]
 
 
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--problems', type=int, default=20, help='problems of each kind')
-    count = parser.parse_args().problems
-    planners, model = {'ours': ours}, panda()
-    if base is None:
-        print('OMPL is not installed: pip install ompl')
-    else:
-        util.setLogLevel(util.LogLevel.LOG_ERROR)
-        planners['plain OMPL'] = plain_ompl
-    print(
-        'scene  planner      solved  p50 [ms] p95 [ms]  CPU p50  CPU p95   length  invalid\n'
-        f'(within {TIMEOUT:g} s; length by that of the straight motion)'
-    )
-    for kind in KINDS:
-        problems = [problem(model, kind, seed) for seed in range(count)]
-        for name, plan in planners.items():
-            measure(model, name, plan, problems)
+    parser.add_argument('--all', action='store_true', help=f'{PROBLEMS} problems of each scene')
+    parser.add_argument('--problems', type=int, default=FEW, help='problems of each scene')
+    parser.add_argument('--wheels', type=Path, help='where OMPL and roboplan are installed')
+    parser.add_argument('--planner', choices=PLANNERS, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    count = PROBLEMS if options.all else options.problems
+    if options.planner is not None:
+        measured(options.planner, count)
+        return
+    print('scene, planner    solved p50 [ms] p95 [ms]  length     p95  invalid proof [ms]')
+    for name in PLANNERS:
+        command = [sys.executable, __file__, '--planner', name, '--problems', str(count)]
+        places = [] if name == 'ours' or options.wheels is None else _places(options.wheels)
+        paths = [os.environ.get('PYTHONPATH', ''), *map(str, places)]
+        environment = os.environ | {'PYTHONPATH': os.pathsep.join(filter(None, paths))}
+        run = subprocess.run(command, check=True, stdout=subprocess.PIPE, env=environment)
+        lines = run.stdout.decode()
+        found = [json.loads(line) for line in lines.splitlines() if line.startswith('{')]
+        if 'missing' in found[0]:
+            print(f'{name}: not installed; see --wheels')
+            continue
+        for each in found:
+            print(row(f'{each["kind"]:6} {name}', [each]))
+        print(row(f'all    {name}', found), flush=True)
 
 
 if __name__ == '__main__':

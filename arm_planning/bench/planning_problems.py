@@ -9,12 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from arm_bringup.description import expand_xacro
+from arm_bringup.robots import installed_robots_folder
 from arm_model import (
     Array,
     Box,
     Clearances,
     CollisionObject,
     frozen,
+    load_limits,
     ORIGIN,
     PlanningScene,
     Pose,
@@ -27,6 +30,9 @@ CLEARANCE = 0.01
 
 MIN_DISTANCE = 1.5
 """Least distance of start and goal in [rad]: what is nearer is no problem."""
+
+PROBLEMS = 100
+"""Problems of each kind: their seeds are 0 to 99."""
 
 MAX_DRAWS = 3000
 """States that are drawn for a problem at most."""
@@ -103,6 +109,13 @@ KINDS: Mapping[str, Callable[[np.random.Generator], Boxes]] = {
     'gap': _gap,
     'bin': _bin,
 }
+
+
+def panda() -> RobotModel:
+    """Return the Panda."""
+    folder = installed_robots_folder() / 'panda'
+    urdf, srdf = expand_xacro(folder / 'panda.urdf.xacro'), (folder / 'panda.srdf').read_text()
+    return RobotModel(urdf, srdf, load_limits(folder / 'limits.yaml'))
 
 
 def problem(model: RobotModel, kind: str, seed: int) -> Problem:
