@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 from nav_msgs.msg import Odometry
 from processes import RunningProcess
 import pytest
-from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.qos import qos_profile_sensor_data
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from node_runner import LATCHED
 from quad_bringup.demo.main import GROUND_TRUTH
 from quad_description import Pose, pose_positions
 from quad_msgs.srv import SetMode
@@ -29,7 +30,6 @@ pytestmark = pytest.mark.scenario
 STARTING = 60.0  # [s] until all is ready on a busy machine
 MOVING = 60.0  # [s] for a mode to be reached
 WAY_DOWN = 10.0  # [s]
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
@@ -49,10 +49,10 @@ def test_a_robot_on_its_way_down_arrives_before_its_processes_end(
         states = client.listen(String, '/controller_node/state', LATCHED)
 
         def height() -> float:
-            return truth[-1].pose.pose.position.z
+            return float(truth[-1].pose.pose.position.z)
 
         def reach(state: str) -> None:
-            client.spin_until(lambda: states and states[-1].data == state, MOVING, state)
+            client.spin_until(lambda: bool(states) and states[-1].data == state, MOVING, state)
 
         bringup.wait_for('all is ready', STARTING)
         client.spin_until(lambda: bool(truth and joints), STARTING, 'robot')

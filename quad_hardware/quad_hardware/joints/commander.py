@@ -178,7 +178,7 @@ class JointCommander:
             distance, joint = self._farthest(positions, place)
             self._drop(
                 f'the servos were let go, and {joint} is {distance:.2f} rad from its target; set '
-                f'the mode relax, then stand (commands begin up to {LET_GO_BAND:g} rad off the legs)'
+                f'the mode relax, then stand (commands begin within {LET_GO_BAND:g} rad of legs)'
             )
             return None
         if not self._send_angles(self._joints.angles(command.targets)):
