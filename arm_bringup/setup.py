@@ -66,6 +66,7 @@ setup(
         'test': ['pytest'],
         'motion': [
             'numpy>=1.26',
+            'pin>=3.3',
             sibling('arm_model'),
             sibling('arm_planning'),
             sibling('arm_servo'),

@@ -28,8 +28,7 @@ from rclpy.action.server import ActionServer
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
-
-from arm_bringup.description import expand_xacro
+from urdf_reader import expand_xacro
 
 if TYPE_CHECKING:
     from types import TracebackType

@@ -20,8 +20,8 @@ from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import MeshTriangle, SolidPrimitive
 from shape_msgs.msg import Plane as PlaneMessage
 from std_msgs.msg import Header
+from urdf_reader import expand_xacro
 
-from arm_bringup.description import expand_xacro
 from arm_model import load_limits
 from arm_planning.ros.robot_groups import RobotGroups
 

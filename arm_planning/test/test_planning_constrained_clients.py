@@ -38,8 +38,8 @@ from planning_messages import pose_at
 import pytest
 from shape_msgs.msg import SolidPrimitive
 from urdf_kinematics import forward
+from urdf_reader import expand_xacro
 
-from arm_bringup.description import expand_xacro
 from arm_model.ros import seconds
 
 Array = NDArray[np.float64]

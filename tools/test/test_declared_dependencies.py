@@ -52,7 +52,7 @@ STARTED |= {'quad_bringup': {'quad_hardware', 'quad_sim', 'quad_teleop', 'robot_
 OPTIONAL = {
     'arm_bringup': {
         *('arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'python3-numpy'),
-        *('control_msgs', 'moveit_msgs'),
+        *('control_msgs', 'moveit_msgs', 'pinocchio', 'shape_msgs'),
     }
 }
 """Packages that are used where they are built, and that colcon need not build for this one."""
