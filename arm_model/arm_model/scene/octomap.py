@@ -37,8 +37,9 @@ VALUES = {'OcTree': struct.Struct('<f'), 'ColorOcTree': struct.Struct('<f3x')}
 ROOT_SIZE = 1 << 16
 """Edge of the whole tree, in its smallest cells."""
 
-MAX_BOXES = 20_000
-"""How many boxes a map may have; each of them is looked at by planner and controllers."""
+MAX_BOXES = 1_000
+"""How many boxes a map may have. pinocchio copies its table of pairs for each shape that is added
+to a scene: 1,000 boxes take single copies of 4 MB, beside a control cycle."""
 
 MAX_RUNS = 500_000
 """Rows of smallest cells into which leaves are cut so that they join across their borders."""

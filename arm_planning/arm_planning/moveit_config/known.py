@@ -25,6 +25,7 @@ NO_PIPELINE = 'this planning pipeline is not here'
 DIRECT = 'controllers are reached by their actions, and switched by nobody'
 ALWAYS = 'all capabilities and topics are there always'
 NO_SENSORS = 'there are no updaters of octomaps; send octomaps with planning scenes'
+ONE_ROTATION = "Pilz' planner uses the velocity of rotation only"
 NO_DATABASE = 'there is no warehouse'
 NO_MOVEIT_CPP = 'these are of MoveItCpp'
 
@@ -126,6 +127,7 @@ KNOWN: Sequence[Known] = (
     signed(f'{CARTESIAN}.max_trans_acc', 1.0),
     signed(f'{CARTESIAN}.max_trans_dec', -1.0),
     signed(f'{CARTESIAN}.max_rot_vel', 1.0),
+    *ignored(ONE_ROTATION, f'{CARTESIAN}.max_rot_acc', f'{CARTESIAN}.max_rot_dec'),
     texts('planning_pipelines'),
     texts('planning_pipelines.pipeline_names'),
     *ignored(NO_MOVEIT_CPP, 'planning_pipelines.**'),

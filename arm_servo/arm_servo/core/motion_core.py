@@ -55,9 +55,9 @@ PREPARED_STATE_TOLERANCE = 0.01
 ARM_DISTANCE = 0.005
 """Least distance to another arm that moves, for what is no jog, in [m]."""
 
-UNCHECKED_CLEARANCE = 0.002
+UNCHECKED_CLEARANCE = 0.001
 """Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
-that is stopped there is not in contact, not even as measured, and can be led away."""
+that is stopped there is not in contact and can be led away. Planned paths keep as much."""
 
 MAX_JOINTS = 8
 """Joints of the longest chain that is jogged."""
@@ -401,11 +401,11 @@ class MotionCore:
         is_target, code = self.source is Source.TARGET, GoalCode.PATH_TOLERANCE_VIOLATED
         if limiter.cause is Cause.COLLISION:
             if self._filter.is_near_neighbour:
-                where = (
-                    'with another arm that moves; begin when that is out of the way, or plan both'
-                    ' together'
-                )
-            elif is_target:
+                near = f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm'
+                where = 'to another arm; begin when that is out of the way, or keep more distance'
+                self._arbiter.end(Outcome(code, f'{near} {where}'))
+                return
+            if is_target:
                 where = 'on the way to the target from where the arm is; go around that'
             elif self._unchecked is self.execution:
                 where = 'on the trajectory: the scene changed; lead it around that'

@@ -27,6 +27,10 @@ MIN_SAMPLES, MAX_SAMPLES = 6, 40
 MAX_STRIDE = 0.1
 """Way of all joints between two looks in [rad]."""
 
+NEAR_ARM = 0.1
+"""Distance to other arms in [m] below which an arm may be stopped off its path, so that its stops
+must be clear of everything."""
+
 ROUNDING_TOLERANCE = 1e-7
 """Rounding of ruckig's positions that is let pass in [rad]."""
 
@@ -182,7 +186,7 @@ class SafetyFilter:
             wanted: State wanted at the end of the period.
             period: Its length in [s].
             clearance: Least distance between links on a stop in [m]; None where what moves the
-                arm keeps to a path that was checked.
+                arm keeps to a path that was checked. Near other arms it counts as 0 then.
             now: Steady time in [s].
             apart: Least distance to other arms that move, while all stop, in [m]; None is any.
 
@@ -198,6 +202,8 @@ class SafetyFilter:
                 wanted = _mixed(beyond, self._brake(state, period, now), wanted)
                 beyond, stop = self._beyond(wanted)
             if stop is not None and not beyond.any():
+                if clearance is None and self._may_meet(stop, end, apart):
+                    clearance = 0.0  # it may have to leave its path for the other arm
                 near = self._floor.too_near(stop, end, state, now, clearance)
                 if near is None and self._neighbours is not None:
                     near = self._apart.too_near(stop, end, state, now, apart)
@@ -224,6 +230,13 @@ class SafetyFilter:
                 self._version = neighbours.version
                 self._apart.forget()
             yield
+
+    def _may_meet(self, stop: Plan, begin: float, apart: float | None) -> bool:
+        """Whether another arm may soon be in the way of a stop."""
+        if self._neighbours is None or apart is None:
+            return False
+        within = apart + NEAR_ARM
+        return self._neighbours.least(stop, begin, within).distance < within
 
     def _beyond(self, wanted: RobotState) -> tuple[Mask, Plan | None]:
         """Return which joints could not stop any more within their limits, and how all would."""
