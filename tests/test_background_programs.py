@@ -44,7 +44,7 @@ IGNORING = ['env', '--ignore-signal=INT']
                 '--duration',
                 '600',
             ],
-            'imu frame',
+            'order of joints',
         ),
         (['quad_hardware', 'doctor', '--port', '/dev/null', '--duration', '300'], '.'),
     ],

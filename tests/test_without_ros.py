@@ -34,6 +34,7 @@ INSTALLED = (
     'quad_teleop',
     'robot_viewer',
     'arm_bringup[motion]',
+    'libraries/rosbag_files',
 )
 """Packages that nothing else requires; they bring all others."""
 IMPORTED = [

@@ -29,7 +29,9 @@ class TickingNode(QuietNode):
         """Keep what is published."""
         return SimpleNamespace(publish=self.published.append)
 
-    def create_subscription(self, _kind: Any, topic: str, callback: Any, _depth: Any) -> None:
+    def create_subscription(
+        self, _kind: Any, topic: str, callback: Any, _depth: Any, **_: Any
+    ) -> None:
         """Keep who listens."""
         self.receive[topic] = callback
 

@@ -281,3 +281,74 @@ def test_a_policy_needs_a_velocity_that_somebody_estimates(tmp_path: Path) -> No
 def standing(velocity: Velocity) -> PolicyInputs:
     """Return what a robot that stands measures."""
     return PolicyInputs(JointSample(STAND, (0.0,) * 12), UPRIGHT, velocity, (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        (('JointPositionAction', 'JointVelocityAction'), 'is a JointVelocityAction'),
+        (('JointPositionAction', 'RelativeJointPositionAction'), 'is a RelativeJointPosition'),
+        (('joint_ids: null', 'joint_ids: [1, 0]'), 'an order of joints of its own'),
+    ],
+)
+def test_other_actions_than_positions_of_all_joints_are_refused(
+    tmp_path: Path, change: tuple[str, str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Velocities and differences have the same width; nothing else would show it."""
+    tool = TOOLS['isaac_deploy']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    arguments = attached(tool, tmp_path)
+    side = tmp_path / 'deploy.yaml'
+    side.write_text(side.read_text().replace(*change))
+    assert run(arguments) == 1
+    assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('offset', [0.0, 2.5])
+def test_targets_far_off_the_stand_are_refused(tmp_path: Path, offset: float) -> None:
+    """An offset that is not that of the training leads the legs elsewhere at once."""
+    tool = TOOLS['playground']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    arguments = [*attached(tool, tmp_path), '--set', f'action.offset={offset}']
+    assert run(arguments) == 0
+    with pytest.raises(PolicyError, match='targets standing'):
+        load(tmp_path / 'policy.onnx')
+
+
+def test_a_whole_list_of_terms_has_its_own_order() -> None:
+    """Terms that all have their source replace those of the file; single keys do not."""
+    base = document_of(GOOD, 'file')
+    terms = {'q': {'source': 'joint_positions', 'relative': True}, 'down': {'source': 'gravity'}}
+    whole = document_of({'observation': {'terms': terms}}, 'side').over(base)
+    assert [term.name for term in build_contract(whole).terms] == ['q', 'down']
+    part = document_of({'observation': {'terms': {'gyro': {'frame': 'yawed'}}}}, 'side').over(base)
+    assert [term.name for term in build_contract(part).terms] == ['gyro', 'q']
+
+
+def test_recurrent_states_of_other_sizes_are_refused(tmp_path: Path) -> None:
+    """Before the second step would fail with the robot on its legs."""
+    tool = TOOLS['playground']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    arguments = attached(tool, tmp_path)
+    arguments[arguments.index('--set', -2) + 1] = 'recurrence={h_in: actions}'
+    assert run(arguments) == 0
+    with pytest.raises(PolicyError, match=r'recurrence\.h_in'):
+        load(tmp_path / 'policy.onnx')
+
+
+@pytest.mark.parametrize(
+    ('name', 'text'),
+    [
+        ('config.yaml', 'go2: {observations: [dof_pos], joint_names: [a], joint_mapping: [7]}'),
+        ('config.yaml', 'go2: {observations: 5}'),
+        (
+            'env.yaml',
+            'sim: {}\ndecimation: 4\nobservations: {policy: {a: {func: b:c, history_length: x}}}',
+        ),
+    ],
+)
+def test_values_of_another_form_are_refused(tmp_path: Path, name: str, text: str) -> None:
+    """With the file; no other error leaves."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(PolicyError, match=name):
+        read_contract_file(tmp_path / name)

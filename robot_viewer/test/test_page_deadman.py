@@ -7,7 +7,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_viewer.page.deadman import Deadman, HEARTBEAT, RELEASED_AFTER
+from robot_viewer.page.deadman import Deadman, HEARTBEAT, RELEASED_AFTER, StopLatch
 
 
 def test_a_held_button_counts_from_the_first_heartbeat_on() -> None:
@@ -48,3 +48,14 @@ def test_after_a_stop_a_button_has_to_be_pressed_anew(before: int, held: int) ->
         now += HEARTBEAT
         assert not deadman.beat(1 + number % 2, now)
     assert deadman.beat(1, now + RELEASED_AFTER + HEARTBEAT)
+
+
+def test_what_goes_on_after_a_stop_does_not_count() -> None:
+    """A slider that is dragged on; it counts again when it was let go for a moment."""
+    latch = StopLatch()
+    assert latch.passes(0.0)
+    latch.stop(0.05)
+    for tick in range(1, 20):
+        assert not latch.passes(0.1 * tick)
+    assert latch.passes(2.5)
+    assert latch.passes(2.6)

@@ -67,6 +67,7 @@ class SmallWorkspace:
             self.install(of, name)
         self.environment = {
             **os.environ,
+            'NO_VIEW': '1',
             'AMENT_PREFIX_PATH': os.pathsep.join(map(str, (folder / 'prefix', *prefixes))),
             'PYTHONPATH': os.pathsep.join(str(SOURCES / name) for name in sources),
             'TMPDIR': str(folder),

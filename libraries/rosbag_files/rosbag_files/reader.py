@@ -141,7 +141,10 @@ def recording_files(folder: Path) -> list[Path]:
     Raises:
         BagError: There is none.
     """
-    found = [path for path in folder.iterdir() if _NUMBER.search(path.name)]
+    named = (path for path in folder.iterdir() if _NUMBER.search(path.name))
+    # one that is being compressed is there twice, whole where it is not compressed
+    by_number = {_number(path): path for path in sorted(named, key=lambda p: p.suffix != '.zstd')}
+    found = list(by_number.values())
     if not found:
         raise BagError(f"'{folder}' holds no recording: neither {METADATA_FILE} nor MCAP files")
     return sorted(found, key=lambda path: int(_number(path)))

@@ -105,9 +105,15 @@ class BagWriter:
         """Announce a topic before its first message, or renew what is known of it.
 
         Of one that is known, QoS profiles are renewed: in metadata.yaml, and in the next file.
+
+        Raises:
+            BagError: It cannot be written.
         """
         if topic.name not in self._topics:
-            self._file.add_topic(topic)
+            try:
+                self._file.add_topic(topic)
+            except OSError as error:
+                raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
         self._topics[topic.name] = topic
 
     def write(

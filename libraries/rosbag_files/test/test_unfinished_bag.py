@@ -21,6 +21,7 @@ from rosbag_files import (
     repair,
     WriterOptions,
 )
+from rosbag_files.reader import recording_files
 
 MESSAGES = [message(number) for number in range(100)]
 
@@ -111,3 +112,11 @@ def test_a_folder_without_a_recording(tmp_path: Path) -> None:
         BagReader(tmp_path)
     with pytest.raises(BagError, match='does not exist'):
         BagReader(tmp_path / 'nothing')
+
+
+def test_a_file_that_is_being_compressed_counts_once(tmp_path: Path) -> None:
+    """Whoever is killed meanwhile leaves both; the one that is whole is read."""
+    for name in ('bag_0.mcap', 'bag_0.mcap.zstd', 'bag_1.mcap.zstd'):
+        (tmp_path / name).touch()
+    names = [path.name for path in recording_files(tmp_path)]
+    assert names == ['bag_0.mcap', 'bag_1.mcap.zstd']

@@ -137,7 +137,9 @@ def check_contract(
 def check_answers(
     network: Network,
     standing: Floats,
-    scale: Floats,
+    contract: PolicyContract,
+    stand: Floats,
+    *,
     period: float,
     clock: Callable[[], float],
 ) -> Iterator[Row]:
@@ -146,7 +148,8 @@ def check_answers(
     Args:
         network: The network.
         standing: The observation of a robot that stands.
-        scale: Positions in [rad] for an action of one.
+        contract: What it expects.
+        stand: Where the robot stands, in the order of the policy [rad].
         period: Time between two steps in [s].
         clock: A monotonic clock in [s].
     """
@@ -159,15 +162,21 @@ def check_answers(
     finite = bool(np.isfinite(run(np.zeros_like(standing))).all())
     yield _row('answer to all zero', 'numbers', 'numbers' if finite else 'NaN', finite)
     action = run(standing)
-    largest = float(np.abs(action[0] * scale).max())
+    raw = action[0]
+    if contract.action.clip is not None:
+        raw = np.clip(raw, *np.array(contract.action.clip, np.float32).T)
+    targets = np.array(contract.action.offset) + np.array(contract.action.scale) * raw
+    largest = float(np.abs(targets - stand).max())
     # a NaN is not below anything
     fits = largest < MAX_RESTING_ACTION
-    yield _row('action standing', f'below {MAX_RESTING_ACTION:g} rad', f'{largest:.3f} rad', fits)
+    expected = f'below {MAX_RESTING_ACTION:g} rad off the stand'
+    yield _row('targets standing', expected, f'{largest:.3f} rad', fits)
     first = run(standing).copy()
     same = bool(np.array_equal(first, run(standing), equal_nan=True))
     yield _row('the same answer twice', 'yes', 'yes' if same else 'no', same)
-    for _ in range(WARM_UP):
-        run(standing)
+    network.reset()
+    steady = all(bool(np.isfinite(network.run(standing)).all()) for _ in range(WARM_UP))
+    yield _row('answers one after the other', 'numbers', 'numbers' if steady else 'NaN', steady)
     times = []
     for _ in range(TIMED_RUNS):
         start = clock()
@@ -209,9 +218,19 @@ def _recurrent(network: Network, contract: PolicyContract) -> Iterator[Row]:
     for state in contract.recurrence:
         fed, kept = inputs.get(state.input), outputs.get(state.output)
         found = f'{fed} from {kept}'
-        sizes = [len(port[1]) if port else 0 for port in (fed, kept)]
-        fits = fed is not None and kept is not None and fed[0] == FLOAT and sizes[0] == sizes[1]
+        fits = fed is not None and kept is not None and _same_port(fed, kept)
         yield _row(f'recurrence.{state.input}', f'an input, from {state.output}', found, fits)
+
+
+def _same_port(fed: tuple[str, tuple[object, ...]], kept: tuple[str, tuple[object, ...]]) -> bool:
+    """Return whether an output may be fed to an input: type and sizes that are fixed."""
+    (kind, shape), (other, others) = fed, kept
+    fixed = (
+        one == two
+        for one, two in zip(shape, others, strict=False)
+        if isinstance(one, int) and isinstance(two, int)
+    )
+    return kind == other == FLOAT and len(shape) == len(others) and all(fixed)
 
 
 def _rates(

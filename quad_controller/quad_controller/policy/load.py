@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-import numpy as np
-
 from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
@@ -169,9 +167,17 @@ def validate_policy(
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
     standing = runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0)))
-    scale = np.array(contract.action.scale, np.float32)
     try:
-        answers = tuple(check_answers(network, standing, scale, period, clock))
+        answers = tuple(
+            check_answers(
+                network,
+                standing,
+                contract,
+                runner.in_its_order(stand),
+                period=period,
+                clock=clock,
+            )
+        )
     except Exception as error:
         raise PolicyError(f'policy {name} cannot be run: {error}') from error
     report = Report((*report.rows, *answers))

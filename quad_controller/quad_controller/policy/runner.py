@@ -121,10 +121,16 @@ class PolicyRunner:
         self._builder.reset()
         self._network.reset()
 
+    def in_its_order(self, positions: Targets) -> Floats:
+        """Return positions in the policy's order, defaults of joints that it alone has."""
+        ordered: Floats = self._defaults.copy()
+        ordered[self._policy_places] = np.array(positions)[self._robot_places]
+        return ordered
+
     def observe(self, inputs: PolicyInputs) -> Floats:
         """Return the observation; its history goes on by one step."""
         joints = inputs.joints
-        self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
+        self._positions[:] = self.in_its_order(joints.positions)
         if joints.velocities is not None:
             self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
         return self._builder.build(

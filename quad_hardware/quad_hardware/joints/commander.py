@@ -121,8 +121,6 @@ class JointCommander:
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
             now: Time [s].
         """
-        if self._let_go and self._farthest(positions, place)[0] <= LET_GO_BAND:
-            self._let_go = False
         command = self._send(self._commanded, positions, place, now)
         if command is not None:
             self._loss.commanded(command.targets, now)
@@ -174,8 +172,9 @@ class JointCommander:
         except CommandError as error:
             self.refuse(error)
             return None
+        distance, joint = self._farthest(positions, place)
+        self._let_go = self._let_go and distance > LET_GO_BAND
         if self._let_go and stream is self._commanded:
-            distance, joint = self._farthest(positions, place)
             self._drop(
                 f'the servos were let go, and {joint} is {distance:.2f} rad from its target; set '
                 f'the mode relax, then stand (commands begin within {LET_GO_BAND:g} rad of legs)'

@@ -19,6 +19,7 @@ from viser import (
 )
 
 from .aim import History, KEPT
+from .deadman import StopLatch
 from .robot_scene import travel
 
 UNTOUCHED = 1.0
@@ -37,15 +38,19 @@ class TargetPanel:
     Only what a person does in a browser sends anything; sliders that follow the robot do not.
     """
 
-    def __init__(self, server: ViserServer, joints: Sequence[Joint], aim: Aim) -> None:
+    def __init__(
+        self, server: ViserServer, joints: Sequence[Joint], latch: StopLatch, aim: Aim
+    ) -> None:
         """Add it to the tab that is open.
 
         Args:
             server: Of the page.
             joints: The joints that move together.
+            latch: After STOP no slider counts until nobody has moved one for a moment.
             aim: Sends them somewhere.
         """
         self._aim = aim
+        self._latch = latch
         self._touched = 0.0
         gui = server.gui
         gui.add_markdown('Moves to where a slider is put; STOP ends it.')
@@ -74,7 +79,9 @@ class TargetPanel:
     def _moved(self, event: GuiEvent[GuiSliderHandle[float]]) -> None:
         if event.client_id is None:  # it follows its joint
             return
-        self._touched = time.monotonic()
+        self._touched = now = time.monotonic()
+        if not self._latch.passes(now):
+            return
         targets = {name: slider.value for name, slider in self._sliders.items()}
         self._aim(targets, self._speed.value / 100.0)
 

@@ -9,7 +9,7 @@ each other, later ones count, and what is still open then is asked for by name.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import yaml
@@ -39,7 +39,21 @@ class ContractDocument:
 
     def over(self, base: ContractDocument) -> ContractDocument:
         """Return this one laid over another: its values count, the other's order stays."""
+        terms = self.values.get('observation', {}).get('terms', {})
+        if terms and all(isinstance(t, dict) and 'source' in t for t in terms.values()):
+            base = base.without_terms()  # these are all of them, in their order
         return self._joined(base, _merged(base.values, self.values, top_counts=True))
+
+    def without_terms(self) -> ContractDocument:
+        """Return this one without the terms of the observation."""
+        observation = self.values.get('observation', {})
+        kept = {key: value for key, value in observation.items() if key != 'terms'}
+        origins = {
+            path: origin
+            for path, origin in self.origins.items()
+            if not path.startswith('observation.terms')
+        }
+        return replace(self, values={**self.values, 'observation': kept}, origins=origins)
 
     def completed_by(self, other: ContractDocument) -> ContractDocument:
         """Return this one with the values of another where it has none; its order stays."""

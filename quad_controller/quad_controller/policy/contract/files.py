@@ -6,10 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import re
 
 from ...exceptions import PolicyError
 from . import isaac_lab, playground, rl_sar
-from .document import ContractDocument, document_of
+from .document import ContractDocument, document_of, Values
 
 
 def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocument:
@@ -27,6 +28,15 @@ def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocume
     except (OSError, UnicodeDecodeError) as error:
         raise PolicyError(f'contract {path}: {error}') from error
     values = isaac_lab.load_tagged(text, path.name)
+    try:
+        return _read(values, path, joints)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError, re.error) as error:
+        if isinstance(error, PolicyError):
+            raise
+        raise PolicyError(f'contract {path}: a value is not of its form: {error}') from error
+
+
+def _read(values: Values, path: Path, joints: Sequence[str]) -> ContractDocument:
     keys = set(values)
     if {'step_dt', 'observations', 'actions'} <= keys:
         return isaac_lab.read_deploy(values, path.name)

@@ -23,6 +23,7 @@ from .terms import ISAAC_LAB
 JOINTS_HINT = 'the file does not have the order of the joints; Isaac Lab prints robot.joint_names'
 PER_TERM = {'layout': 'per_term', 'newest': 'last', 'start': 'repeat'}
 FRAMES = {'layout': 'frames', 'newest': 'last', 'start': 'repeat'}
+POSITION_ACTION = 'JointPositionAction'
 RANGES = {'lin_vel_x': 'x', 'lin_vel_y': 'y', 'ang_vel_z': 'yaw'}
 
 
@@ -171,10 +172,18 @@ def _document(
 
 
 def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
-    if len(actions) == 1:
-        return []
-    names = ', '.join(actions) or 'none'
-    return [f'{origin}: one action of joint positions can be run here, not {names}']
+    """Return why the actions are not absolute positions of all joints in their order."""
+    if len(actions) != 1:
+        names = ', '.join(actions) or 'none'
+        return [f'{origin}: one action of joint positions can be run here, not {names}']
+    (name, action), *_ = actions.items()
+    kind = re.split(r'[.:]', str(action.get('class_type', name)))[-1]
+    refusals = []
+    if kind != POSITION_ACTION:
+        refusals.append(f'{origin}: actions.{name} is a {kind}; {POSITION_ACTION} can be run here')
+    if action.get('joint_ids') is not None or action.get('preserve_order'):
+        refusals.append(f'{origin}: actions.{name} has an order of joints of its own')
+    return refusals
 
 
 def _matched(value: object, joints: Sequence[str], default: float) -> object:

@@ -351,6 +351,8 @@ class _WriterThread:
             self._writer.close()
         except BagError as error:
             self._error = error
+        except Exception as error:  # noqa: BLE001  # or the recording would end without a word
+            self._error = BagError(f'internal error: {error!r}')
 
     def _work(self) -> None:
         while self._jobs:
