@@ -10,7 +10,7 @@ from pathlib import Path
 import signal
 import sys
 
-from .exceptions import QuadControllerError
+from .exceptions import PolicyError, QuadControllerError
 from .policy import onnx_file
 from .policy.contract.build import build_contract
 from .policy.contract.document import ContractDocument, setting
@@ -29,14 +29,12 @@ def run(arguments: Sequence[str]) -> int:
         if options.dry_run:
             return 0
         target = options.output or options.model
-        data = onnx_file.with_metadata(
-            options.model.read_bytes(), CONTRACT_KEY, document.to_yaml()
-        )
-        target.write_bytes(data)
+        _write(options.model, target, document)
+        digest = onnx_file.digest(target)
     except (QuadControllerError, OSError) as error:
         sys.stdout.write(f'{error}\n')
         return 1
-    sys.stdout.write(f'{target} has its contract, sha256 {onnx_file.digest(target)}\n')
+    sys.stdout.write(f'{target} has its contract, sha256 {digest}\n')
     return 0
 
 
@@ -63,6 +61,23 @@ def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> Co
         document = read_contract_file(path, joints).over(document)
         joints = joints or document.values.get('joints') or ()
     return top.over(document)
+
+
+def _write(model: Path, target: Path, document: ContractDocument) -> None:
+    """Write the model with its contract, whole or not at all.
+
+    Raises:
+        PolicyError: Its weights lie in files that are not beside the target.
+        OSError: It cannot be written.
+    """
+    data = onnx_file.with_metadata(model.read_bytes(), CONTRACT_KEY, document.to_yaml())
+    sides = onnx_file.side_files(model, data)
+    if sides and target.resolve().parent != model.resolve().parent:
+        names = ', '.join(side.name for side in sides)
+        raise PolicyError(f'the weights of {model} lie in {names}: write --output beside them')
+    part = target.with_name(f'{target.name}.part')
+    part.write_bytes(data)
+    part.replace(target)
 
 
 def _print_table(document: ContractDocument) -> None:

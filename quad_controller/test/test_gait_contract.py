@@ -352,3 +352,41 @@ def test_values_of_another_form_are_refused(tmp_path: Path, name: str, text: str
     (tmp_path / name).write_text(text)
     with pytest.raises(PolicyError, match=name):
         read_contract_file(tmp_path / name)
+
+
+def test_a_model_is_written_whole_and_beside_its_weights(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Elsewhere its weights would be missing; nothing is written then."""
+    tool, other = TOOLS['rl_sar'](), tmp_path / 'other' / 'policy.onnx'
+    other.parent.mkdir()
+    write_network(tool, tmp_path / 'policy.onnx', external=True)
+    arguments = attached(tool, tmp_path)
+    assert run([*arguments, '--output', str(other)]) == 1
+    assert 'write --output beside them' in capsys.readouterr().out
+    assert not any(other.parent.iterdir())
+    assert run([*arguments, '--output', str(tmp_path / 'new.onnx')]) == 0
+    assert load(tmp_path / 'new.onnx').contract.width == tool.width
+
+
+def test_clips_of_isaac_lab_are_matched_with_joints(tmp_path: Path) -> None:
+    """By patterns, as scales are; a joint that none matches is not clipped."""
+    tool = TOOLS['isaac_env']()
+    text = tool.files['env.yaml'].replace(
+        'use_default_offset: true\n    clip: null',
+        'use_default_offset: true\n    clip:\n      .*_hip_joint: [-0.1, 0.1]',
+    )
+    (tmp_path / 'env.yaml').write_text(text)
+    document = read_contract_file(tmp_path / 'env.yaml', JOINTS)
+    clips = document.values['action']['target_clip']
+    assert [clip == [-0.1, 0.1] for clip in clips] == ['hip' in name for name in JOINTS]
+
+
+def test_clips_beyond_the_limits_are_refused(tmp_path: Path) -> None:
+    """No target would be both within the clip and where the joint may be."""
+    tool = TOOLS['rl_sar']()
+    write_network(tool, tmp_path / 'policy.onnx')
+    clip = ['--set', 'action.target_clip=[3.0, 4.0]']
+    assert run([*attached(tool, tmp_path), *clip]) == 0
+    with pytest.raises(PolicyError, match='outside of its soft limits'):
+        load(tmp_path / 'policy.onnx')

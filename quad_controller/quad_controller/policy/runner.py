@@ -11,6 +11,7 @@ import numpy as np
 
 from quad_description import Quadruped, Targets
 
+from ..exceptions import PolicyError
 from ..gait.velocity import Velocity
 from .contract.model import PolicyContract, Source
 from .interface import PolicyInputs, PolicyStep
@@ -66,6 +67,9 @@ class PolicyRunner:
             robot: The robot.
             options: How to run it.
             period: Of the control loop in [s]; that of the policy is one or several of them.
+
+        Raises:
+            PolicyError: Targets are clipped to where a joint may not be.
         """
         self._name, self._network, self._contract = name, network, contract
         self._low_pass = options.low_pass or contract.action.low_pass
@@ -206,4 +210,9 @@ class PolicyRunner:
             lowest, highest = np.array(self._contract.action.target_clip, np.float32).T
             np.maximum(lower, lowest, out=lower)
             np.minimum(upper, highest, out=upper)
+            for name, low, high in zip(self._contract.joint_names, lower, upper, strict=True):
+                if low > high:
+                    raise PolicyError(
+                        f'action.target_clip of {name} lies outside of its soft limits'
+                    )
         return lower, upper

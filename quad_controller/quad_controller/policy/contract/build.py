@@ -336,7 +336,7 @@ def _numbers(count: int) -> Callable[[object], tuple[float, ...]]:
         numbers = _any_numbers(value)
         if not isinstance(value, (list, tuple)):
             return numbers * count
-        if len(numbers) != count:
+        if count and len(numbers) != count:  # 0: the joints are open
             raise _UnfitError(f'a number or {count} of them, not {len(numbers)}')
         return numbers
 

@@ -10,6 +10,7 @@ has the order of the joints: it is the simulator's, and has to be given by name.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+import math
 import re
 from typing import Any
 
@@ -141,7 +142,7 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
         contract['action'] = _known(
             scale=_matched(action.get('scale'), joints, 1.0),
             offset=None if action.get('use_default_offset') else offset,
-            target_clip=action.get('clip'),
+            target_clip=_matched(action.get('clip'), joints, [-math.inf, math.inf]),
         )
     hints = {'joints': JOINTS_HINT}
     if not joints:
@@ -186,8 +187,8 @@ def _one_action(actions: Mapping[str, Any], origin: str) -> list[str]:
     return refusals
 
 
-def _matched(value: object, joints: Sequence[str], default: float) -> object:
-    """Return a number for each joint where the file has patterns; else what it has."""
+def _matched(value: object, joints: Sequence[str], default: object) -> object:
+    """Return a value for each joint where the file has patterns; else what it has."""
     if not isinstance(value, Mapping):
         return value
     if not joints:
