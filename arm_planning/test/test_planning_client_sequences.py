@@ -134,6 +134,7 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     assert (status, executed.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
     assert at(rig) == pytest.approx(MOVED, abs=1e-3)
     # setPoseTarget() and move(): the frame of the model
+    rig.client.spin_for(0.5)  # move_group gets the joint states
     pose = tip(rig)
     pose.position.z += 0.1
     _status, moved = rig.move(action_goal(interface_request(pose_goal(pose, HAND, BASE))))

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.scenario
 SOURCE = Path(__file__).with_name('frontend_source.py')
 RECORDING = 'Recording...'
 TIMEOUT = 30.0  # [s]
+ARRIVAL = 1.0  # [s] from a player to a recorder on a busy machine
 
 
 @pytest.fixture
@@ -136,10 +137,12 @@ def test_what_is_recorded_is_played(env: Mapping[str, str], tmp_path: Path) -> N
         words = ['bag', 'play', str(first), '--remap', '/numbers:=/counted', '--delay', '2']
         with RunningProcess([*PROGRAM, *words], env) as player:
             assert player.wait(60.0) == 0
+        time.sleep(ARRIVAL)  # nothing says that the last ones have arrived
         recorder.stop()
     before, after = read(first), read(second)
     assert after['/counted'] == before['/numbers'] == list(range(300))
-    assert after['/loose'] == before['/loose']
+    # best effort: a busy machine may lose some, and changes none
+    assert after['/loose'] == [each for each in before['/loose'] if each in after['/loose']]
     assert after['/latched'] == ['kept']
 
 
