@@ -95,7 +95,15 @@ def test_a_controller_killed_in_mid_trot_leaves_no_leg_in_the_air(quad: Simulate
     lying = [pose_positions(Pose.LIE)[name] for name in joints.name]
     assert list(joints.position) == pytest.approx(lying, abs=0.15)
     count = len(quad.tap.targets)
-    quad.spin(0.5)
+    stray = quad.client.node.create_publisher(JointCommand, '/joint_command', 1)
+    standing = [pose_positions(Pose.STAND)[name] for name in joints.name]
+    goes_on = quad.client.node.create_timer(
+        0.02, lambda: stray.publish(JointCommand(position=standing))
+    )
+    quad.spin(0.5)  # commands that were only held up raise no robot, either
+    quad.processes['hardware'].wait_for('the robot was laid down, and ')
+    quad.client.node.destroy_timer(goes_on)
+    quad.client.node.destroy_publisher(stray)
     assert len(quad.tap.targets) == count
     quad.start('controller')
     quad.spin(0.5)

@@ -199,7 +199,9 @@ class NodeRig(Rig):
     def begin_anew(self) -> None:
         """Put the robot to zero, without faults, and forget what was received."""
         self.peer.behaviour = Behaviour()
-        self.receive('/joint_states', 3)  # by then the last command of another test has arrived
+        # after a way down, commands begin where the legs are
+        self.command(list(self.receive('/joint_states').position))
+        self.receive('/joint_states', 3)  # by then the last command has arrived
         self.peer.angles.update(dict.fromkeys(self.peer.angles, 0.0))
         self.peer.commands.clear()
         for messages in self.received.values():

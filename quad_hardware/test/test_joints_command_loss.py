@@ -227,7 +227,7 @@ def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
     assert len(line.sent) > before + 40
     assert line.commander.go_down(STAND, now + PERIOD) is None
     assert line.commander.counters.loss
-    assert line.commander.take(LYING, STAND, now + 1.0) is not None
+    assert line.commander.take(STANDING, STAND, now + 1.0) is not None
     assert not line.commander.counters.loss
 
 
@@ -308,21 +308,48 @@ def test_a_robot_that_is_lost_is_not_brought_down_later(cut: str) -> None:
     assert line.commander.miss(STAND, 0.0, now + 2.0) == ''
 
 
-@pytest.mark.parametrize('descended', [0.1, 0.8, 10.0])
-def test_a_controller_that_wakes_begins_softly_where_the_legs_are(descended: float) -> None:
-    """It was frozen, and goes on with its trot while the robot goes down, or lies."""
-    line = Line()
-    now = line.walk(2.0) + line.commander.timeout
+def laid_down(line: Line, now: float, descended: float) -> tuple[Mapping[str, float], float]:
+    """Let commands break off in a trot; return the legs [rad] after a time [s], and when it is."""
     line.commander.miss(STAND, 0.0, now)
     place, end = STAND, now + descended
     while now < end and line.commander.goes_down:
         now += PERIOD
         if command := line.commander.go_down(place, now):
             place = dict(zip(NAMES, command.targets, strict=True))
+    return place, now
+
+
+@pytest.mark.parametrize('descended', [0.1, 0.8, 10.0])
+def test_a_controller_that_wakes_begins_softly_where_the_legs_are(descended: float) -> None:
+    """It was frozen, and looks where the legs are while the robot goes down, or lies."""
+    line = Line()
+    place, now = laid_down(line, line.walk(2.0) + line.commander.timeout, descended)
+    assert line.commander.take([place[name] for name in NAMES], place, now) is not None
+    assert not line.commander.goes_down
     for tick in range(1, 10):
         before = place
         command = line.commander.take([0.5, 0.2, 0.9] * 4, before, now + tick * PERIOD)
         assert command is not None
         place = dict(zip(NAMES, command.targets, strict=True))
         speed = max(abs(place[name] - before[name]) for name in NAMES) / PERIOD
-        assert speed <= 2.0 + 20.0 * (tick - 1) * PERIOD + 1e-9
+        assert speed <= 2.0 + 20.0 * tick * PERIOD + 1e-9
+
+
+@given(st.floats(1.0, 3.0), st.lists(st.sampled_from([PERIOD, 0.7, 3.0]), min_size=1, max_size=60))
+def test_commands_that_only_did_not_arrive_raise_no_robot_that_was_laid_down(
+    descended: float, gaps: list[float]
+) -> None:
+    """The network stalls, the controller knows nothing of it: the robot goes on down, and lies."""
+    line = Line()
+    place, now = laid_down(line, line.walk(2.0) + line.commander.timeout, descended)
+    for tick, gap in enumerate(gaps):
+        now += gap
+        assert line.commander.take(trot(tick, 0.3), place, now) is None
+        if command := line.commander.go_down(place, now):
+            place = dict(zip(NAMES, command.targets, strict=True))
+    assert 'the robot was laid down, and ' in line.warned[-1]
+    while line.commander.goes_down:
+        now += PERIOD
+        line.commander.go_down(place, now)
+    assert line.sent[-1] == pytest.approx(JOINTS.angles(LYING))
+    assert line.commander.take(LYING, dict(zip(NAMES, LYING, strict=True)), now) is not None

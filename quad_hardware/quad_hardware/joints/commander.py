@@ -13,7 +13,7 @@ from .command import Command, CommandLimiter, LimiterSettings
 from .command_loss import CommandLoss, LossReaction
 from .mapping import JointMap
 
-LET_GO_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
+START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
 
 
 @dataclass(slots=True)
@@ -22,7 +22,7 @@ class CommandCounters:
 
     Attributes:
         received: All of them.
-        refused: Of wrong length or not finite.
+        refused: Of wrong length, not finite, or far from legs that something else has moved.
         clamped: Went beyond limits and were taken to them.
         slowed: Asked for more speed than allowed, and were approached.
         reason: Why the last one was refused, or which joints were clamped.
@@ -79,7 +79,7 @@ class JointCommander:
         self._loss = CommandLoss(joints, raised, reaction, limiter.stream_timeout)
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
-        self._let_go = False
+        self._moved_by = ''  # what took the legs from where the commands of before left them
         self.timeout = self._loss.timeout
 
     @property
@@ -104,7 +104,7 @@ class JointCommander:
         the stream is no new request; a stalled process makes one, too.
         """
         self._forget()
-        self._let_go = True
+        self._moved_by, self.counters.loss = 'the servos were let go', ''
 
     def refuse(self, error: CommandError) -> None:
         """Count a command that is none."""
@@ -123,6 +123,7 @@ class JointCommander:
         """
         command = self._send(self._commanded, positions, place, now)
         if command is not None:
+            self._moved_by = ''
             self._loss.commanded(command.targets, now)
             self.counters.loss = ''
         return command
@@ -139,6 +140,9 @@ class JointCommander:
         if not hazard:
             return ''
         reason = self._loss.begin(place, tilt, now)
+        if not reason:  # commands that only did not arrive raise no robot that lies, either
+            self._commanded.reset()
+            self._moved_by = 'joint commands broke off and the robot was laid down'
         does = f'holds as it is, for {reason}' if reason else 'lies down'
         self.counters.loss = (
             f'joint commands broke off {hazard}: the robot {does}; is the controller running?'
@@ -167,24 +171,27 @@ class JointCommander:
             if not place:
                 self._drop(self._obstacle())
                 return None
+            if self._moved_by and stream is self._commanded:
+                self._check_start(positions, place)
             measured = [place.get(name) for name in self._joints.names]
             command = stream.step(positions, measured, now)
         except CommandError as error:
             self.refuse(error)
-            return None
-        distance, joint = self._farthest(positions, place)
-        self._let_go = self._let_go and distance > LET_GO_BAND
-        if self._let_go and stream is self._commanded:
-            self._drop(
-                f'the servos were let go, and {joint} is {distance:.2f} rad from its target; set '
-                f'the mode relax, then stand (commands begin within {LET_GO_BAND:g} rad of legs)'
-            )
             return None
         if not self._send_angles(self._joints.angles(command.targets)):
             self._drop(self._obstacle())
             return None
         self._count(command)
         return command
+
+    def _check_start(self, positions: Sequence[float], place: Mapping[str, float]) -> None:
+        """Refuse targets that do not begin where the legs are."""
+        distance, joint = self._farthest(positions, place)
+        if distance > START_BAND:
+            raise CommandError(
+                f'{self._moved_by}, and {joint} is {distance:.2f} rad from its target; set the '
+                f'mode relax, then stand (commands begin up to {START_BAND:g} rad off the legs)'
+            )
 
     def _farthest(
         self, positions: Sequence[float], place: Mapping[str, float]

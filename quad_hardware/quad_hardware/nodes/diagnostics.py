@@ -147,7 +147,8 @@ def command_diagnostic(node: str, port: str, counters: CommandCounters) -> Diagn
     level = DiagnosticStatus.WARN if counters.troubled else DiagnosticStatus.OK
     message = counters.reason if counters.troubled else f'{counters.received} received'
     if counters.loss:
-        level, message = DiagnosticStatus.ERROR, counters.loss
+        level = DiagnosticStatus.ERROR
+        message = f'{counters.loss}; {message}' if counters.troubled else counters.loss
     values = {k: v for k, v in asdict(counters).items() if k != 'troubled'}
     counters.troubled, counters.largest_step = False, 0.0
     return _status(level, f'{node}: joint commands', message, port, values)
