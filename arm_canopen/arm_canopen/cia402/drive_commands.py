@@ -64,7 +64,9 @@ class DriveCommands:
         self._leaving: Promise[str] | None = None  # the shutdown at the end of the master
         self._stream = TargetStream(drive, scheduler, self._steps)
         self._recovery = Recovery(
-            drive, scheduler, lambda mode: self.run('recovery', self._enable_in(mode))
+            drive,
+            scheduler,
+            lambda mode: self.run('recovery', self._enable_in(mode), by_itself=True),
         )
 
     def request(self, name: str) -> Promise[str]:
@@ -72,7 +74,12 @@ class DriveCommands:
         return self.run(name, self.offered[name](), preempt=name in self._stopping)
 
     def run(
-        self, name: str, sequence: Coroutine[Promise[Any], None, str], *, preempt: bool = False
+        self,
+        name: str,
+        sequence: Coroutine[Promise[Any], None, str],
+        *,
+        preempt: bool = False,
+        by_itself: bool = False,
     ) -> Promise[str]:
         """Run one of the coroutines below unless another one runs.
 
@@ -80,6 +87,7 @@ class DriveCommands:
             name: Name of the command, for messages.
             sequence: The coroutine.
             preempt: End the one that runs instead of being refused; for what stops a drive.
+            by_itself: No client has requested it, so no stream of targets is let in for it.
         """
         if self._leaving is not None:
             sequence.close()
@@ -90,7 +98,12 @@ class DriveCommands:
             sequence.close()
             return _refused(DriveError(f'{self.drive.name} is busy: {self._running} is running'))
         self._running = name
-        self._stream.end(name)
+        if preempt:
+            self._stream.end(name)
+        elif by_itself:
+            self._stream.interrupt(name)
+        else:
+            self._stream.renew(name)
         self._task = self._scheduler.spawn(sequence)
         return self._task
 
@@ -116,7 +129,7 @@ class DriveCommands:
             DriveError: The drive cannot take it; the message has the reason.
         """
         answer = self._set(target)
-        self._stream.end('a single target')
+        self._stream.interrupt('a single target')
         return answer
 
     def deliver(self, command: Callable[[], str]) -> Promise[str]:
@@ -225,7 +238,7 @@ class DriveCommands:
         destination = self._named(lambda: mode.destination(move))
         drive.control.check_target(destination)
         delivery = self._named(lambda: mode.move(move))
-        self._stream.end('a single move')
+        self._stream.interrupt('a single move')
         self._resume(delivery)
         if not move.immediate:
             self._delivery = completed()  # answered when it is queued, not when its turn comes

@@ -32,7 +32,7 @@ class StopCommands:
         return drive.describe()
 
     async def halt(self) -> str:
-        """Brake and stay enabled (bit 8, option code 0x605D); the next target goes on."""
+        """Brake and stay enabled (bit 8, option code 0x605D); the next single target goes on."""
         drive = self._drive
         await self._ready_to_stop('halted')
         if self._is_quick_stopped():

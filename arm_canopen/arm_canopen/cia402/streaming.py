@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A stream of targets of one drive: stopped where it pauses, kept out where a command ended it."""
+"""A stream of targets of one drive: stopped where it pauses, kept out after a command."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ class TargetStream:
     """Targets on a topic, without an end that anybody announces.
 
     A publisher cannot know that its drive was halted, homed or switched to a mode in which its
-    numbers mean something else. So what comes after a command belongs to the old stream, until
-    there was a pause of ``target_timeout``.
+    numbers mean something else, and a pause of it is no request: a stalled process and a network
+    make pauses, too. So a stream that a command has ended stays out, until a command that enables
+    the drive or selects a mode is given while no targets come.
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler, steps: DriveSequences) -> None:
@@ -29,24 +30,22 @@ class TargetStream:
         self._came = -math.inf
         self._goes_on_until = 0.0
         self._ended_by = ''
+        self._begun = False  # one has come since the last command that lets one in
         self._watch: Task[None] | None = None
 
     def admit(self) -> None:
         """Take note of a target of a stream.
 
         Raises:
-            DriveError: It belongs to a stream that was ended.
+            DriveError: A command keeps streams out.
         """
-        drive, now = self._drive, self._scheduler.now
-        before, self._came = self._came, now
-        if now - before > drive.config.target_timeout:
-            self._ended_by = ''
+        self._came = self._scheduler.now
         if self._ended_by:
-            pause = drive.config.target_timeout * 1000  # [ms]
             raise DriveError(
-                f'{drive.name} takes no target of this stream: it was ended by {self._ended_by}; '
-                f'a new one begins after a pause of {pause:g} ms'
+                f'{self._drive.name} takes no stream of targets: it was ended by {self._ended_by};'
+                ' stop the publisher, call ~/enable or the service of a mode, then stream anew'
             )
+        self._begun = True
 
     def follow(self, delivery: Promise[None]) -> None:
         """A target was commanded: stop the drive when it refuses it, or no other one follows."""
@@ -56,14 +55,27 @@ class TargetStream:
             self._watch = self._scheduler.background(self._watch_for_pause())
 
     def end(self, by: str) -> None:
-        """Keep out what is still to come of the stream.
+        """Keep streams out.
 
         Args:
-            by: What ended it, in words.
+            by: The command, in words.
         """
         self._ended_by = by
         if self._watch is not None:
             self._watch.cancel(DriveError('the stream was ended by a command'))
+
+    def interrupt(self, by: str) -> None:
+        """Keep out the stream that has begun, if one has; a pause may be a stall."""
+        if self._begun:
+            self.end(by)
+
+    def renew(self, by: str) -> None:
+        """Let a stream in that begins from now on, but not one that comes already."""
+        silence = self._scheduler.now - self._came
+        if silence <= self._drive.config.target_timeout:
+            self.end(by)
+        else:
+            self._ended_by, self._begun = '', False
 
     def _note_delivery(self, delivery: Promise[None]) -> None:
         drive = self._drive

@@ -5,15 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.drive import DriveState, OperationMode
 
 pytestmark = pytest.mark.slow
 
@@ -25,8 +27,10 @@ class Publisher:
     """A client that sends a target in each cycle, whatever becomes of it."""
 
     def __init__(self, mode: OperationMode) -> None:
-        """Enable a drive in a mode."""
-        self.net = VirtualNetwork(bus_config(drive_config(JOINT, 2)))
+        """Enable a drive in a mode; it is enabled again after its device was lost."""
+        drive = drive_config(JOINT, 2)
+        axis = replace(drive.axes[0], recovery=RecoveryPolicy.AUTO)
+        self.net = VirtualNetwork(bus_config(replace(drive, axes=(axis,))))
         self.net.boot()
         self.net.do(JOINT, 'init')
         self.net.select(JOINT, mode)
@@ -82,23 +86,91 @@ def test_a_command_wins_over_a_stream(mode: OperationMode, name: str) -> None:
     client.publish(2.0)
     assert client.motor == pytest.approx(rest, abs=0.03)  # at most it runs out of its braking
     assert 'ended by' in client.refusals[-1]
-    assert 'pause of 200 ms' in client.refusals[-1]
+
+
+STOPS = ['halt', 'quick_stop', 'disable']
+PAUSES = [0.25, 0.7, 3.0]  # [s] of a stalled publisher or network; the stream ends after 0.2 s
+
+
+@pytest.mark.parametrize('pause', PAUSES)
+@pytest.mark.parametrize('name', STOPS)
+@pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
+def test_a_pause_is_no_request(mode: OperationMode, name: str, pause: float) -> None:
+    """A publisher that was held up while somebody stopped the drive moves it no more."""
+    client = Publisher(mode)
+    client.publish(0.5)
+    client.result(client.net.begin(JOINT, name, preempt=True))
+    rest = client.motor
+    for _ in range(3):
+        client.net.run(pause)
+        client.publish(0.3)
+    assert client.motor == pytest.approx(rest, abs=0.03)
+    assert 'ended by' in client.refusals[-1]
 
 
 @pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.PROFILE_POSITION])
-def test_after_a_pause_a_new_stream_is_followed(mode: OperationMode) -> None:
-    """It ends the halt as any other target would."""
+def test_a_new_stream_is_followed_after_an_explicit_command(mode: OperationMode) -> None:
+    """Given while no targets come; one that is given while they come lets nothing in."""
     client = Publisher(mode)
     client.publish(0.5)
     client.result(client.net.begin(JOINT, 'halt', preempt=True))
+    rest = client.motor
+    client.result(client.net.begin(JOINT, 'enable'))
     client.publish(0.5)
+    client.net.run(1.0)
+    client.publish(0.5)
+    assert client.motor == pytest.approx(rest, abs=0.03)
     client.net.run(0.25)
+    client.net.do(JOINT, 'enable')
     client.refusals.clear()
     client.publish(1.0)
     assert client.refusals == []
     assert client.motor == pytest.approx(client.value, abs=0.6)
     assert client.net.drives[JOINT].view.velocity > 0.3
     assert not client.net.drives[JOINT].control.halted
+
+
+@pytest.mark.parametrize('pause', PAUSES)
+def test_a_single_target_stays_where_a_stream_was_held_up(pause: float) -> None:
+    """The stream had begun, so its pause may be a stall."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.publish(0.5)
+    client.net.run(pause)
+    client.commands.set_target(-0.2)
+    client.net.run(pause)
+    client.publish(2.0)
+    assert client.motor == pytest.approx(-0.2, abs=2e-3)
+    assert 'ended by a single target' in client.refusals[-1]
+
+
+@pytest.mark.parametrize('held_up', [False, True])
+def test_a_drive_that_recovers_by_itself_waits_for_a_command(*, held_up: bool) -> None:
+    """The publisher knows nothing of the power cut; nobody has enabled the drive for it."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.publish(0.5)
+    client.net.power_off(JOINT)
+    client.net.run(1.0)
+    client.net.power_on(JOINT)
+    view = client.net.drives[JOINT].view
+    if not held_up:
+        client.publish(3.0)
+    client.net.run_until(lambda: view.state is DriveState.OPERATION_ENABLED)
+    client.net.run(0.3)
+    rest = client.motor
+    client.publish(2.0)
+    assert client.motor == pytest.approx(rest, abs=1e-3)
+    assert 'ended by recovery' in client.refusals[-1]
+
+
+def test_a_stream_begins_after_a_single_target() -> None:
+    """To the start first, then along: no stream had begun."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.commands.set_target(0.1)
+    client.net.run(1.0)
+    client.value = 0.1
+    client.publish(1.0)
+    assert client.refusals == []
+    assert client.motor > 0.4
 
 
 def test_a_drive_that_is_enabled_again_waits_for_a_new_stream() -> None:
