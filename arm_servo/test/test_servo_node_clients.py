@@ -16,7 +16,7 @@ from arm_servo.core.requests import JogRequest
 from arm_servo.jog.servo_source import TwistCommand
 from arm_servo.ros.refusals import Refusals
 from arm_servo.ros.servo.modes import CommandKind
-from arm_servo.ros.servo.node import NEW_MOTION_SILENCE, Servo
+from arm_servo.ros.servo.node import Servo
 
 
 class Commands:
@@ -33,7 +33,6 @@ class Commands:
         servo._modes = SimpleNamespace(admit=lambda _kind: None)
         servo._prepare = lambda: None
         servo._gateway, servo._refusals = self.drives.gateway, Refusals()
-        servo._last = -NEW_MOTION_SILENCE
         self.servo = servo
 
     def send(self, numbers: list[float], frame: str = '') -> None:

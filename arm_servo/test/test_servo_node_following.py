@@ -35,7 +35,7 @@ def test_jogging_an_arm_that_stands_still_runs_no_further_than_the_limit() -> No
 
 
 def test_a_stream_of_commands_does_not_start_it_again() -> None:
-    """Who lets go and commands again begins where the arm is; who does not gets the reason."""
+    """Who lets go and commands again begins where the arm is; a pause is not letting go."""
     arm = Elsewhere()
     arm.run(5)
     arm.moves = False
@@ -47,6 +47,10 @@ def test_a_stream_of_commands_does_not_start_it_again() -> None:
     assert arm.gateway.snapshot.blocked == ''
     arm.moves = True
     before = np.array(arm.at)
+    assert len(jog(arm, 50)) == 50
+    assert len(arm.points) == sent
+    arm.run(40)
+    assert jog(arm, 1, 0.0) == []
     assert jog(arm, 50) == []
     assert np.abs(arm.path()[sent] - before).max() < 1e-3
     assert arm.at[0] > before[0] + 0.1

@@ -36,18 +36,36 @@ def test_one_page_at_a_time(beats: list[tuple[int, float]]) -> None:
             holder, last = page, now
 
 
-@given(st.integers(1, 90), st.integers(0, 90))
-def test_after_a_stop_a_button_has_to_be_pressed_anew(before: int, held: int) -> None:
-    """Whoever still holds it, of whichever page."""
+@given(
+    st.integers(1, 90),
+    st.lists(st.tuples(st.sampled_from([1, 2]), st.floats(HEARTBEAT, 9.0)), max_size=60),
+)
+def test_after_a_stop_a_button_has_to_be_pressed_anew(
+    before: int, beats: list[tuple[int, float]]
+) -> None:
+    """Whatever the pauses of its heartbeats, which a stalled page makes, too."""
     deadman, now = Deadman(), 10.0
     for _ in range(before):
         now += HEARTBEAT
         deadman.beat(1, now)
+        deadman.beat(2, now)
     deadman.stop()
-    for number in range(held):
-        now += HEARTBEAT
-        assert not deadman.beat(1 + number % 2, now)
-    assert deadman.beat(1, now + RELEASED_AFTER + HEARTBEAT)
+    for page, gap in beats:
+        now += gap
+        assert not deadman.beat(page, now)
+    assert deadman.release(1, now)
+    assert not deadman.release(2, now)
+    assert deadman.beat(1, now + RELEASED_AFTER)
+
+
+def test_a_button_that_nobody_held_counts_after_a_stop_at_once() -> None:
+    """It was let go before; what is late of it does not count."""
+    deadman = Deadman()
+    assert deadman.beat(1, 10.0)
+    deadman.release(1, 10.1)
+    assert not deadman.beat(1, 10.1 + 0.1 * HEARTBEAT)
+    deadman.stop()
+    assert deadman.beat(1, 11.0)
 
 
 def test_what_goes_on_after_a_stop_does_not_count() -> None:

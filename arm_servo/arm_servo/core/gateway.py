@@ -18,6 +18,7 @@ from arm_model import ArmError, Array, PlanningScene, RobotModel, RobotState
 from arm_trajectory import GoalCode
 
 from ..exceptions import NotReadyError
+from .hold_to_run import BEGINS, HoldToRun
 from .motion_core import MotionCore
 from .motion_queue import MotionCommand, MotionQueue
 from .moving_arms import Neighbours
@@ -47,6 +48,7 @@ class CommandGateway:
 
     Attributes:
         model: The arm.
+        holds: Which clients hold a jog, and have to let go after the arm had stopped following.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class CommandGateway:
         self._orders = OrderQueue()
         self._clock = clock
         self._order = CommandOrder()
+        self.holds = HoldToRun()
         self._motions = MotionQueue(
             core, self._orders, self._order, worker, clock, rest=self._rest
         )
@@ -103,6 +106,8 @@ class CommandGateway:
             prepared = self._core.prepare(request)
             if isinstance(request, JogRequest) and len(self._orders) >= MAX_QUEUED_JOGS:
                 raise NotReadyError(f'{MAX_QUEUED_JOGS} commands wait for the cycle')
+            if isinstance(request, JogRequest):
+                self.holds.command(request.client, self._clock(), is_zero=request.is_zero)
             get_ready()
         except ArmError as error:
             future.set_exception(error)
@@ -184,6 +189,16 @@ class CommandGateway:
             positions: Positions last commanded to the drives in [rad].
         """
         self._core.reset(positions)
+        if self.holds.begin(self._clock()):
+            self._order.void((Source.JOG,), BEGINS)
+
+    def reset(self, positions: Array) -> None:
+        """Go on from where others have moved the arm while it was at rest.
+
+        Args:
+            positions: Positions in [rad].
+        """
+        self._core.reset(positions)
 
     def step(
         self,
@@ -226,7 +241,7 @@ class CommandGateway:
         Args:
             reason: What has happened since, with the remedy.
         """
-        self._order.void(MOTIONS, reason)
+        self._interrupt(reason)
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Bring the arm to rest, a trajectory on its path; the motion ends with the reason.
@@ -235,7 +250,7 @@ class CommandGateway:
             reason: What has gone wrong, and where.
             code: Code of the motion's outcome.
         """
-        self._order.void(MOTIONS, reason)
+        self._interrupt(reason)
         self._core.fail(reason, code)
 
     def idle(
@@ -250,7 +265,7 @@ class CommandGateway:
             ages: How old the measured values of each joint are in [s].
         """
         if self._snapshot.set_point is not None:
-            self._order.void(MOTIONS, blocked)
+            self._interrupt(blocked)
         self._core.stands(measured)
         self._core.abandon(blocked)  # it ended at the latest when the arm came to rest
         self._motions.report_ends()
@@ -273,9 +288,13 @@ class CommandGateway:
             now: Steady time.
             reason: What has failed, with the remedy.
         """
-        self._order.void(MOTIONS, reason)
+        self._interrupt(reason)
         self._motions.clear(reason)
         self.idle(now, self._snapshot.measured, reason)
+
+    def _interrupt(self, reason: str) -> None:
+        self._order.void(MOTIONS, reason)
+        self.holds.interrupt(reason, self._clock())
 
     def _rest(self) -> RobotState | None:
         """Return where the arm stands while others have its drives; None where it follows."""

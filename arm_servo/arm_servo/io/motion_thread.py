@@ -83,7 +83,8 @@ class MotionCycle:
         measured, blocked = self._feedback.state(now)
         blocked = self.closing or blocked or self._kept(now)
         if not self._following and not blocked and measured is not None:
-            self._begin(measured.position)
+            self._gateway.begin(measured.position)
+            self._watch.begin(measured.position)
             self._following, self._lost = True, ''
         if not self._following or measured is None:
             self._gateway.idle(now, measured, blocked)
@@ -112,14 +113,11 @@ class MotionCycle:
             self._failure = ''
         return self._failure
 
-    def _begin(self, position: Array) -> None:
-        self._gateway.begin(position)
-        self._watch.begin(position)
-
     def _compare(self, position: Array, now: float) -> str:
         """Begin where others have moved the arm at rest; say when it does not follow."""
         if self._watch.moved(position, quiet=self._quiet):
-            self._begin(position)
+            self._gateway.reset(position)
+            self._watch.begin(position)
         if self._quiet:
             return ''
         if self._feedback.time == self._compared:  # nothing new was received

@@ -53,6 +53,7 @@ TWISTS: Mapping[str, Twist] = {
 }
 """Shares of the speed of jogging, along and about the axes of the base."""
 
+REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 WALKS: Mapping[str, Velocity] = {
     'forward': (0.3, 0.0, 0.0),
     'back': (-0.3, 0.0, 0.0),
@@ -310,7 +311,9 @@ class RobotPage:
         with self._tab('Jog'):
             speed = self._speed()
             for title, twist in TWISTS.items():
-                self._held(title, partial(self._jog, speed, twist))
+                self._held(
+                    title, partial(self._jog, speed, twist), partial(self._actions.jog, REST)
+                )
 
     def offer_walk(self, modes: Collection[str]) -> None:
         """Offer to walk as long as a button is held, and the modes of the robot."""
@@ -321,8 +324,9 @@ class RobotPage:
                 button = self._server.gui.add_button(mode)
                 button.on_click(partial(self._request, mode))
             speed = self._speed()
+            rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
             for title, velocity in WALKS.items():
-                self._held(title, partial(self._walk, speed, velocity))
+                self._held(title, partial(self._walk, speed, velocity), rest)
 
     def _stop(self) -> None:
         self._deadman.stop()  # or a button that is held would go on
@@ -347,14 +351,20 @@ class RobotPage:
     def _speed(self) -> GuiSliderHandle[float]:
         return self._server.gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
 
-    def _held(self, label: str, act: Callable[[], None]) -> None:
-        """Add a button that acts as long as it is held."""
+    def _held(self, label: str, act: Callable[[], None], rest: Callable[[], None]) -> None:
+        """Add a button that acts as long as it is held, and rests when it is let go."""
 
         def beat(event: GuiEvent[GuiButtonHandle]) -> None:
             if self._deadman.beat(event.client_id, time.monotonic()):
                 act()
 
-        self._server.gui.add_button(label, hint='hold it').on_hold(beat, 1.0 / HEARTBEAT)
+        def release(event: GuiEvent[GuiButtonHandle]) -> None:
+            if self._deadman.release(event.client_id, time.monotonic()):
+                rest()
+
+        button = self._server.gui.add_button(label, hint='hold it')
+        button.on_hold(beat, 1.0 / HEARTBEAT)
+        button.on_click(release)  # a click ends where the button is let go
 
     def _jog(self, speed: GuiSliderHandle[float], twist: Twist) -> None:
         x, y, z, a, b, c = (speed.value / 100.0 * part for part in twist)

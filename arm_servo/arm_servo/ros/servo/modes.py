@@ -31,15 +31,16 @@ class ServoModes:
         paused: Why the servo takes no commands; empty when it does.
     """
 
-    def __init__(self, node: Node, stop: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, stop: Callable[[str], None], renew: Callable[[], None]) -> None:
         """Offer the services.
 
         Args:
             node: The servo's node.
             stop: Brings jogging to rest, for a reason.
+            renew: Takes what comes from now on for a new jog.
         """
         self.paused = ''
-        self._stop_jogging = stop
+        self._stop_jogging, self._renew = stop, renew
         self._kind: CommandKind | None = None
         node.create_service(ServoCommandType, '~/switch_command_type', self._switch)
         node.create_service(SetBool, '~/pause_servo', self._pause)
@@ -73,6 +74,7 @@ class ServoModes:
             self._kind = CommandKind(request.command_type)
         except ValueError:
             return response  # success is false
+        self._renew()
         response.success = True
         return response
 
@@ -100,4 +102,5 @@ class ServoModes:
 
     def _resume(self) -> str:
         self.paused = ''
+        self._renew()
         return 'takes commands'

@@ -36,9 +36,6 @@ from .status import status_of
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
-NEW_MOTION_SILENCE = 0.5
-"""Silence after which a command begins a new motion, which may take drives back, in [s]."""
-
 MAX_STAMP_AHEAD = 0.1
 """How far ahead of this clock a stamp may be in [s]."""
 
@@ -63,15 +60,14 @@ class Servo:
             node: The servo's node.
             gateway: Commands to the core.
             parameters: How it behaves.
-            prepare: Called before a new motion, to get the drives back.
+            prepare: Called before a motion, to get the drives back.
         """
         self._node, self._gateway, self._prepare = node, gateway, prepare
         self._parameters = parameters
-        self._modes = ServoModes(node, self._stop)
+        self._modes = ServoModes(node, self._stop, gateway.holds.renew)
         model = gateway.model
         frames = TfListener(node, model, parameters.frame_prefix)
         self.converter = CommandConverter(model, frames, parameters, read_scales(node))
-        self._last = -NEW_MOTION_SILENCE
         self._refusals = Refusals()
         self._status = node.create_publisher(ServoStatus, parameters.status_topic, 10)
         for kind, message, topic, convert in (
@@ -90,7 +86,7 @@ class Servo:
             age = self._checked_age(message)
             self._modes.admit(kind)
             request = convert(message, begin - age)
-            self._send(request, (kind, message.header.frame_id), begin)
+            self._send(request, (kind, message.header.frame_id))
         except ArmError as error:
             self._refuse(str(error))
         except Exception as error:  # noqa: BLE001  # a message must not end the program
@@ -100,24 +96,20 @@ class Servo:
             )
 
     def _send(
-        self,
-        request: JogRequest | DisplacementRequest,
-        client: tuple[CommandKind, str],
-        now: float,
+        self, request: JogRequest | DisplacementRequest, client: tuple[CommandKind, str]
     ) -> None:
-        """Command a motion; what begins after a silence gets back drives that others have."""
-        begins = not request.is_zero and now - self._last > NEW_MOTION_SILENCE
-        get_ready = self._prepare if begins else _do_nothing
+        """Command a motion, which gets back drives that others have."""
+        # the events executor hands out no publisher, so topic and frame stand for the client
+        get_ready = _do_nothing if request.is_zero else self._prepare
         if isinstance(request, JogRequest):
-            # the events executor hands out no publisher, so topic and frame stand for the client
             request = replace(request, client=client)
             self._gateway.command(request, get_ready).add_done_callback(self._note)
-        else:
-            command = self._gateway.request(request, get_ready)
-            command.future.add_done_callback(self._note)
-            command.ended.add_done_callback(self._note_end)
-        if not request.is_zero:
-            self._last = now
+            return
+        # a stream of displacements is held like a jog
+        self._gateway.holds.command(client, time.monotonic(), is_zero=request.is_zero)
+        command = self._gateway.request(request, get_ready)
+        command.future.add_done_callback(self._note)
+        command.ended.add_done_callback(self._note_end)
 
     def _checked_age(self, message: Any) -> float:  # noqa: ANN401
         """Return how long ago a message was sent in [s]."""

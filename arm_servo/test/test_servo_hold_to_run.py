@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A jog that is held moves no arm that had stopped following, however its commands pause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from servo_drives import Drives, PERIOD
+
+from arm_canopen import Refusal, RefusalCause
+from arm_servo import NotReadyError, Source
+from arm_servo.core.commands import by_joint
+from arm_servo.core.hold_to_run import BEGIN_MARGIN, GONE_AFTER, HoldToRun
+from arm_servo.core.requests import JogRequest
+from arm_servo.jog.servo_source import JointCommand
+
+PAUSES = st.floats(0.0, GONE_AFTER - 0.1)
+
+
+class Stick:
+    """A client that jogs the first joint of an arm whose drives others may take."""
+
+    def __init__(self, client: str = 'stick') -> None:
+        """Let the arm follow."""
+        self.drives = Drives()
+        self.drives.attach()
+        self.drives.run(2)
+        self.client = client
+        self.refusals: list[str] = []
+
+    def push(self, speed: float, cycles: int = 1) -> None:
+        """Command a speed in each cycle, as the servo node does."""
+        for _ in range(cycles):
+            velocities = {'panda_joint1': speed}
+            command = JointCommand(*by_joint(self.drives.gateway.model, velocities, 'velocities'))
+            request = JogRequest(command, self.drives.now + 0.1, client=self.client)
+            future = self.drives.gateway.command(request, self._get_ready)
+            self.drives.run()
+            if (error := future.exception(0.0)) is not None:
+                self.refusals.append(str(error))
+
+    def wait(self, seconds: float) -> None:
+        """Command nothing."""
+        self.drives.run(round(seconds / PERIOD))
+
+    @property
+    def position(self) -> float:
+        """Where the joint was sent in [rad]."""
+        return self.drives.axes[0].setpoint
+
+    def _get_ready(self) -> None:
+        if self.drives.source.detached:
+            self.drives.attach()
+
+
+def halt(stick: Stick) -> None:
+    """Let somebody halt a drive."""
+    stick.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
+
+
+def faults(stick: Stick) -> None:
+    """Let a drive fault, and somebody reset it."""
+    axis = stick.drives.axes[1]
+    faulted = Refusal(RefusalCause.FAULT)
+    stick.drives.axes[1] = replace(axis, followable=False, refusal=faulted)
+    stick.drives.run(100)
+    stick.drives.axes[1] = axis
+
+
+@pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
+@pytest.mark.parametrize('happens', [halt, faults])
+def test_a_stick_that_is_held_moves_nothing_after_a_stop(
+    happens: Callable[[Stick], None], pause: float
+) -> None:
+    """Its commands pause as a stalled process makes them; let go and pushed again, it moves."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    assert stick.drives.gateway.snapshot.source is Source.JOG
+    happens(stick)
+    stick.wait(1.0)
+    rest, attached = stick.position, len(stick.drives.attachments)
+    stick.wait(pause)
+    stick.push(0.2, 100)
+    assert stick.position == pytest.approx(rest, abs=1e-6)
+    assert len(stick.drives.attachments) == attached
+    assert 'lets go first' in stick.refusals[-1]
+    stick.push(0.0)
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_a_stick_that_is_held_moves_no_arm_that_is_enabled() -> None:
+    """It was pushed while the drives were disabled; they were enabled for something else."""
+    stick = Stick()
+    stick.wait(1.0)
+    enabled, disabled = list(stick.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    stick.drives.axes = [replace(axis, followable=False, refusal=disabled) for axis in enabled]
+    stick.wait(0.1)
+    stick.push(0.2, 100)
+    stick.drives.axes = enabled
+    rest = stick.position
+    stick.push(0.2, 100)
+    assert stick.position == pytest.approx(rest, abs=1e-6)
+    stick.push(0.0)
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_a_new_push_gets_the_drives_back() -> None:
+    """The stick was let go before somebody took a drive."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    stick.push(0.0)
+    stick.wait(1.0)
+    halt(stick)
+    stick.wait(0.1)
+    rest = stick.position
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+def test_others_need_not_let_go() -> None:
+    """Only who held when the arm stopped."""
+    stick = Stick()
+    stick.push(0.2, 50)
+    halt(stick)
+    stick.wait(1.0)
+    rest, stick.client = stick.position, 'another'
+    stick.push(0.2, 50)
+    assert stick.position > rest + 0.02
+
+
+@given(PAUSES, st.lists(PAUSES, max_size=20))
+def test_no_pause_is_letting_go(before: float, pauses: list[float]) -> None:
+    """Whatever the pauses, before and after the stop: only a zero, or a person's request."""
+    holds, now = HoldToRun(), 100.0
+    holds.command('stick', now, is_zero=False)
+    now += before
+    holds.interrupt('halted', now)
+    for pause in pauses:
+        now += pause
+        with pytest.raises(NotReadyError, match='halted; a jog that was held before lets go'):
+            holds.command('stick', now, is_zero=False)
+    holds.command('stick', now, is_zero=True)
+    holds.command('stick', now, is_zero=False)
+
+
+def test_a_person_lets_everybody_in() -> None:
+    """A keyboard that sends no zero needs a request."""
+    holds = HoldToRun()
+    holds.command('keys', 1.0, is_zero=False)
+    holds.interrupt('halted', 2.0)
+    holds.renew()
+    holds.command('keys', 3.0, is_zero=False)
+
+
+def test_who_is_long_gone_holds_nothing() -> None:
+    """A program that ended without a zero, and begins again another day."""
+    holds = HoldToRun()
+    holds.command('keys', 1.0, is_zero=False)
+    holds.interrupt('halted', 1.1 + GONE_AFTER)
+    holds.begin(1.2 + GONE_AFTER)
+    holds.command('keys', 2.0 + GONE_AFTER, is_zero=False)
+
+
+@given(st.floats(0.0, 1.0).filter(lambda ahead: abs(ahead - BEGIN_MARGIN) > 1e-9))
+def test_an_arm_that_begins_to_follow_moves_for_a_new_push_only(ahead: float) -> None:
+    """The push that gets the drives back is some cycles older than that."""
+    holds = HoldToRun()
+    holds.command('stick', 100.0, is_zero=False)
+    holds.command('stick', 100.0 + ahead, is_zero=False)
+    holds.begin(100.0 + ahead)
+    if ahead < BEGIN_MARGIN:
+        holds.command('stick', 100.0 + ahead, is_zero=False)
+    else:
+        with pytest.raises(NotReadyError):
+            holds.command('stick', 100.0 + ahead, is_zero=False)
