@@ -20,9 +20,10 @@ from moveit_msgs.msg import (
     JointConstraint,
     MotionPlanRequest,
     OrientationConstraint,
+    PlanningSceneComponents,
     PositionConstraint,
 )
-from moveit_msgs.srv import GetMotionPlan
+from moveit_msgs.srv import GetMotionPlan, GetPlanningScene
 from processes import executable, RunningProcess
 from rclpy.action.server import ActionServer
 from ros_client import RosClient
@@ -127,10 +128,26 @@ class MoveGroupRig:
             raise
 
     def _wait_for_states(self) -> None:
-        self.client.spin_until(
-            lambda: self._states.get_subscription_count() > 0, TIMEOUT, 'a listener'
-        )
-        self.client.spin_for(0.2)
+        """Wait until move_group has received joint states: it shows others than by default."""
+        positions = self.positions
+        self.positions = {name: position + 0.01 for name, position in positions.items()}
+        self.settle()
+        self.positions = positions
+        self.settle()
+
+    def settle(self) -> None:
+        """Wait until move_group has received where the robot is."""
+        asked = GetPlanningScene.Request()
+        asked.components.components = PlanningSceneComponents.ROBOT_STATE
+        deadline = time.monotonic() + TIMEOUT
+        while time.monotonic() < deadline:
+            answer = self.client.call(GetPlanningScene, '/get_planning_scene', asked, TIMEOUT)
+            state = answer.scene.robot_state.joint_state
+            places = dict(zip(state.name, state.position, strict=True))
+            if all(abs(places[name] - at) < 1e-9 for name, at in self.positions.items()):
+                return
+            self.client.spin_for(0.02)  # joint states are published
+        raise TimeoutError('move_group does not receive where the robot is')
 
     def serve_arm(self, name: str) -> Any:
         """Offer a trajectory controller."""

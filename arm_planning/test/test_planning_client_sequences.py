@@ -73,7 +73,7 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
 def at_ready(rig: MoveGroupRig) -> None:
     """Begin each test at the same place."""
     rig.positions.update(zip(JOINTS, READY, strict=True))
-    rig.client.spin_for(0.2)
+    rig.settle()
 
 
 def interface_request(goal: Any) -> MotionPlanRequest:
@@ -134,13 +134,13 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     assert (status, executed.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
     assert at(rig) == pytest.approx(MOVED, abs=1e-3)
     # setPoseTarget() and move(): the frame of the model
-    rig.client.spin_for(0.5)  # move_group gets the joint states
+    rig.settle()
     pose = tip(rig)
     pose.position.z += 0.1
     _status, moved = rig.move(action_goal(interface_request(pose_goal(pose, HAND, BASE))))
     assert moved.error_code.val == SUCCESS, moved.error_code
     assert moved.executed_trajectory.joint_trajectory.points
-    rig.client.spin_for(0.2)
+    rig.settle()
     assert tip(rig).position.z == pytest.approx(pose.position.z, abs=2e-3)
     # computeCartesianPath()
     down = tip(rig)
@@ -273,7 +273,7 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     goal.trajectory.joint_trajectory = plan.trajectory.joint_trajectory
     status, done = rig.run(ExecuteTrajectory, '/execute_trajectory', goal)
     assert (status, done.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
-    rig.client.spin_for(0.2)
+    rig.settle()
     # compute_fk and compute_ik there and back, with a state for the start
     pose = tip(rig)
     asked = GetPositionIK.Request()
