@@ -15,7 +15,7 @@ from .units import Units
 
 
 class CyclicPosition(Mode):
-    """Mode 8: a set-point each cycle, from a stream or from a profile towards a single target."""
+    """Mode 8: a set-point each cycle, of a motion source or from a profile towards targets."""
 
     number = OperationMode.CYCLIC_POSITION
     halts_by_bit = False
@@ -59,9 +59,14 @@ class CyclicPosition(Mode):
 
     def set_target(self, target: float) -> Promise[None]:
         """Go to a single target by a profile."""
-        # refuse now what could not be sent on arrival
-        fitting(self._target, self._units.position_to_device(target))
-        self._profile.target = target
+        self._require_fitting(target)
+        self._profile.go(target)
+        return IN_THE_IMAGE
+
+    def follow_target(self, target: float) -> Promise[None]:
+        """Go to the next target of a stream by a profile that is as even as they come."""
+        self._require_fitting(target)
+        self._profile.track(target)
         return IN_THE_IMAGE
 
     @property
@@ -72,7 +77,7 @@ class CyclicPosition(Mode):
     def brake(self) -> None:
         """Come to a stop within the limits, wherever that is."""
         self._streamed = None
-        self._profile.target = None
+        self._profile.go(None)
 
     @property
     def braked(self) -> bool:
@@ -85,8 +90,12 @@ class CyclicPosition(Mode):
         Raises:
             DriveError: It is not finite or does not fit the object.
         """
-        fitting(self._target, self._units.position_to_device(setpoint))
+        self._require_fitting(setpoint)
         self._streamed = setpoint
+
+    def _require_fitting(self, position: float) -> None:
+        """Refuse now what could not be sent on arrival."""
+        fitting(self._target, self._units.position_to_device(position))
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Write the streamed set-point, or the profile's; a stream that ends is braked."""

@@ -128,9 +128,10 @@ class DriveCommands:
         Raises:
             DriveError: The drive cannot take it; the message has the reason.
         """
-        answer = self._set(target)
+        mode = self.drive.control.mode
+        self._set(mode.set_target, target)
         self._stream.interrupt('a single target')
-        return answer
+        return f'target {target:g} in mode {mode.number.title}'
 
     def deliver(self, command: Callable[[], str]) -> Promise[str]:
         """Command a target or a move; done when the drive has it, and no halt keeps it.
@@ -220,7 +221,7 @@ class DriveCommands:
             DriveError: The drive cannot take it; the message has the reason.
         """
         self._stream.admit()
-        self._set(target)
+        self._set(self.drive.control.mode.follow_target, target)
         self._stream.follow(self._delivery)
 
     def move(self, move: Move) -> str:
@@ -336,12 +337,10 @@ class DriveCommands:
             'it if it shall be'
         )
 
-    def _set(self, target: float) -> str:
-        drive = self.drive
+    def _set(self, command: Callable[[float], Promise[None]], target: float) -> None:
         self._require_acceptance()
-        drive.control.check_target(target)
-        self._resume(self._named(lambda: drive.control.mode.set_target(target)))
-        return f'target {target:g} in mode {drive.control.mode.number.title}'
+        self.drive.control.check_target(target)
+        self._resume(self._named(lambda: command(target)))
 
     def _named(self, command: Callable[[], T]) -> T:
         """Command the mode; what it refuses gets the name of the drive."""

@@ -91,6 +91,10 @@ class Mode(ABC):
             DriveError: The mode has no target, or the value does not fit.
         """
 
+    def follow_target(self, target: float) -> Promise[None]:
+        """Take one of a stream of targets; as :meth:`set_target` where the drive itself leads."""
+        return self.set_target(target)
+
     @abstractmethod
     def step(self, now: float, period: float, statusword: int) -> int:
         """Advance one cycle in which the drive accepts targets, and return the bits of this mode.

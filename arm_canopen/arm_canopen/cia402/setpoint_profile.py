@@ -1,6 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A trapezoidal profile, one step a cycle, for single targets in the cyclic position modes."""
+"""A trapezoidal profile, one step a cycle, for targets in the cyclic position modes.
+
+A single target is approached as fast as the limits allow. Those of a stream are points of a path,
+and come at times of their own: the profile follows a line between them, so that its speed is that
+of the path and not that of a dash to each point. A set-point that can always stop at the end of
+the line goes beyond none of the targets.
+"""
 
 from __future__ import annotations
 
@@ -23,6 +29,44 @@ class ProfileLimits:
     deceleration: float
 
 
+SPREAD = 2.0  # intervals between targets over which the way to the newest one is spread
+LEARNING = 0.25  # share of the newest interval in their mean
+
+
+class TargetLine:
+    """Goes to the newest of a stream of targets at a constant rate.
+
+    It takes twice the usual interval between them for that, so that it does not rest when one is
+    late.
+
+    Attributes:
+        position: Where it is.
+        target: The newest target.
+    """
+
+    def __init__(self, target: float) -> None:
+        self.position = self.target = target
+        self._left = self._since = 0.0  # [s] to the newest target, and since it came
+        self._interval: float | None = None  # [s]
+
+    def extend(self, target: float) -> None:
+        """Take the next target."""
+        before = self._since if self._interval is None else self._interval
+        self._interval = before + LEARNING * (self._since - before)
+        self._left, self._since = SPREAD * self._interval, 0.0
+        self.target = target
+
+    def step(self, period: float) -> float:
+        """Advance by a cycle of that length in [s], and return the new position."""
+        if self._left > period:
+            self.position += period / self._left * (self.target - self.position)
+        else:
+            self.position = self.target
+        self._left -= period
+        self._since += period
+        return self.position
+
+
 class SetpointProfile:
     """Moves a set-point to a target that may change at any time, without a step in velocity.
 
@@ -37,11 +81,23 @@ class SetpointProfile:
         self.position = position
         self.velocity = velocity
         self.target: float | None = None
+        self._line: TargetLine | None = None
 
     @property
     def at_rest(self) -> bool:
         """Whether the set-point stands still and has nowhere to go."""
         return self.velocity == 0.0 and self.target in (None, self.position)
+
+    def go(self, target: float | None) -> None:
+        """Go to a single target; without one brake to a stop."""
+        self.target, self._line = target, None
+
+    def track(self, target: float) -> None:
+        """Go on to the next target of a stream; the first one is like a single target."""
+        if self._line is None:
+            self._line, self.target = TargetLine(target), target
+        else:
+            self._line.extend(target)
 
     def follow(self, position: float, period: float) -> None:
         """Take the set-point of a stream, and remember its rate for a smooth stop.
@@ -52,7 +108,7 @@ class SetpointProfile:
         """
         self.velocity = (position - self.position) / period
         self.position = position
-        self.target = None
+        self.go(None)
 
     def step(self, period: float, limits: ProfileLimits) -> float:
         """Advance by a cycle.
@@ -67,6 +123,8 @@ class SetpointProfile:
         Returns:
             The new set-point.
         """
+        if self._line is not None:
+            self.target = self._line.step(period)
         if self.at_rest:
             return self.position
         wanted = 0.0 if self.target is None else self._wanted(self.target, period, limits)
