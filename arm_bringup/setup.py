@@ -16,7 +16,6 @@ EXECUTABLES = [
     'demo = arm_bringup.demos.wave.main:main',
     'motion_demo = arm_bringup.demos.motion:main',
     'plan_demo = arm_bringup.demos.plan:main',
-    'wave_master = arm_bringup.demos.wave.master:main',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[1]

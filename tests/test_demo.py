@@ -6,14 +6,21 @@ from __future__ import annotations
 
 import re
 import signal
+import time
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
+from canopen_interfaces.srv import COTargetDouble
 from processes import RunningProcess
 import psutil
 import pytest
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
@@ -47,6 +54,46 @@ def test_demo_moves_all_joints_and_leaves_them_disabled(isolation: Isolation) ->
     gone, alive = psutil.wait_procs(started, timeout=5.0)
     assert not alive
     assert len(gone) >= 3
+
+
+def wait_for_silence(client: RosClient, topic: str, duration: float) -> None:
+    """Wait until no target has come for a time in [s]."""
+    targets = client.listen(Float64, topic)
+    seen, since = 0, time.monotonic()
+
+    def silent() -> bool:
+        nonlocal seen, since
+        if len(targets) != seen:
+            seen, since = len(targets), time.monotonic()
+        return time.monotonic() - since > duration
+
+    client.spin_until(silent, 10.0, 'silence')
+
+
+def test_a_drive_that_is_commanded_from_elsewhere_leaves_the_wave(isolation: Isolation) -> None:
+    """It goes where it was sent and stays there, the others wave on; asked to, it comes back."""
+    with start(isolation, 'demo', 'panda') as demo, RosClient(isolation.domain_id) as client:
+        demo.wait_for('waving', 40.0)
+        states = client.listen(JointState, '/panda_joint1/joint_states')
+
+        def wait_for(reached: Callable[[float], bool], what: str) -> None:
+            client.spin_until(
+                lambda: any(reached(each.position[0]) for each in states[-1:]), 15.0, what
+            )
+
+        wait_for(lambda position: abs(position) > 0.1, 'motion')
+        answer = client.call(
+            COTargetDouble, '/panda_joint1/target', COTargetDouble.Request(target=1.2)
+        )
+        assert answer.success
+        demo.wait_for('panda_joint1 left the wave: it was halted or sent elsewhere', 15.0)
+        wait_for(lambda position: abs(position - 1.2) < 0.01, 'target')
+        wait_for_silence(client, '/panda_joint1/target', 0.5)
+        assert client.trigger('/panda_joint1/cyclic_position_mode').success
+        assert client.trigger('/wave/start').success
+        wait_for(lambda position: position < 0.5, 'wave')
+        assert demo.stop() == 0, demo.output
+    assert demo.output.count('left the wave') == 1
 
 
 def test_ctrl_c_ends_the_bring_up_cleanly(isolation: Isolation) -> None:

@@ -43,7 +43,6 @@ def libraries(program: str, *arguments: str) -> set[str]:
     ('entry', 'unwanted'),
     [
         ('arm_canopen.nodes.master', FOREIGN | MODEL),
-        ('arm_bringup.demos.wave.master', FOREIGN | MODEL),
         ('arm_servo.ros.canopen_backend', FOREIGN),
     ],
 )

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import threading
-from types import SimpleNamespace
-from typing import Any
 
 from isolation import Isolation
 import pytest
@@ -15,7 +13,6 @@ import rclpy
 from rclpy.node import Node
 from urdf_reader import DescriptionError
 
-from arm_bringup.demos.wave.node import WaveNode
 from arm_bringup.exceptions import BringupError
 from arm_canopen import CanopenError
 from arm_canopen.nodes.joint_state_publisher import JointStatePublisher
@@ -45,12 +42,6 @@ def controller() -> Node:
     return ControllerNode(threading.Event())
 
 
-def wave() -> Node:
-    """Make the wave of a bus without drives."""
-    master: Any = SimpleNamespace(bus=SimpleNamespace(nodes=[]))
-    return WaveNode(master)
-
-
 @pytest.mark.parametrize(
     ('make', 'parameter', 'reason'),
     [
@@ -64,7 +55,6 @@ def wave() -> Node:
         (Display, 'rate:=1000', 'rate is 1000: it must be 1.0 to 200.0'),
         (JointStatePublisher, 'robot_description:=none', 'no XML'),
         (JointStatePublisher, 'robot_descripton:=none', "did you mean 'robot_description'"),
-        (wave, 'robot_description:=none', 'no XML'),
     ],
 )
 def test_a_refused_node_leaves_nothing_in_the_graph(

@@ -162,16 +162,16 @@ def test_bus_and_description_reach_the_processes(tmp_path: Path) -> None:
 
 
 def test_another_master_gets_its_parameters(tmp_path: Path) -> None:
-    """The demo runs one with the wave inside."""
+    """That of arm_servo, for one."""
     stack = Stack(
         ROBOT,
         'can0',
         simulate=True,
-        master=Executable('arm_bringup', 'wave_master'),
+        master=Executable('arm_servo', 'motion_node'),
         master_parameters={'diagnostics_period': '0.2'},
     )
-    argv = processes(tmp_path, stack)['master'].argv
-    assert argv[0].endswith('arm_bringup/wave_master')
+    argv = processes(tmp_path, stack, 'arm_servo')['master'].argv
+    assert argv[0].endswith('arm_servo/motion_node')
     assert 'diagnostics_period:=0.2' in argv
 
 

@@ -41,7 +41,6 @@ FIGURES = Figures(
     drives=dict.fromkeys(JOINTS, DRIVE),
     bus=BusFigures(2912.4, 26.9, 0, 0.00014, 0.00122, 3),
     axes=dict.fromkeys(JOINTS, AxisFigures(True, -0.4, 0.4, 0.01, 0.005)),
-    wave='running',
 )
 COMMANDS = ['source env.sh', 'ros2 topic hz /joint_states', f'ros2 {"x" * 100}']
 VIEW = ArmView('panda on vcan0', LIMITS)
@@ -89,9 +88,7 @@ states = st.sampled_from(['', 'Fault reaction active', 'Operation enabled', 'Rea
 modes = st.sampled_from(['', 'No mode', 'Interpolated position', 'Cyclic velocity', 'Mode -3'])
 nmts = st.sampled_from(['', 'PRE_OPERATIONAL', 'OFFLINE', 'STOPPED'])
 numbers = st.floats(-999, 999) | st.just(float('nan')) | st.just(float('inf'))
-drives = st.builds(
-    DriveFigures, st.booleans(), nmts, states, modes, numbers, numbers, numbers, st.just('')
-)
+drives = st.builds(DriveFigures, st.booleans(), nmts, states, modes, *[numbers] * 4, st.just(''))
 
 
 @given(

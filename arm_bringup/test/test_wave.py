@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The laws of the wave: it begins where the joint stands, is smooth, and stays within limits."""
+"""The laws of the wave: it begins where the joint stands, is smooth, leaves what others move."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 import math
 
@@ -13,70 +14,57 @@ from hypothesis import strategies as st
 import pytest
 from urdf_reader import JointRange
 
+from arm_bringup.demos.figures import DriveFigures
+from arm_bringup.demos.wave.axis import PATIENCE, STANDING
 from arm_bringup.demos.wave.plan import (
     plan_swing,
     plan_wave,
     quintic_step,
-    STEP_CURVATURE,
     STEP_SLOPE,
-    stop_duration,
-    Swing,
     WaveStyle,
 )
-from arm_bringup.demos.wave.source import WaveSource, WaveState
+from arm_bringup.demos.wave.wave import Wave
 from arm_bringup.exceptions import WaveError
-from arm_canopen import Refusal, RefusalCause
 
 pytestmark = pytest.mark.slow
 
-CYCLE = 0.01  # [s]
+PERIOD = 0.02  # [s] between targets
+OBSERVED = 10  # targets between two observations
 STYLE = WaveStyle()
-HALTED = Refusal(RefusalCause.HALTED)
-
-
-@dataclass(frozen=True)
-class Feedback:
-    """What a master reports of a drive, as far as the wave looks at it."""
-
-    name: str
-    position: float
-    setpoint: float
-    refusal: Refusal | None = None
+ENABLED = DriveFigures(online=True, state='Operation enabled', mode='Cyclic position')
 
 
 class Arm:
-    """Drives that follow at once, or not at all; keeps every set-point."""
+    """Drives that are where they are sent, unless somebody else has them; keeps their tracks."""
 
     def __init__(self, limits: list[JointRange], starts: list[float]) -> None:
-        phases = [0.9 * i for i in range(len(limits))]
-        pairs = zip(limits, phases, strict=True)
-        self.swings = [plan_swing(each, phase, STYLE) for each, phase in pairs]
-        self.source = WaveSource(self.swings, STYLE)
-        self.held: set[str] = set()
-        self.tracks = {
-            swing.name: [start] for swing, start in zip(self.swings, starts, strict=True)
+        self.swings = [plan_swing(each, 0.9 * i, STYLE) for i, each in enumerate(limits)]
+        self.wave = Wave(self.swings, STYLE)
+        self.drives = {
+            swing.name: replace(ENABLED, setpoint=start, position=start, following_error=0.01)
+            for swing, start in zip(self.swings, starts, strict=True)
         }
+        self.foreign: set[str] = set()
+        self.tracks = {name: [drive.setpoint] for name, drive in self.drives.items()}
+        self.now = 0.0
+        self._count = 0
 
     def run(self, duration: float) -> None:
-        """Go on for some time in [s]."""
-        for _ in range(round(duration / CYCLE)):
-            feedback = [
-                Feedback(name, track[-1], track[-1], HALTED if name in self.held else None)
-                for name, track in self.tracks.items()
-            ]
-            setpoints = self.source.update(0.0, CYCLE, feedback)  # type: ignore[arg-type]
-            for (name, track), setpoint in zip(self.tracks.items(), setpoints, strict=True):
-                follows = setpoint is not None and name not in self.held
-                track.append(setpoint if follows and setpoint is not None else track[-1])
+        """Go on for some time in [s]; what is known of the drives comes more rarely."""
+        for _ in range(round(duration / PERIOD)):
+            if self._count % OBSERVED == 0:
+                self.wave.observe(self.drives, self.now)
+            self._count += 1
+            self.now += PERIOD
+            for name, target in self.wave.targets(self.now).items():
+                if name not in self.foreign:
+                    self.move(name, target)
+            for name, drive in self.drives.items():
+                self.tracks[name].append(drive.setpoint)
 
-    def check(self) -> None:
-        """Check the bounds on speed and acceleration by differences, also across phases."""
-        for swing in self.swings:
-            track = self.tracks[swing.name]
-            steps = [b - a for a, b in pairwise(track)]
-            turns = [b - a for a, b in pairwise(steps)]
-            assert max(map(abs, steps)) <= swing.velocity * CYCLE * (1 + 1e-9)
-            assert max(map(abs, turns)) <= STYLE.acceleration * CYCLE**2 * (1 + 1e-6) + 1e-12
+    def move(self, name: str, to: float) -> None:
+        """Move a drive."""
+        self.drives[name] = replace(self.drives[name], setpoint=to, position=to)
 
 
 limits = st.builds(
@@ -104,167 +92,167 @@ plans = st.lists(st.tuples(limits, st.floats(-1, 1)), min_size=1, max_size=3)
 
 @given(st.floats(0, 1), st.floats(1e-4, 0.1))
 @example(0.9999999999999999, 0.0625)
-def test_the_step_has_two_continuous_derivatives_within_its_constants(x: float, d: float) -> None:
-    """Differences never exceed the greatest slope and curvature, also across its ends."""
-    before, here, after = (quintic_step(x + offset) for offset in (-d, 0.0, d))
-    assert here <= 1.0
-    assert -1e-15 <= after - here <= STEP_SLOPE * d * (1 + 1e-9) + 1e-15
-    assert abs(after - 2 * here + before) <= STEP_CURVATURE * d * d * (1 + 1e-6) + 1e-14
+def test_the_step_has_a_slope_within_its_constant(x: float, d: float) -> None:
+    """It rises from 0 to 1 and never passes either, also across its ends."""
+    before, after = quintic_step(x), quintic_step(x + d)
+    assert 0.0 <= before <= 1.0
+    assert -1e-15 <= after - before <= STEP_SLOPE * d * (1 + 1e-9) + 1e-15
 
 
 @given(plans)
-def test_the_first_setpoint_is_where_the_joint_stands(
+def test_a_joint_moves_from_where_it_stands_no_faster_than_planned(
     plan: list[tuple[JointRange, float]],
 ) -> None:
-    """Nothing jumps: the first cycle moves less than the acceleration allows."""
+    """Through entry and swing; one beyond its limits goes in, and never farther out."""
     arm = named(plan)
-    arm.source.start()
-    arm.run(CYCLE)
-    for track in arm.tracks.values():
-        assert track[1] == pytest.approx(track[0], abs=STYLE.acceleration * CYCLE**2)
-
-
-@given(plans, st.floats(0.1, 20), st.floats(0.1, 12))
-def test_speed_and_acceleration_stay_within_the_plan(
-    plan: list[tuple[JointRange, float]], stop_after: float, start_after: float
-) -> None:
-    """Through entry, swing, a stop at any time and a start at any time after it."""
-    arm = named(plan)
-    arm.source.start()
-    arm.run(stop_after)
-    arm.source.stop()
-    arm.run(start_after)
-    arm.source.start()
-    arm.run(5.0)
-    arm.check()
-
-
-@given(plans)
-def test_positions_stay_between_start_and_swing(plan: list[tuple[JointRange, float]]) -> None:
-    """A joint within its limits stays there; one outside goes in and never farther out."""
-    arm = named(plan)
-    arm.source.start()
-    arm.run(15.0)
+    arm.wave.start()
+    arm.run(20.0)
     for swing, (each, _) in zip(arm.swings, plan, strict=True):
         track = arm.tracks[swing.name]
+        steps = [abs(after - before) for before, after in pairwise(track)]
+        assert max(steps) <= swing.velocity * PERIOD * (1 + 1e-9)
+        moving = next(step for step in steps if step)
+        assert moving <= 0.02 * swing.velocity * PERIOD  # from rest
         assert min(track) >= min(track[0], each.lower) - 1e-12
         assert max(track) <= max(track[0], each.upper) + 1e-12
-        late = track[-round(STYLE.period / CYCLE) :]
-        if len(track) * CYCLE > swing.entry_duration(track[0], STYLE) + STYLE.period:
+        entered = swing.entry_duration(track[0], STYLE) + 1.0
+        if entered + STYLE.period < 20.0:
+            late = track[round(entered / PERIOD) :]
             assert max(late) - min(late) == pytest.approx(2 * swing.amplitude, rel=1e-3)
-            margin = (1 - STYLE.range_share) * (each.upper - each.lower) / 2
-            assert each.lower + margin <= min(late) + 1e-12
-            assert max(late) <= each.upper - margin + 1e-12
-
-
-@given(plans, st.floats(0.1, 12))
-def test_a_stop_ends_in_standstill(
-    plan: list[tuple[JointRange, float]], stop_after: float
-) -> None:
-    """After its duration the wave is idle, leaves the drives where they are, and stands still."""
-    arm = named(plan)
-    arm.source.start()
-    arm.run(stop_after)
-    arm.source.stop()
-    arm.run(arm.source.stop_duration + 2 * CYCLE)
-    assert arm.source.report.state is WaveState.IDLE
-    for track in arm.tracks.values():
-        assert track[-1] == track[-2]
-        assert abs(track[-3] - track[-4]) <= STYLE.acceleration * CYCLE**2
 
 
 def panda() -> Arm:
-    """Build the seven joints of the Panda at zero, two of them outside or at their limits."""
+    """Build the first joints of the Panda at zero, two of them outside or at their limits."""
     table = [(-2.9, 2.9), (-1.76, 1.76), (-2.9, 2.9), (-3.07, -0.07), (-2.9, 2.9), (-0.02, 3.75)]
     joints = [JointRange(f'joint{i}', *pair, 2.175) for i, pair in enumerate(table)]
     return Arm(joints, [0.0] * len(joints))
 
 
-def test_a_released_axis_stays_out_and_the_others_go_on() -> None:
-    """Until the next start, at which it enters from where it stands then."""
+def halted(arm: Arm) -> None:
+    """Let somebody halt a drive."""
+    arm.foreign.add('joint1')
+
+
+def elsewhere(arm: Arm) -> None:
+    """Let somebody send it elsewhere."""
+    arm.foreign.add('joint1')
+    arm.move('joint1', 1.5)
+
+
+def in_mode_1(arm: Arm) -> None:
+    """Let somebody select another mode, in which its set-point follows by chance."""
+    arm.drives['joint1'] = replace(arm.drives['joint1'], mode='Profile position')
+
+
+def disabled(arm: Arm) -> None:
+    """Let somebody disable it."""
+    arm.drives['joint1'] = replace(arm.drives['joint1'], state='Switched on', message='off')
+
+
+@pytest.mark.parametrize(
+    ('take', 'reason'),
+    [
+        (halted, 'its set-point stands at'),
+        (elsewhere, 'its set-point stands at 1.500'),
+        (in_mode_1, 'it is in mode Profile position'),
+        (disabled, 'it is not enabled: off'),
+    ],
+)
+def test_a_drive_that_somebody_else_has_gets_no_target_until_the_next_start(
+    take: Callable[[Arm], None], reason: str
+) -> None:
+    """The others go on; given back, it enters from where it stands then."""
     arm = panda()
-    arm.source.start()
+    arm.wave.start()
     arm.run(8.0)
-    arm.source.released('joint1', Refusal(RefusalCause.SINGLE_TARGET))
+    assert arm.wave.departures() == []
+    take(arm)
+    arm.run(2.0)
+    (text,) = arm.wave.departures()
+    assert text.startswith('joint1 left the wave')
+    assert reason in text
+    assert 'joint1' not in arm.wave.targets(arm.now)
+    assert list(arm.wave.active) == [f'joint{i}' for i in (0, 2, 3, 4, 5)]
+    arm.foreign.clear()
+    arm.drives['joint1'] = replace(arm.drives['joint1'], mode=ENABLED.mode, state=ENABLED.state)
+    rest = arm.drives['joint1'].setpoint
     arm.run(1.0)
-    tracks = arm.tracks
-    assert len(set(tracks['joint1'][-90:])) == 1
-    assert len(set(tracks['joint0'][-90:])) > 80
-    assert [axis.name for axis in arm.source.report.axes if not axis.active] == ['joint1']
-    tracks['joint1'][-1:] = [1.5] * 3  # moved elsewhere by someone else, and at rest
-    before = len(tracks['joint1'])
-    arm.source.start()
+    assert arm.drives['joint1'].setpoint == rest
+    assert len(set(arm.tracks['joint0'][-40:])) == 40
+    arm.wave.start()
+    arm.run(0.6)
+    assert 'joint1' in arm.wave.active
+    assert arm.drives['joint1'].setpoint == pytest.approx(rest, abs=0.1)
+    arm.run(5.0)
+    assert abs(arm.drives['joint1'].setpoint - rest) > 0.1
+
+
+def test_a_drive_that_stands_for_a_moment_stays() -> None:
+    """A message may come twice, or targets late."""
+    arm = panda()
+    arm.wave.start()
+    arm.run(8.0)
+    arm.foreign.add('joint1')
+    arm.run((STANDING - 1) * OBSERVED * PERIOD)
+    arm.foreign.clear()
     arm.run(3.0)
-    tracks['joint1'] = tracks['joint1'][before - 2 :]
-    arm.check()
-    assert tracks['joint1'][0] == 1.5
-    assert len(set(tracks['joint1'])) > 250
+    assert 'joint1' in arm.wave.active
 
 
-def test_an_axis_that_cannot_follow_leaves_by_itself() -> None:
-    """It does not come back when it can follow again, only at a start."""
+@pytest.mark.parametrize('moves', [True, False])
+def test_a_drive_that_moves_or_has_no_mode_yet_is_waited_for_a_little(*, moves: bool) -> None:
+    """What is known of it may be older than the answer of its service; later is too late."""
     arm = panda()
-    arm.source.start()
+    arm.wave.start()
+
+    def keep(active: int) -> None:
+        for _ in range(active):
+            if moves:
+                arm.move('joint1', arm.drives['joint1'].setpoint + 0.1)
+            else:
+                in_mode_1(arm)
+            arm.run(OBSERVED * PERIOD)
+        assert 'joint1' not in arm.wave.active
+        arm.drives['joint1'] = replace(arm.drives['joint1'], mode=ENABLED.mode)
+        arm.run(3 * OBSERVED * PERIOD)
+
+    keep(PATIENCE - 2)
+    assert 'joint1' in arm.wave.active
+    arm.wave.stop()
+    arm.wave.start()
+    keep(PATIENCE)
+    assert 'joint1' not in arm.wave.active
+
+
+def test_before_a_start_and_after_a_stop_nobody_is_sent_anywhere() -> None:
+    """The stop returns who was."""
+    arm = panda()
     arm.run(1.0)
-    arm.held.add('joint2')
-    arm.run(0.3)
-    arm.held.clear()
-    arm.run(0.3)
-    assert len(set(arm.tracks['joint2'][-50:])) == 1
+    assert arm.wave.targets(arm.now) == {}
+    assert list(arm.wave.stop()) == []
+    arm.wave.start()
+    arm.run(1.0)
+    assert list(arm.wave.stop()) == list(arm.drives)
+    arm.run(1.0)
+    assert arm.wave.targets(arm.now) == {}
+    assert arm.wave.departures() == []
 
 
-def test_a_start_during_a_stop_waits_for_standstill() -> None:
-    """And then goes on."""
+def test_range_and_following_error_are_measured_while_a_drive_is_in_the_wave() -> None:
+    """By what its messages say: every fifth of a second."""
     arm = panda()
-    arm.source.start()
-    arm.run(5.0)
-    arm.source.stop()
-    arm.run(0.2)
-    arm.source.start()
-    arm.run(0.2)
-    states = [arm.source.report.state]
-    arm.run(5.0)
-    states.append(arm.source.report.state)
-    assert states == [WaveState.STOPPING, WaveState.RUNNING]
-    arm.check()
-
-
-def test_the_report_measures_error_and_range() -> None:
-    """Drives that are one cycle behind show the way of a cycle as error; the range is theirs."""
-    arm = panda()
-    arm.source.start()
+    arm.wave.start()
     arm.run(20.0)
-    for swing, axis in zip(arm.swings, arm.source.report.axes, strict=True):
-        assert axis.samples > 1900
-        assert axis.error_max == 0.0  # these drives are where they are sent to
-        late = arm.tracks[swing.name]
-        assert axis.highest == pytest.approx(max(late), abs=0.01)
-        assert axis.lowest == pytest.approx(min(late), abs=0.01)
-
-
-@pytest.mark.parametrize('offset', [0.01, -0.02])
-def test_the_path_error_is_the_distance_to_the_last_setpoint(offset: float) -> None:
-    """A drive that stands off by a constant has that as maximum and as root mean square."""
-    source = WaveSource([Swing('joint', 0.0, 0.1, 0.0, 1.0, 1.0)], STYLE)
-    source.start()
-    position = 0.0
-    for _ in range(100):
-        feedback = [Feedback('joint', position, 0.0)]
-        setpoint = source.update(0.0, CYCLE, feedback)[0]  # type: ignore[arg-type]
-        assert setpoint is not None
-        position = setpoint + offset
-    report = source.report.axes[0]
-    assert report.error_max == pytest.approx(abs(offset))
-    assert report.error_rms == pytest.approx(abs(offset))
-
-
-def test_before_a_start_and_after_a_stop_nothing_is_commanded() -> None:
-    """Idle answers None for every axis; a stop while idle changes nothing."""
-    arm = panda()
-    arm.source.stop()
-    arm.run(1.0)
-    assert all(len(set(track)) == 1 for track in arm.tracks.values())
-    assert arm.source.report.state is WaveState.IDLE
+    for name, figures in arm.wave.figures.items():
+        assert figures.active
+        assert (figures.error_max, figures.error_rms) == pytest.approx((0.01, 0.01))
+        assert figures.highest == pytest.approx(max(arm.tracks[name]), abs=0.01)
+        assert figures.lowest == pytest.approx(min(arm.tracks[name]), abs=0.01)
+    error = replace(arm.drives['joint0'], following_error=-0.03)
+    arm.wave.observe({'joint0': error}, arm.now)
+    figures = arm.wave.figures['joint0']
+    assert figures.error_max == pytest.approx(0.03)
+    assert 0.01 < figures.error_rms < 0.02
 
 
 @given(limits, st.sampled_from(['range', 'velocity']))
@@ -287,12 +275,10 @@ def test_a_joint_without_a_range_swings_about_zero() -> None:
     assert 0 < swing.amplitude <= STYLE.amplitude
 
 
-def test_a_limit_of_thousands_makes_no_stop_of_hours() -> None:
+def test_a_limit_of_thousands_is_no_speed_of_a_wave() -> None:
     """Baxter's URDF has a velocity limit of 10000 rad/s for its head."""
-    style = WaveStyle()
-    swing = plan_swing(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0, style)
-    assert swing.velocity == style.max_velocity
-    assert stop_duration([swing], style) < 2 * style.period
+    swing = plan_swing(JointRange('head_pan', -1.6, 1.6, 10000.0), 0.0, STYLE)
+    assert swing.velocity == STYLE.max_velocity
 
 
 def test_the_wave_has_a_swing_for_each_drive_with_a_joint() -> None:

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
 import time
 
 from demo_doubles import FakeDisplay, FakeSupervisor
@@ -20,16 +19,17 @@ JOINTS = ['joint1', 'joint2']
 RANGES = {name: JointRange(name, -2.0, 2.0, 1.0) for name in JOINTS}
 DRIVE = DriveFigures(online=True, state='Operation enabled')
 MOVED = AxisFigures(True, -0.4, 0.4, 0.01, 0.005)
-GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED), wave='running')
+GOOD = Figures(dict.fromkeys(JOINTS, DRIVE), axes=dict.fromkeys(JOINTS, MOVED))
 
 
 class Client:
-    """A client whose services answer as they are given, and whose wave stops at once."""
+    """A client whose services answer as they are given, and whose second drive is taken away."""
 
     def __init__(self, refuses: str = '', when: Callable[[str], None] = lambda what: None) -> None:
         self.figures = GOOD
         self.prepared: list[str] = []
         self.called: list[str] = []
+        self.left = ['joint2 left the wave: halted']
         self.closed = False
         self.given_up: Callable[[], bool] = lambda: False
         self._refuses = refuses
@@ -44,9 +44,21 @@ class Client:
         self.called += services
         if self._refuses in services:
             raise CallError(f'{self._refuses}: fault')
-        if services == ['wave/stop']:
-            self.figures = replace(self.figures, wave='idle')
         return dict.fromkeys(services, '')
+
+    def start_wave(self) -> None:
+        """Note it."""
+        self.called.append('start')
+
+    def stop_wave(self) -> Sequence[str]:
+        """Return the drive that is left."""
+        self.called.append('stop')
+        return JOINTS[:1]
+
+    def departures(self) -> Sequence[str]:
+        """Report each once."""
+        left, self.left = self.left, []
+        return left
 
     def wait_until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
         """Wait as the real one does."""
@@ -77,7 +89,7 @@ def run(scenario: WaveScenario, supervisor: FakeSupervisor, client: Client) -> N
 
 
 def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_processes() -> None:
-    """Services of all joints are called side by side; at the end the supervisor stops."""
+    """Services of all joints are called side by side; what is still in the wave is halted."""
     display, supervisor, client = FakeDisplay(), FakeSupervisor(), Client()
     scenario = WaveScenario(display, RANGES, 'cyclic_position_mode', duration=0.01)
     run(scenario, supervisor, client)
@@ -86,10 +98,12 @@ def test_all_joints_are_enabled_before_the_wave_and_the_wave_stops_before_the_pr
         'joint2/init',
         'joint1/cyclic_position_mode',
         'joint2/cyclic_position_mode',
-        'wave/start',
-        'wave/stop',
+        'start',
+        'stop',
+        'joint1/halt',
     ]
-    assert set(client.called) == set(client.prepared)
+    assert {*client.called} - {*client.prepared} == {'start', 'stop'}
+    assert [each.text for each in display.notices] == ['joint2 left the wave: halted']
     assert display.phases == ['booting', 'enabling', 'waving', 'stopping']
     assert supervisor.outcome is not None
     assert supervisor.outcome.exit_code == 0
@@ -105,7 +119,7 @@ def test_a_drive_that_refuses_ends_the_demo_with_its_reason() -> None:
     scenario = WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=1.0)
     run(scenario, supervisor, client)
     assert supervisor.outcome == Outcome(1, 'joint2/init: fault')
-    assert 'wave/start' not in client.called
+    assert 'start' not in client.called
     assert scenario.result.summary == []
     assert client.closed
 
@@ -122,7 +136,7 @@ def test_ctrl_c_stops_the_wave_first() -> None:
     scenario = WaveScenario(FakeDisplay(), RANGES, 'cyclic_position_mode', duration=None)
     run(scenario, supervisor, client)
     assert answers == [False, True]
-    assert client.called[-1] == 'wave/stop'
+    assert client.called[-2:] == ['stop', 'joint1/halt']
     assert scenario.left
 
 

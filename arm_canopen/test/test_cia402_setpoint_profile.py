@@ -106,6 +106,21 @@ def test_no_stream_leads_beyond_its_targets_or_limits(
     assert profile.at_rest
 
 
+def test_a_stream_may_be_quicker_than_a_single_target() -> None:
+    """As far as the drive may (0x607F): 0x6081 is how quick a target is approached."""
+    limits = ProfileLimits(0.1, 10.0, 10.0, speed_limit=0.4)
+    for speed, reached in [(0.3, 0.3), (0.9, 0.4)]:
+        profile = SetpointProfile(0.0)
+        for cycle in range(200):
+            profile.track(speed * cycle * CYCLE)
+            profile.step(CYCLE, limits)
+        assert profile.velocity == pytest.approx(reached, rel=0.01)
+    profile.go(10.0)
+    for _ in range(50):
+        profile.step(CYCLE, limits)
+    assert profile.velocity == pytest.approx(0.1)
+
+
 def test_a_single_target_ends_a_stream() -> None:
     """It is approached as if none had been; so is the first one of the next stream."""
     plain, after = SetpointProfile(0.0), SetpointProfile(0.0)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What /diagnostics says of bus, drives and wave, in types."""
+"""What /diagnostics says of bus and drives, and what a demo measured, in types."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Protocol
 
 ENABLED = 'Operation enabled'
 """Title of the state in which a drive can move (CiA 402-2, figure 4)."""
+FOLLOWING_MODES = ('Interpolated position', 'Cyclic position')
+"""Titles of the modes in which a drive follows targets along a path (7 and 8)."""
 
 
 class KeyValue(Protocol):
@@ -52,6 +54,7 @@ class DriveFigures:
         mode: Mode of operation.
         position: Position in [rad].
         velocity: Velocity in [rad/s].
+        setpoint: Position last commanded in [rad].
         following_error: Set-point minus position in [rad].
         message: The master's word on it.
     """
@@ -62,6 +65,7 @@ class DriveFigures:
     mode: str = ''
     position: float = math.nan
     velocity: float = math.nan
+    setpoint: float = math.nan
     following_error: float = math.nan
     message: str = ''
 
@@ -69,6 +73,11 @@ class DriveFigures:
     def enabled(self) -> bool:
         """It can move."""
         return self.online and self.state == ENABLED
+
+    @property
+    def follows_targets(self) -> bool:
+        """It follows a stream of positions, unless something else moves it."""
+        return self.enabled and self.mode in FOLLOWING_MODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +103,10 @@ class BusFigures:
 
 @dataclass(frozen=True, slots=True)
 class AxisFigures:
-    """What the wave measured on an axis since it was started.
+    """What a demo measured on an axis.
 
     Attributes:
-        active: It takes part.
+        active: The demo moves it.
         lowest: Least position in [rad].
         highest: Greatest position in [rad].
         error_max: Greatest path error in [rad].
@@ -124,14 +133,12 @@ class Figures:
     Attributes:
         drives: The drives by name.
         bus: The bus.
-        axes: What the wave says of each axis, by the name of the drive.
-        wave: State of the wave, empty before it said one.
+        axes: What the demo measured on each axis, by the name of the drive.
     """
 
     drives: Mapping[str, DriveFigures] = field(default_factory=dict)
     bus: BusFigures = BusFigures()
     axes: Mapping[str, AxisFigures] = field(default_factory=dict)
-    wave: str = ''
 
     def updated(self, statuses: Iterable[Status]) -> Figures:
         """Take in a message.
@@ -157,10 +164,6 @@ class Figures:
         values = {each.key: each.value for each in status.values}
         if (source, part) == ('master', 'bus'):
             return replace(self, bus=_bus(values))
-        if (source, part) == ('wave', 'motion'):
-            return replace(self, wave=values.get('state', ''))
-        if source == 'wave':
-            return replace(self, axes={**self.axes, part: _axis(values)})
         if part == 'drive':
             return replace(self, drives={**self.drives, source: _drive(values, status.message)})
         return self
@@ -192,6 +195,7 @@ def _drive(values: Mapping[str, str], message: str) -> DriveFigures:
         mode=values.get('mode', ''),
         position=_number(values, 'position'),
         velocity=_number(values, 'velocity'),
+        setpoint=_number(values, 'setpoint'),
         following_error=_number(values, 'following_error'),
         message=message,
     )
@@ -205,14 +209,4 @@ def _bus(values: Mapping[str, str]) -> BusFigures:
         jitter_p50=_number(values, 'jitter_p50'),
         jitter_p99=_number(values, 'jitter_p99'),
         missed_pdos=_count(values, 'missed_pdos'),
-    )
-
-
-def _axis(values: Mapping[str, str]) -> AxisFigures:
-    return AxisFigures(
-        active=values.get('active') == 'True',
-        lowest=_number(values, 'lowest'),
-        highest=_number(values, 'highest'),
-        error_max=_number(values, 'error_max'),
-        error_rms=_number(values, 'error_rms'),
     )

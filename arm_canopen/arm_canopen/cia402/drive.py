@@ -48,6 +48,8 @@ class Drive:
         control: What is commanded to it.
         failure: Why the master stopped it, until it is enabled again; else empty.
         resetting: Send fault resets while the drive is faulted.
+        following_error: Set-point that was sent before the last position was measured, minus that
+            position, in user units.
         period: Length of the last cycle in [s].
         motions: How many motions were begun: by targets, moves and motion sources.
         interrupted: Mode in which it was enabled when its device was lost, None otherwise.
@@ -78,7 +80,7 @@ class Drive:
         self.on_ready: Callable[[], None] = lambda: None
         self.resetting = False
         self.motions = 0
-        self.period = 0.0
+        self.following_error = self.period = 0.0
         self.interrupted: OperationMode | None = None
         self.feed_forward = FeedForward(self.objects, self.view.units)
         self._streamed = False
@@ -159,6 +161,7 @@ class Drive:
         view.observe()
         if view.state is DriveState.UNKNOWN:
             return
+        self.following_error = self.control.setpoint - view.position
         if before is DriveState.UNKNOWN and self.node.taken_over and self.control.goal is None:
             self._take_over()
         if view.state is not before:

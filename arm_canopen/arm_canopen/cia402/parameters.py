@@ -50,7 +50,7 @@ class DriveParameters:
         speed_limit: 0x607F in user units per second.
         effort_limit: 0x6072 in user units.
         following_window: 0x6065 in user units; None where nothing is monitored, too.
-        profile: Limits for profiles of the master's own, from 0x6081, 0x6083 and 0x6084.
+        profile: Limits for profiles of the master's own, from 0x6081, 0x6083, 0x6084 and 0x607F.
         quick_stop_deceleration: 0x6085 in user units per second squared.
         torque_slope: Greatest change of a torque that the master ramps, in user units per second,
             from 0x6087.
@@ -110,13 +110,14 @@ class ParameterReader:
         effort = await self._read(Index.MAX_TORQUE)
         window = await self._read(Index.FOLLOWING_ERROR_WINDOW)
         speed = await self._read(Index.MAX_PROFILE_VELOCITY)
-        profile = await self._profile()
+        speed_limit = abs(units.velocity_commanded(speed)) if speed else None
+        profile = replace(await self._profile(), speed_limit=speed_limit or 0.0)
         quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
         return DriveParameters(
             supported_modes=await self._read(Index.SUPPORTED_MODES),
             homing_method=await self._read(Index.HOMING_METHOD) or 0,
             position_limits=await self._position_limits(),
-            speed_limit=abs(units.velocity_commanded(speed)) if speed else None,
+            speed_limit=speed_limit,
             effort_limit=abs(units.effort_commanded(effort)) if effort else None,
             following_window=self._following_window(window),
             profile=profile,

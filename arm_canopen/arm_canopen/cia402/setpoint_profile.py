@@ -19,14 +19,16 @@ class ProfileLimits:
     """Limits of a profile, in user units.
 
     Attributes:
-        velocity: Largest speed in [unit/s].
+        velocity: Largest speed towards a single target in [unit/s].
         acceleration: Largest acceleration in [unit/s^2].
         deceleration: Largest deceleration in [unit/s^2].
+        speed_limit: Largest speed along a stream of targets in [unit/s], where that is more.
     """
 
     velocity: float
     acceleration: float
     deceleration: float
+    speed_limit: float = 0.0
 
 
 SPREAD = 2.0  # intervals between targets over which the way to the newest one is spread
@@ -123,11 +125,16 @@ class SetpointProfile:
         Returns:
             The new set-point.
         """
+        speed_limit = limits.velocity
         if self._line is not None:
-            self.target = self._line.step(period)
+            before, self.target = self._line.position, self._line.step(period)
+            line_speed = abs(self.target - before) / period
+            speed_limit = max(speed_limit, min(line_speed, limits.speed_limit))
         if self.at_rest:
             return self.position
-        wanted = 0.0 if self.target is None else self._wanted(self.target, period, limits)
+        wanted = 0.0
+        if self.target is not None:
+            wanted = self._wanted(self.target, period, speed_limit, limits.deceleration)
         braking = abs(wanted) < abs(self.velocity) or wanted * self.velocity < 0
         change = (limits.deceleration if braking else limits.acceleration) * period
         self.velocity += max(-change, min(change, wanted - self.velocity))
@@ -140,10 +147,12 @@ class SetpointProfile:
             self.position, self.velocity = self.target, 0.0
         return self.position
 
-    def _wanted(self, target: float, period: float, limits: ProfileLimits) -> float:
+    def _wanted(
+        self, target: float, period: float, speed_limit: float, deceleration: float
+    ) -> float:
         distance = target - self.position
-        root = math.sqrt(period**2 + 2.0 * abs(distance) / limits.deceleration)
-        speed = min(limits.velocity, limits.deceleration * (root - period))
+        root = math.sqrt(period**2 + 2.0 * abs(distance) / deceleration)
+        speed = min(speed_limit, deceleration * (root - period))
         # on the last cycle the rest of the way is taken in one step
         if abs(distance) <= speed * period:
             speed = abs(distance) / period

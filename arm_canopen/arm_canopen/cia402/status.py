@@ -30,6 +30,7 @@ class DriveStatus:
         position: Actual position in user units.
         velocity: Actual velocity in user units per second.
         setpoint: Position last commanded in user units.
+        following_error: Set-point that was sent before the position was measured, minus that.
         summary: All of it in a sentence.
     """
 
@@ -46,17 +47,13 @@ class DriveStatus:
     position: float
     velocity: float
     setpoint: float
+    following_error: float
     summary: str
 
     @property
     def faulted(self) -> bool:
         """Whether the drive is in a fault or on the way to it."""
         return self.state in FAULTY
-
-    @property
-    def following_error(self) -> float:
-        """Commanded minus actual position in user units."""
-        return self.setpoint - self.position
 
 
 def drive_status(drive: Drive, now: float) -> DriveStatus:
@@ -81,5 +78,6 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         position=drive.view.position,
         velocity=drive.view.velocity,
         setpoint=drive.control.setpoint,
+        following_error=drive.following_error,
         summary=drive.describe(),
     )

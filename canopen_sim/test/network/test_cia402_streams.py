@@ -11,6 +11,7 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen.cia402.status import drive_status
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
@@ -183,6 +184,20 @@ def test_a_drive_that_is_enabled_again_waits_for_a_new_stream() -> None:
     client.result(client.net.begin(JOINT, 'enable'))
     client.publish(1.0)
     assert client.motor == pytest.approx(rest, abs=1e-3)
+
+
+def test_a_stream_is_followed_evenly_and_its_error_is_that_of_one_cycle() -> None:
+    """The set-point moves as the client's path, and is compared where the drive had it."""
+    client = Publisher(OperationMode.CYCLIC_POSITION)
+    client.publish(1.0)
+    drive, speeds, errors = client.net.drives[JOINT], [], []
+    for _ in range(50):
+        before = drive.control.setpoint
+        client.publish(PERIOD)
+        speeds.append((drive.control.setpoint - before) / PERIOD)
+        errors.append(drive_status(drive, client.net.now).following_error)
+    assert speeds == pytest.approx([STEP / PERIOD] * 50, rel=0.02)
+    assert all(STEP <= error < 1.5 * STEP for error in errors)  # and the lag of the servo
 
 
 def test_a_single_target_ends_a_stream() -> None:

@@ -8,10 +8,11 @@ from process_supervisor import Notice, Outcome, Phase
 
 
 class FakeDisplay:
-    """A display that keeps the phases."""
+    """A display that keeps phases and notices."""
 
     def __init__(self) -> None:
         self.phases: list[str] = []
+        self.notices: list[Notice] = []
 
     def phase(self, text: str) -> None:
         """Keep it."""
@@ -24,7 +25,8 @@ class FakeDisplay:
         """Nobody reads."""
 
     def notice(self, notice: Notice) -> None:
-        """Nobody reads."""
+        """Keep it."""
+        self.notices.append(notice)
 
     def close(self) -> None:
         """Nothing is open."""

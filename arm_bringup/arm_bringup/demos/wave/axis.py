@@ -1,139 +1,157 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""One drive in the wave: where it entered, and how well it follows."""
+"""One drive in the wave: when it takes part, where it is sent, and how well it follows."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
 
+from ..figures import AxisFigures, DriveFigures
 from .plan import Swing, WaveStyle
 
-
-@dataclass(frozen=True, slots=True)
-class AxisReport:
-    """How well an axis followed since the wave was started from standstill.
-
-    Attributes:
-        name: Name of the drive.
-        active: It takes part.
-        left: Why it takes no part any more; empty when it does, or never did.
-        lowest: Least measured position in [rad].
-        highest: Greatest measured position in [rad].
-        error_max: Greatest distance in [rad] between a measured position and the last set-point
-            that was sent before it was measured.
-        error_rms: Root mean square of that distance in [rad].
-        samples: Number of measurements.
-    """
-
-    name: str
-    active: bool
-    left: str
-    lowest: float
-    highest: float
-    error_max: float
-    error_rms: float
-    samples: int
+PATIENCE = 5
+"""Observations within which a drive that was asked for has to be ready; later it stays out."""
+STANDING = 3
+"""Observations in which a set-point stands beside the wave before it is somebody else's."""
+BESIDE = 0.1
+"""Distance as a share of the amplitude at which a set-point is beside the wave."""
 
 
 @dataclass(slots=True)
-class WaveAxis:
-    """A drive on its swing.
+class Entry:
+    """How a drive came in.
 
     Attributes:
-        swing: Its motion.
-        active: It takes part.
-        left: Why it takes no part any more.
-        start: Where it entered in [rad].
-        entered: How long ago that was, in [s] of the wave.
+        start: Where it stood in [rad] or [m].
+        time: When, in [s].
         duration: How long its entry takes in [s].
-        sent: The last set-point in [rad], None when it got none.
-        lowest: Least measured position in [rad].
-        highest: Greatest measured position in [rad].
-        error_max: Greatest path error in [rad].
-        squares: Sum of the squares of the path errors in [rad^2].
-        samples: Number of path errors.
     """
 
-    swing: Swing
-    active: bool = False
-    left: str = ''
-    start: float = 0.0
-    entered: float = 0.0
-    duration: float = 1.0
-    sent: float | None = None
+    start: float
+    time: float
+    duration: float
+
+
+@dataclass(slots=True)
+class Tracking:
+    """How well a drive followed.
+
+    Attributes:
+        lowest: Least measured position in [rad] or [m].
+        highest: Greatest measured position in [rad] or [m].
+        error_max: Greatest distance between set-point and measured position in [rad] or [m].
+        squares: Sum of the squares of that distance in [rad^2] or [m^2].
+        samples: Number of measurements.
+    """
+
     lowest: float = math.inf
     highest: float = -math.inf
     error_max: float = 0.0
     squares: float = 0.0
     samples: int = 0
 
-    def clear(self) -> None:
-        """Forget what was measured."""
-        self.lowest, self.highest = math.inf, -math.inf
-        self.error_max = self.squares = 0.0
-        self.samples = 0
-
-    def enter(self, setpoint: float, style: WaveStyle) -> None:
-        """Take part from now on.
-
-        Args:
-            setpoint: Where it stands in [rad].
-            style: The style of the wave.
-        """
-        self.active = True
-        self.left = ''
-        self.start = setpoint
-        self.entered = 0.0
-        self.duration = self.swing.entry_duration(setpoint, style)
-
-    def leave(self, reason: str) -> None:
-        """Take no part any more.
-
-        Args:
-            reason: Why; empty when there is nothing to log.
-        """
-        if self.active:
-            self.left = reason
-        self.active = False
-        self.sent = None
-
-    def measure(self, position: float) -> None:
-        """Compare a measured position with the last set-point.
-
-        Args:
-            position: In [rad].
-        """
-        if self.sent is None:
-            return
-        error = abs(position - self.sent)
-        self.lowest = min(self.lowest, position)
-        self.highest = max(self.highest, position)
+    def measure(self, drive: DriveFigures) -> None:
+        """Take in an observation."""
+        error = abs(drive.following_error)
+        self.lowest = min(self.lowest, drive.position)
+        self.highest = max(self.highest, drive.position)
         self.error_max = max(self.error_max, error)
         self.squares += error * error
         self.samples += 1
 
-    def advance(self, step: float, theta: float) -> float:
-        """Go on, and return the next set-point in [rad].
+
+@dataclass(slots=True)
+class WaveAxis:
+    """A drive on its swing; times are on the steady clock in [s].
+
+    A drive that is not enabled, in a mode that follows no targets, or whose set-point stands while
+    the wave moves on, is somebody else's: it leaves the wave, and is taken back only when it is
+    asked for again.
+
+    Attributes:
+        swing: Its path.
+        left: Why it takes no part any more; empty when it does, or never did.
+    """
+
+    swing: Swing
+    left: str = ''
+    _entry: Entry | None = None
+    _asked: int = 0
+    _target: float = math.nan
+    _setpoint: float = math.nan
+    _standing: int = 0
+    _tracking: Tracking = field(default_factory=Tracking)
+
+    @property
+    def active(self) -> bool:
+        """Whether it takes part."""
+        return self._entry is not None
+
+    def ask(self) -> None:
+        """Let it take part as soon as it stands and can follow."""
+        self._asked = PATIENCE
+
+    def target(self, now: float, omega: float) -> float | None:
+        """Return where it is to be; None when it takes no part.
 
         Args:
-            step: By how much time of the wave in [s].
-            theta: Phase of the wave in [rad].
+            now: The time.
+            omega: Angular velocity of the wave in [rad/s].
         """
-        self.entered += step
-        self.sent = self.swing.position(self.start, self.entered / self.duration, theta)
-        return self.sent
+        entry = self._entry
+        if entry is None:
+            return None
+        entered = (now - entry.time) / entry.duration
+        self._target = self.swing.position(entry.start, entered, omega * now)
+        return self._target
 
-    def report(self) -> AxisReport:
+    def observe(self, drive: DriveFigures, now: float, style: WaveStyle) -> None:
+        """See how it is, and whether it takes part.
+
+        Args:
+            drive: Its figures.
+            now: The time.
+            style: The style of the wave.
+        """
+        stands = drive.setpoint == self._setpoint
+        self._setpoint = drive.setpoint
+        if self._entry is not None:
+            reason = self._lost(drive, stands=stands)
+            if reason:
+                self.leave(reason)
+            else:
+                self._tracking.measure(drive)
+        elif self._asked:
+            self._asked -= 1
+            if stands and drive.follows_targets:
+                self._enter(drive.setpoint, now, style)
+
+    def leave(self, reason: str) -> None:
+        """Take no part any more, and say why."""
+        self._entry, self._asked, self.left = None, 0, reason
+
+    def figures(self) -> AxisFigures:
         """Sum up what was measured."""
-        rms = math.sqrt(self.squares / self.samples) if self.samples else 0.0
-        return AxisReport(
-            self.swing.name,
-            self.active,
-            self.left,
-            self.lowest,
-            self.highest,
-            self.error_max,
-            rms,
-            self.samples,
-        )
+        seen = self._tracking
+        if not seen.samples:
+            return AxisFigures(self.active)
+        rms = math.sqrt(seen.squares / seen.samples)
+        return AxisFigures(self.active, seen.lowest, seen.highest, seen.error_max, rms)
+
+    def _enter(self, setpoint: float, now: float, style: WaveStyle) -> None:
+        self._entry = Entry(setpoint, now, self.swing.entry_duration(setpoint, style))
+        self._asked = self._standing = 0
+        self._target, self.left = setpoint, ''
+
+    def _lost(self, drive: DriveFigures, *, stands: bool) -> str:
+        """Return why it is not ours any more; empty when it is."""
+        if not drive.enabled:
+            return f'it is not enabled: {drive.message or drive.state}'
+        if not drive.follows_targets:
+            return f'it is in mode {drive.mode}'
+        beside = abs(self._target - drive.setpoint) > BESIDE * self.swing.amplitude
+        self._standing = self._standing + 1 if stands and beside else 0
+        if self._standing < STANDING:
+            return ''
+        return f'it was halted or sent elsewhere: its set-point stands at {drive.setpoint:.3f}'

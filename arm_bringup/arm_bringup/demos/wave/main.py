@@ -13,7 +13,6 @@ import sys
 
 from demo_runner import REFRESH_PERIOD, run_demo
 from process_supervisor import (
-    Executable,
     parse_with_ros,
     RosOptions,
     SupervisorError,
@@ -26,12 +25,12 @@ from ...exceptions import BringupError
 from ...groups import joints_of_groups, moved_groups, MovedGroups
 from ...robots import Robot
 from ...session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
+from ...stack import MASTER
 from ..figures import Figures
 from ..table import ArmView
+from .plan import plan_wave, WaveStyle
 from .scenario import Client, WaveScenario
-
-WAVE_MASTER = Executable('arm_bringup', 'wave_master')
-"""The master of the demo."""
+from .wave import Wave
 
 
 def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
@@ -63,16 +62,17 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     return parse_with_ros(parser, argv)
 
 
-def join_ros(namespace: str, given_up: Callable[[], bool]) -> Client:
+def join_ros(wave: Wave, namespace: str, given_up: Callable[[], bool]) -> Client:
     """Make the ROS client of the demo; rclpy loads while the processes start.
 
     Args:
+        wave: The wave.
         namespace: That of the arm.
         given_up: True when nothing shall be waited for any more.
     """
-    from ..client import ArmClient
+    from .client import WaveClient
 
-    return ArmClient(given_up, namespace)
+    return WaveClient(given_up, wave, namespace)
 
 
 def commands(joint: str, mode_service: str, candump: str, ros: RosOptions) -> list[str]:
@@ -122,6 +122,9 @@ def run(arm: Session, duration: float | None) -> int:
 
     Returns:
         0, or 1 when something went wrong.
+
+    Raises:
+        WaveError: No joint has a drive, or one cannot swing.
     """
     for name in sorted(set(arm.drives) - set(joint_limits(arm.urdf))):
         sys.stdout.write(
@@ -135,19 +138,17 @@ def run(arm: Session, duration: float | None) -> int:
         f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
         {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
     )
+    joints = {name: limits for name, limits in view.limits.items() if name in waving}
+    style = WaveStyle()
+    wave = Wave(plan_wave(joints, [name for name in arm.drives if name in joints], style), style)
     candump = f'ros2 run canopen_tools candump {arm.bus} --bus-config {bus_config}'
     return run_demo(
         arm.processes,
         view=view,
         figures=Figures(),
         commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
-        make_scenario=lambda display: WaveScenario(
-            display,
-            {name: limits for name, limits in view.limits.items() if name in waving},
-            arm.mode_service,
-            duration,
-        ),
-        make_client=partial(join_ros, arm.ros.namespace),
+        make_scenario=lambda display: WaveScenario(display, joints, arm.mode_service, duration),
+        make_client=partial(join_ros, wave, arm.ros.namespace),
         endless=duration is None,
     )
 
@@ -165,7 +166,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parameters = {'diagnostics_period': f'{REFRESH_PERIOD}'}
     try:
         with session(
-            arguments, ros, simulate=True, master=WAVE_MASTER, master_parameters=parameters
+            arguments, ros, simulate=True, master=MASTER, master_parameters=parameters
         ) as arm:
             return run(arm, arguments.duration)
     except (BringupError, SupervisorError) as error:

@@ -4,18 +4,14 @@
 
 A joint enters from wherever it stands. With the entry r(t/T), the quintic step of duration T,
 
-    p(t) = start + r(t/T) (centre + A sin(theta + phase) - start)
+    p(t) = start + r(t/T) (centre + A sin(omega t + phase) - start)
 
 which begins at ``start`` with velocity and acceleration zero, is twice continuously
 differentiable, and as a convex combination never leaves the hull of the start and the swing.
-With the offset D = |centre - start| and omega = d theta/dt, its derivatives are bounded by
+With the offset D = |centre - start| its speed is at most (D + A) r1/T + A omega, where r1 = 15/8
+is the greatest slope of the quintic step.
 
-    |v| <= (D + A) r1/T + A omega
-    |a| <= (D + A) r2/T^2 + 2 (r1/T) A omega + A omega^2
-
-where r1 = 15/8 and r2 = 10/sqrt(3) are the greatest slope and curvature of the quintic step.
-A stop slows the time down by the factor g(t) = 1 - r(t/T_stop): the joint stays on its path, and
-adds at most |v| r1/T_stop to its acceleration.
+That is a path for drives to follow; the limits of the motion are those of each drive.
 """
 
 from __future__ import annotations
@@ -30,8 +26,6 @@ from ...exceptions import WaveError
 
 STEP_SLOPE = 15 / 8
 """Greatest first derivative of the quintic step."""
-STEP_CURVATURE = 10 / math.sqrt(3)
-"""Greatest second derivative of the quintic step."""
 
 
 def quintic_step(x: float) -> float:
@@ -53,10 +47,8 @@ class WaveStyle:
         period: Time of one swing in [s].
         range_share: The swing covers at most this share of a joint's range.
         velocity_share: A joint is at most at this share of its velocity limit.
-        max_velocity: No joint is faster, in [rad/s] or [m/s]; some URDFs have limits of thousands.
-        acceleration: Greatest acceleration in [rad/s^2] or [m/s^2]. URDF knows no such limit;
-            the data sheet of the Panda allows 7.5 for its slowest joint.
-        stop_share: Share of the acceleration that is kept for a stop.
+        max_velocity: No joint is faster, in [rad/s] or [m/s]: drives approach their targets at
+            that speed or less, and some URDFs have limits of thousands.
         shortest_entry: A joint takes at least this long to enter in [s].
     """
 
@@ -64,9 +56,7 @@ class WaveStyle:
     period: float = 5.0
     range_share: float = 0.5
     velocity_share: float = 0.6
-    max_velocity: float = 4.0
-    acceleration: float = 4.0
-    stop_share: float = 0.4
+    max_velocity: float = 1.2
     shortest_entry: float = 2.0
 
     @property
@@ -85,8 +75,6 @@ class Swing:
         amplitude: Its amplitude in [rad] or [m].
         phase: How far it is ahead in [rad].
         velocity: Speed that it never exceeds in [rad/s] or [m/s].
-        acceleration: Acceleration that it never exceeds while it is not being stopped, in
-            [rad/s^2] or [m/s^2].
     """
 
     name: str
@@ -94,7 +82,6 @@ class Swing:
     amplitude: float
     phase: float
     velocity: float
-    acceleration: float
 
     def position(self, start: float, entered: float, theta: float) -> float:
         """Evaluate the path.
@@ -111,20 +98,15 @@ class Swing:
         return start + quintic_step(entered) * (target - start)
 
     def entry_duration(self, start: float, style: WaveStyle) -> float:
-        """Return how long the entry must take for both bounds of the module to hold, in [s].
+        """Return how long the entry must take for the bound on the speed to hold, in [s].
 
         Args:
             start: Where the joint stands, in [rad] or [m].
             style: The style of the wave.
         """
         way = abs(self.centre - start) + self.amplitude
-        swing_speed = self.amplitude * style.omega
-        by_velocity = way * STEP_SLOPE / (self.velocity - swing_speed)
-        # way r2 + 2 half T = left T^2, where left is what the swing itself leaves
-        half = STEP_SLOPE * swing_speed
-        left = self.acceleration - swing_speed * style.omega
-        by_acceleration = (half + math.sqrt(half * half + way * STEP_CURVATURE * left)) / left
-        return max(style.shortest_entry, by_velocity, by_acceleration)
+        left = self.velocity - self.amplitude * style.omega
+        return max(style.shortest_entry, way * STEP_SLOPE / left)
 
 
 def plan_swing(limits: JointRange, phase: float, style: WaveStyle) -> Swing:
@@ -144,16 +126,10 @@ def plan_swing(limits: JointRange, phase: float, style: WaveStyle) -> Swing:
             f'{limits.upper:g}, its velocity limit {limits.velocity:g}'
         )
     velocity = min(style.velocity_share * limits.velocity, style.max_velocity)
-    acceleration = (1 - style.stop_share) * style.acceleration
     half_range = (limits.upper - limits.lower) / 2
-    amplitude = min(
-        style.amplitude,
-        style.range_share * half_range,
-        velocity / 2 / style.omega,
-        acceleration / 2 / style.omega**2,
-    )
+    amplitude = min(style.amplitude, style.range_share * half_range, 0.6 * velocity / style.omega)
     centre = 0.0 if math.isinf(half_range) else (limits.lower + limits.upper) / 2
-    return Swing(limits.name, centre, amplitude, phase, velocity, acceleration)
+    return Swing(limits.name, centre, amplitude, phase, velocity)
 
 
 def plan_wave(
@@ -180,14 +156,3 @@ def plan_wave(
         )
     lag = 2 * math.pi / len(joints)
     return [plan_swing(limits[name], -i * lag, style) for i, name in enumerate(joints)]
-
-
-def stop_duration(swings: Sequence[Swing], style: WaveStyle) -> float:
-    """Return how long a stop must take, in [s].
-
-    Args:
-        swings: The joints that are stopped together.
-        style: The style of the wave.
-    """
-    fastest = max((swing.velocity for swing in swings), default=0.0)
-    return fastest * STEP_SLOPE / (style.stop_share * style.acceleration)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 import itertools
 import math
 import time
@@ -13,6 +13,7 @@ from typing import Protocol
 from urdf_reader import JointRange
 
 from demo_runner import DemoClient, DemoResult, DemoScenario, Display
+from process_supervisor import Notice, Severity
 
 from ...enabling import enabling_services
 from ..figures import Figures
@@ -20,14 +21,12 @@ from ..report import problems, summary_lines, warnings
 
 ENABLE_TIMEOUT = 15.0
 """Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
-CALL_TIMEOUT = 10.0
-"""Longest time in [s] for the services of the wave, and for it to stop."""
-START, STOP = 'wave/start', 'wave/stop'
-"""Services of the wave."""
+HALT_TIMEOUT = 10.0
+"""Longest time in [s] for the drives to come to rest."""
 
 
 class Client(DemoClient, Protocol):
-    """What the demo needs of ROS; :class:`..client.ArmClient` is the real one."""
+    """What the demo needs of ROS; :class:`.client.WaveClient` is the real one."""
 
     figures: Figures
 
@@ -36,6 +35,15 @@ class Client(DemoClient, Protocol):
 
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
         """Call services side by side."""
+
+    def start_wave(self) -> None:
+        """Stream targets to the drives that can follow."""
+
+    def stop_wave(self) -> Sequence[str]:
+        """Stream none any more; return the drives that were in the wave."""
+
+    def departures(self) -> Sequence[str]:
+        """Return which drives have left the wave, and why."""
 
 
 class WaveScenario(DemoScenario[Client]):
@@ -64,22 +72,29 @@ class WaveScenario(DemoScenario[Client]):
         self._duration = math.inf if duration is None else duration
 
     def _prepare(self, client: Client) -> None:
-        client.prepare([*itertools.chain(*self._enabling), START, STOP])
+        halts = [f'{name}/halt' for name in self._joints]
+        client.prepare([*itertools.chain(*self._enabling), *halts])
 
     def _perform(self, client: Client) -> None:
         self._enter('enabling')
         for services in self._enabling:
             client.call(services, ENABLE_TIMEOUT)
-        client.call([START], CALL_TIMEOUT)
+        client.start_wave()
         self._enter('waving')
         begun = time.monotonic()
         self._moving.set()
         end = begun + self._duration
-        self._wait(client, lambda: self.left or time.monotonic() >= end, math.inf, 'the end')
+        self._wait(client, lambda: self._ends(client, end), math.inf, 'the end')
         self._conclude(client.figures, time.monotonic() - begun)
         self._enter('stopping')
-        client.call([STOP], CALL_TIMEOUT)
-        self._wait(client, lambda: client.figures.wave == 'idle', CALL_TIMEOUT, 'the wave to stop')
+        if halts := [f'{name}/halt' for name in client.stop_wave()]:
+            client.call(halts, HALT_TIMEOUT)
+
+    def _ends(self, client: Client, end: float) -> bool:
+        """Report who left the wave; return whether it ends."""
+        for text in client.departures():
+            self._display.notice(Notice(Severity.WARNING, text))
+        return self.left or time.monotonic() >= end
 
     def _conclude(self, figures: Figures, duration: float) -> None:
         self.result = DemoResult(
