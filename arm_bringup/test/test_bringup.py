@@ -16,7 +16,7 @@ from small_bringup import read_until, SmallWorkspace
 from small_processes import service_manager, TIMEOUT
 
 from arm_bringup import bringup
-from arm_bringup.demos.wave import main as demo
+from arm_bringup.demos.wave.main import DEMO
 
 pytestmark = pytest.mark.slow
 
@@ -223,4 +223,4 @@ def test_an_option_that_is_cut_short_moves_nothing(words: list[str]) -> None:
         bringup.parse(['panda', *words])
     assert end.value.code == 2
     with pytest.raises(SystemExit):
-        demo.parse(['panda', '--dur', '5'])
+        DEMO.parse(['panda', '--dur', '5'])

@@ -11,7 +11,7 @@ import pytest
 
 from arm_bringup.demos.figures import BusFigures
 from arm_bringup.demos.motion.goals import beside, duration
-from arm_bringup.demos.motion.results import Results, Square
+from arm_bringup.demos.motion.results import MotionResults, Square
 from arm_model import JointLimits
 
 
@@ -45,7 +45,7 @@ def test_planned_trajectories_keep_the_limits(begin: np.ndarray, scale: float) -
 
 def test_good_figures_are_no_problem() -> None:
     """A run as it should be has a row for each part and no problem."""
-    results = Results()
+    results = MotionResults()
     results.square('square', Square(0.1, 0.1004, 1e-4, 2e-3))
     results.singularity(0.5, 0.49, 'singularity: x is lost here')
     results.motion(1.0, 0.01, BusFigures())
@@ -55,7 +55,7 @@ def test_good_figures_are_no_problem() -> None:
 
 def test_late_commands_judge_no_speed() -> None:
     """A computer too busy to jog stops the tool; the row says so, and other causes are judged."""
-    results = Results()
+    results = MotionResults()
     results.square('square', Square(0.1, 0.0, 1e-4, 2e-3, gap=0.23))
     assert results.problems == []
     assert 'not judged: jog commands were up to 0.23 s apart' in results.lines()[0]
@@ -65,7 +65,7 @@ def test_late_commands_judge_no_speed() -> None:
 
 def test_late_answers_judge_no_path() -> None:
     """Where a busy computer let PDOs come late, only what was commanded is judged."""
-    results = Results()
+    results = MotionResults()
     results.square('square', Square(0.1, 0.1, 1e-4, 4e-3, missed=2))
     results.motion(1.0, 0.4, BusFigures(missed_pdos=2))
     assert results.problems == []
@@ -90,7 +90,7 @@ def test_late_answers_judge_no_path() -> None:
 )
 def test_each_failure_has_its_reason(measure: object, words: str) -> None:
     """Whatever is beyond its bound ends the demo with an error that says it."""
-    results = Results()
+    results = MotionResults()
     assert callable(measure)
     measure(results)
     (problem,) = results.problems
@@ -99,7 +99,7 @@ def test_each_failure_has_its_reason(measure: object, words: str) -> None:
 
 def test_an_arm_that_may_not_be_as_quick_has_done_well() -> None:
     """Without a file of limits its accelerations are low; the servo says so."""
-    results = Results()
+    results = MotionResults()
     slow = Square(0.1, 0.07, 1e-4, 1e-4, limited='joint acceleration: elbow, 0.7x')
     results.square('square', slow)
     assert results.problems == []

@@ -11,11 +11,14 @@ from demo_doubles import FakeDisplay, FakeSupervisor
 import pytest
 from simulated_planning import Misbehaviour, SimulatedPlanning
 
+from arm_bringup.demos.plan.motions import Motions
 from arm_bringup.demos.plan.observer import Observer
-from arm_bringup.demos.plan.scenario import PlanScenario
+from arm_bringup.demos.plan.orders import MotionOrder
+from arm_bringup.demos.plan.results import PlanResults
 from arm_bringup.demos.plan.sequence import Arm, PlanSequence
 from arm_bringup.demos.plan.tool import flange_tool
-from arm_bringup.demos.plan.workcell import find_workcell
+from arm_bringup.demos.plan.workcell import by_joint, find_workcell
+from arm_bringup.demos.scenario import PartsScenario
 from arm_bringup.description import expand_xacro
 from arm_model import load_limits, RobotModel, start_pose
 from demo_runner import DemoResult
@@ -41,12 +44,14 @@ def played(wrong: Misbehaviour) -> DemoResult:
     assert arm.cell is not None
     observer = Observer(urdf, arm.model)
     client = SimulatedPlanning(observer, arm.model, arm.cell.home, wrong)
-    scenario = PlanScenario(
+    scenario = PartsScenario[SimulatedPlanning](
         FakeDisplay(),
         arm.model.joints,
         'cyclic_position_mode',
-        lambda client_, results: PlanSequence(client_, [arm], results, clock=client.clock),
-        duration=0.0,
+        0.0,
+        lambda _, enter, look: PlanSequence(
+            [arm], enter, Motions(client, PlanResults(), look, client.clock)
+        ),
     )
     scenario.run(FakeSupervisor(), lambda _given_up: client)
     return scenario.result
@@ -64,6 +69,23 @@ def test_all_goes_well_on_a_robot_that_does_as_it_should() -> None:
     assert 'GOAL_IN_COLLISION' in rows['blocked goal']
     assert 'pillar' in rows['blocked goal']
     assert '(2 plans)' in rows['box in the way']
+
+
+def test_ctrl_c_cancels_all_motions_that_are_on_their_way() -> None:
+    """Those of two arms at the same time, too; one that has ended is left alone."""
+    urdf, arm = played_arm()
+    assert arm.cell is not None
+    client = SimulatedPlanning(Observer(urdf, arm.model), arm.model, arm.cell.home, Misbehaviour())
+    motions = Motions(client, PlanResults(), lambda: None, client.clock)
+    orders = [
+        MotionOrder(arm.model.group, by_joint(arm.model, pose))
+        for pose in (arm.cell.home, arm.cell.aside, arm.cell.aside)
+    ]
+    ended = motions.attempt(orders[0])
+    under_way = [motions.send(order) for order in orders[1:]]
+    assert [run.done for run in under_way] == [False, False]
+    motions.cancel()
+    assert [run.end().code for run in (ended, *under_way)] == ['SUCCESS', *['PREEMPTED'] * 2]
 
 
 def test_the_demo_waits_until_move_group_knows_where_the_joints_are() -> None:

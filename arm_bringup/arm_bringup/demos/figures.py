@@ -169,6 +169,11 @@ class Figures:
         return self
 
     @property
+    def line(self) -> str:
+        """A line of the demo's own; empty for none."""
+        return ''
+
+    @property
     def enabled(self) -> int:
         """Number of drives that can move."""
         return sum(drive.enabled for drive in self.drives.values())

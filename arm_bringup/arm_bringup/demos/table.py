@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The live table of the demo, for a terminal of any size that is large enough."""
+"""The live table of the demos, for a terminal of any size that is large enough."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from urdf_reader import JointRange
 from demo_runner import compose, DemoStatus
 
 from .figures import AxisFigures, BusFigures, DriveFigures, ENABLED, Figures
-from .report import progress_line
+from .report import bus_line, progress_line
 
 NARROWEST = 80
 """Columns of a terminal below which there is no table."""
@@ -63,10 +63,12 @@ class ArmView:
     Attributes:
         title: Robot and bus.
         limits: The joints, in the order of the rows.
+        label: What the demo's own line begins with; without one there is none.
     """
 
     title: str
     limits: Mapping[str, JointRange]
+    label: str = ''
 
     def fits(self, width: int, height: int) -> bool:
         """Say whether a terminal has room for the table.
@@ -75,7 +77,7 @@ class ArmView:
             width: Its columns.
             height: Its lines.
         """
-        return width >= NARROWEST and height >= len(self.limits) + LINES_AROUND
+        return width >= NARROWEST and height >= self._lines
 
     def progress(self, figures: Figures) -> str:
         """Say in a line how it goes.
@@ -83,6 +85,8 @@ class ArmView:
         Args:
             figures: The latest.
         """
+        if self.label:
+            return f'{figures.line}; {bus_line(figures.bus)}'
         return progress_line(figures, self.limits)
 
     def render(
@@ -97,8 +101,17 @@ class ArmView:
             height: Lines of the terminal.
         """
         body: list[RenderableType] = [self.drives(figures, width), Text(''), bus_text(figures.bus)]
-        room = height - len(self.limits) - LINES_AROUND
+        if self.label:
+            line = Text.assemble((f'{self.label:<7}', 'bold'), figures.line)
+            line.truncate(width)
+            body.append(line)
+        room = height - self._lines
         return compose(self.title, status, body, (min(width, WORDS_FROM), width), room)
+
+    @property
+    def _lines(self) -> int:
+        """Lines that it needs."""
+        return len(self.limits) + LINES_AROUND + bool(self.label)
 
     def drives(self, figures: Figures, width: int) -> Table:
         """Draw the table of the drives.

@@ -21,6 +21,6 @@ def main() -> int:
     if find_spec('arm_servo') is None:
         sys.stderr.write(f'{MAKE_MOVE}\n')
         return USAGE_ERROR
-    from .main import main as run_demo
+    from .main import DEMO
 
-    return run_demo()
+    return DEMO.main()

@@ -24,3 +24,11 @@ class MotionFigures(Figures):
     tool_speed: float = 0.0
     override: float = 1.0
     jerk: float = 0.0
+
+    @property
+    def line(self) -> str:
+        """What moves the arm."""
+        return (
+            f'tool {self.tool_speed:.3f} m/s   override {100 * self.override:.0f} %   '
+            f'peak jerk {100 * self.jerk:.0f} % of the limit   {self.words}'
+        )

@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo found out: rows of the summary, and what went wrong."""
+"""What the demo found out of squares, the singular pose, and the motion as a whole."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..figures import BusFigures
 from ..report import bus_line
+from ..results import Results
 
 WORST_LINE = 3e-3
 """Greatest distance of the tool from the line that it is jogged along, in [m]."""
@@ -51,30 +52,8 @@ class Square:
 
 
 @dataclass(slots=True)
-class Results:
-    """Filled while the demo runs.
-
-    Attributes:
-        rows: Name and figures of each part, in their order.
-        problems: What went wrong.
-        complete: Whether every part was run.
-    """
-
-    rows: list[tuple[str, str]] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
-    complete: bool = False
-
-    def add(self, name: str, figures: str, problem: str = '') -> None:
-        """Take in a part.
-
-        Args:
-            name: What it was.
-            figures: What was measured.
-            problem: What went wrong; empty when all went well.
-        """
-        self.rows.append((name, figures))
-        if problem:
-            self.problems.append(f'{name}: {problem}')
+class MotionResults(Results):
+    """Filled while the demo runs."""
 
     def square(self, name: str, square: Square) -> None:
         """Take in a square of the tool.
@@ -137,8 +116,3 @@ class Results:
         problem = slow if tracking > WORST_TRACKING and not bus.missed_pdos else ''
         self.add('joint tracking error', f'{1e3 * tracking:.2f} mrad', problem)
         self.add('bus and loop', bus_line(bus))
-
-    def lines(self) -> list[str]:
-        """Return the summary."""
-        width = max((len(name) for name, _ in self.rows), default=0)
-        return [f'{name:<{width}}  {figures}' for name, figures in self.rows]

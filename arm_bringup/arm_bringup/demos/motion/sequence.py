@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+import math
 import time
 
 from action_msgs.msg import GoalStatus
@@ -17,7 +18,7 @@ from process_supervisor import CallError
 from .client import GoalRun, MotionClient
 from .goals import duration
 from .poses import free_end, free_way, SIDE, SIDES, SPEED, square_fits
-from .results import Results, Square, WORST_PATH
+from .results import MotionResults, Square, WORST_PATH
 from .samples import away_from_line, peak_jerk, tool_speed, tracking_error
 
 PERIOD = 0.02
@@ -42,11 +43,7 @@ MOTION_TIMEOUT = 60.0
 """Longest time of a trajectory in [s]."""
 
 
-class EndRequested(Exception):  # noqa: N818  # it is no error: the user asked for the end
-    """The user asked for the end."""
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class MotionSequence:
     """The parts of the demo, for a client whose drives are enabled.
 
@@ -55,18 +52,42 @@ class MotionSequence:
         model: The arm.
         start: The pose from which the parts begin in [rad].
         period: Period of the cycle in [s].
-        results: Where figures go.
         enter: Called with the name of each part.
         look: Called often; shows how it goes, and raises EndRequested.
+        results: Where figures go.
     """
 
     client: MotionClient
     model: RobotModel
     start: Array
     period: float
-    results: Results
     enter: Callable[[str], None]
     look: Callable[[], None]
+    results: MotionResults = field(default_factory=MotionResults)
+    _run: GoalRun | None = None
+
+    def set_up(self) -> None:
+        """Have nothing to set up: each run begins at the start pose."""
+
+    def come_to_rest(self) -> None:
+        """Cancel the trajectory that is on its way; a jog ends by itself."""
+        run = self._run
+        if run is not None and not run.done:
+            run.cancel()
+            self.client.wait_until(lambda: run.done, MOTION_TIMEOUT, 'the end of the canceled')
+
+    def conclude(self) -> None:
+        """Add what was measured all the time."""
+        samples, bus = self.client.samples, self.client.figures.bus
+        if samples:
+            jerk = peak_jerk(samples, self.period, self.model.limits.jerk)
+            self.results.motion(jerk, tracking_error(samples, self.period), bus)
+        late = bus.jitter_p99
+        if math.isfinite(late) and late > self.period / 2:
+            self.results.warnings.append(
+                f'the cycle was late by {1e3 * late:.0f} ms now and then (p99): this computer is '
+                'too busy, drives wait and may lose their path'
+            )
 
     def run(self) -> None:
         """Run every part once.
@@ -94,7 +115,7 @@ class MotionSequence:
         end = self.start
         begin = self.client.last.position if self.client.samples else np.zeros(len(self.model))
         for pose in free_way(self.model, begin, end):
-            self._finish(self.client.send(pose, duration(begin, pose, self.model.limits)))
+            self._finish(self._send(pose, duration(begin, pose, self.model.limits)))
             self._rest()
             begin = pose
 
@@ -156,7 +177,7 @@ class MotionSequence:
         self.enter('a trajectory, at 30 % in its middle')
         begin, end, nominal = self._plan()
         first = len(self.client.samples)
-        run = self.client.send(end, nominal)
+        run = self._send(end, nominal)
         self._reach(run, begin, end, EARLY)
         self.client.override(SLOW)
         self._reach(run, begin, end, LATE)
@@ -182,7 +203,7 @@ class MotionSequence:
         self.enter('a trajectory, canceled')
         begin, end, nominal = self._plan()
         first = len(self.client.samples)
-        run = self.client.send(end, nominal)
+        run = self._send(end, nominal)
         self._reach(run, begin, end, HALF)
         run.cancel()
         self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of the canceled')
@@ -200,13 +221,6 @@ class MotionSequence:
             f'at rest after {100 * share:.0f} % of the way, {1e3 * error:.3f} mrad off the path'
         )
         self.results.add('cancel', figures, problem)
-
-    def measure(self) -> None:
-        """Take in what was measured all the time."""
-        samples = self.client.samples
-        jerk = peak_jerk(samples, self.period, self.model.limits.jerk)
-        tracking = tracking_error(samples, self.period)
-        self.results.motion(jerk, tracking, self.client.figures.bus)
 
     def _plan(self) -> tuple[Array, Array, float]:
         """Return begin, end and time of a trajectory from where the arm is."""
@@ -240,6 +254,10 @@ class MotionSequence:
         recent = self.client.samples[-round(SETTLE / self.period) :]
         way = float(np.linalg.norm(recent[-1].tool - recent[0].tool))
         return way < STUCK * SETTLE
+
+    def _send(self, end: Array, nominal: float) -> GoalRun:
+        self._run = run = self.client.send(end, nominal)
+        return run
 
     def _finish(self, run: GoalRun) -> None:
         self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of a trajectory')

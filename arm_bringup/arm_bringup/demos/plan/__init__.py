@@ -22,6 +22,6 @@ def main() -> int:
     if missing := [name for name in NEEDED if find_spec(name) is None]:
         sys.stderr.write(f'build {" and ".join(missing)} (make build) for planned motions\n')
         return USAGE_ERROR
-    from .main import main as run_demo
+    from .main import DEMO
 
-    return run_demo()
+    return DEMO.main()

@@ -25,3 +25,14 @@ class PlanFigures(Figures):
     planning_time: float = math.nan
     clearance: float = math.nan
     nearest: tuple[str, str] = ('', '')
+
+    @property
+    def line(self) -> str:
+        """What was planned, and how near the arm is to what."""
+        parts = []
+        if math.isfinite(self.planning_time):
+            parts.append(f'planned in {1e3 * self.planning_time:.0f} ms')
+        if math.isfinite(self.clearance):
+            first, second = self.nearest
+            parts.append(f'{1e3 * self.clearance:.0f} mm between {first} and {second}')
+        return '   '.join([*parts, self.words])

@@ -8,81 +8,38 @@ import argparse
 from collections.abc import Sequence
 import contextlib
 from dataclasses import dataclass
-from functools import partial
 import json
 import os
 from pathlib import Path
-import sys
 
 from urdf_reader import parse_srdf, read_urdf
 
 from arm_model import ArmError, Array, load_limits, RobotModel, start_pose
-from demo_runner import run_demo
-from process_supervisor import (
-    namespaced_parameters,
-    parse_with_ros,
-    RosOptions,
-    SupervisorError,
-    USAGE_ERROR,
-)
-from process_supervisor.arguments import seconds_from
+from process_supervisor import namespaced_parameters, RosOptions
 
-from ...description import joint_limits, read_semantic
-from ...exceptions import BringupError, RobotError
-from ...groups import joints_of_groups, moved_groups, MovedGroups
+from ...description import read_semantic
+from ...exceptions import RobotError
+from ...groups import joints_of_groups, MovedGroups
 from ...motion import controller_names, planning_files
 from ...robots import Robot
-from ...session import (
-    add_arguments,
-    locate,
-    robots_epilog,
-    Session,
-    session,
-    SIMULATED_BUS,
-)
+from ...session import locate
 from ...stack import MOTION_NODE
-from ..table import ArmView
+from ..program import DemoProgram, Play, Stage
+from ..scenario import PartsScenario
 from .boxes import find_swing
 from .client import PlanClient
 from .figures import PlanFigures
+from .motions import Motions
 from .observer import Observer
-from .scenario import PlanScenario
+from .results import PlanResults
 from .sequence import Arm, PlanSequence
 from .tool import flange_tool, GripperParts, gripping_tool, Tool
-from .view import PlanView
 from .workcell import by_joint, find_workcell
 
 DURATION_MARGIN = 20.0
 """How much longer than planned a motion may take on a busy computer in [s]."""
 WITH_GRIPPER = '_hand'
 """What follows the name of a robot in that of its folder with a gripper."""
-
-
-def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line.
-
-    Args:
-        argv: Arguments without the program's name.
-
-    Returns:
-        What was asked for, and the options of all nodes.
-    """
-    parser = argparse.ArgumentParser(
-        prog='ros2 run arm_bringup plan_demo',
-        description='Bring a simulated arm up with move_group, and have it pick and place among '
-        'obstacles, go around a box that appears in its way, and refuse a blocked goal; further '
-        'arms move in the same scene. Ends with what was measured at the joint states.',
-        epilog=robots_epilog(),
-        allow_abbrev=False,
-    )
-    add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
-    parser.add_argument(
-        '--duration',
-        metavar='S',
-        type=seconds_from(0.0),
-        help='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
-    )
-    return parse_with_ros(parser, argv)
 
 
 def with_gripper(arguments: argparse.Namespace) -> Robot:
@@ -203,43 +160,28 @@ class Robots:
         return flange_tool(model, home), ''
 
 
-def run(arm: Session, groups: MovedGroups, duration: float | None) -> int:
-    """Run the demo.
-
-    Args:
-        arm: The arm, prepared.
-        groups: Its groups that are moved; the first shows what it can.
-        duration: How long it is repeated in [s]; None until Ctrl-C.
-
-    Returns:
-        0, or 1 when something went wrong.
+def prepare(stage: Stage) -> Play:
+    """Find a workcell for the first arm, and a motion for each other one.
 
     Raises:
-        ModelError: Its files do not make an arm, or it has no pose to start from.
+        ModelError: The files do not make arms, or one has no pose to start from.
     """
-    arms = Robots(arm.robot, arm.urdf, groups).arms()
-    observer = Observer(arm.urdf, arms[0].model)
-    limits = {name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives}
-    if arm.start:
-        sys.stdout.write(f'{arm.start}\n')
-    title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}, and move_group'
-
-    return run_demo(
-        arm.processes,
-        view=PlanView(ArmView(title, limits)),
-        figures=PlanFigures(),
-        commands=commands(arm.ros),
-        make_scenario=lambda display: PlanScenario(
+    arm = stage.arm
+    arms = Robots(arm.robot, arm.urdf, stage.groups).arms()
+    observer, root = Observer(arm.urdf, arms[0].model), read_urdf(arm.urdf).root
+    return Play(
+        commands(arm.ros),
+        lambda display: PartsScenario(
             display,
-            list(limits),
+            stage.limits,
             arm.mode_service,
-            lambda client, results: PlanSequence(client, arms, results),
-            duration,
+            stage.duration,
+            lambda client, enter, look: PlanSequence(
+                arms, enter, Motions(client, PlanResults(), look)
+            ),
         ),
-        make_client=lambda given_up: PlanClient(
-            given_up, observer, read_urdf(arm.urdf).root, arm.ros.namespace
-        ),
-        endless=False,
+        lambda given_up: PlanClient(given_up, observer, root, arm.ros.namespace),
+        PlanFigures(),
     )
 
 
@@ -255,34 +197,18 @@ def commands(ros: RosOptions) -> list[str]:
     ]
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo until its end or Ctrl-C.
-
-    Args:
-        argv: Arguments without the program's name; None takes those of the process.
-
-    Returns:
-        0 when all went well, 1 when something did not, 2 when nothing was started.
-    """
-    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
-    try:
-        robot = with_gripper(arguments)
-        if robot.lacking:
-            raise RobotError(
-                f'{robot.name} lacks {robot.lacking}: '
-                f'ros2 run arm_bringup check {arguments.robot} reports all of it'
-            )
-        groups = moved_groups(robot)
-        with session(
-            arguments,
-            ros,
-            simulate=True,
-            master=MOTION_NODE,
-            master_parameters={'diagnostics_period': '0.2'},
-            master_files=partial(demo_files, groups=groups),
-            plan=True,
-        ) as arm:
-            return run(arm, groups, arguments.duration)
-    except (BringupError, SupervisorError, ArmError) as error:
-        sys.stderr.write(f'{error}\n')
-        return USAGE_ERROR
+DEMO = DemoProgram(
+    name='plan_demo',
+    description='Bring a simulated arm up with move_group, and have it pick and place among '
+    'obstacles, go around a box that appears in its way, and refuse a blocked goal; further '
+    'arms move in the same scene. Ends with what was measured at the joint states.',
+    duration='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
+    master=MOTION_NODE,
+    prepare=prepare,
+    beside=', and move_group',
+    label='plan',
+    find_robot=with_gripper,
+    files=demo_files,
+    plan=True,
+    errors=(ArmError,),
+)

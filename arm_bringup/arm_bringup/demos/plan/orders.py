@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from arm_model import AttachedBody, CollisionObject, Pose
-from demo_runner import DemoClient
 
+from ..scenario import DriveClient
 from .observer import Observer
 
 SUCCESS, BLOCKED, UNKNOWN_STATE = 'SUCCESS', 'GOAL_IN_COLLISION', 'ROBOT_STATE_STALE'
@@ -129,14 +129,8 @@ class MotionRun(Protocol):
         """Return how it ended; once it is done."""
 
 
-class PlanningClient(DemoClient, Protocol):
-    """What the scenario needs of ROS."""
-
-    def prepare(self, services: Iterable[str]) -> None:
-        """Look for services of drives that will be called."""
-
-    def call(self, services: list[str], timeout: float) -> Mapping[str, str]:
-        """Call services of drives side by side."""
+class PlanningClient(DriveClient, Protocol):
+    """What the demo needs of ROS; :class:`.client.PlanClient` is the real one."""
 
     @property
     def observer(self) -> Observer:

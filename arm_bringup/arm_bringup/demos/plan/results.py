@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo found out: rows of the summary, and what went wrong."""
+"""What the demo found out: of motions that were seen, and of what came to rest where."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from arm_model import Array, Pose
 
+from ..results import Results
 from .observer import Watch
 
 WORST_JOINT = 5e-3
@@ -22,36 +23,14 @@ WORST_GAP = 0.5
 
 
 @dataclass(slots=True)
-class Results:
+class PlanResults(Results):
     """Filled while the demo runs.
 
     Attributes:
-        rows: Name and figures of each part, in their order.
-        problems: What went wrong.
         planning_times: Of all plans in [s].
     """
 
-    rows: list[tuple[str, str]] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
     planning_times: list[float] = field(default_factory=list)
-
-    def add(self, name: str, figures: str) -> None:
-        """Take in a part.
-
-        Args:
-            name: What it was.
-            figures: What was measured.
-        """
-        self.rows.append((name, figures))
-
-    def problem(self, name: str, words: str) -> None:
-        """Take in what went wrong.
-
-        Args:
-            name: In which part.
-            words: What it was.
-        """
-        self.problems.append(f'{name}: {words}')
 
     def watched(self, name: str, watch: Watch) -> None:
         """Judge what was seen of a motion: contacts, and whether all of it was seen.
@@ -85,11 +64,6 @@ class Results:
             return 'nothing was planned'
         times = 1e3 * np.array(self.planning_times)
         return f'{len(times)} plans, p50 {np.median(times):.0f} ms, greatest {times.max():.0f} ms'
-
-    def lines(self) -> list[str]:
-        """Return the summary."""
-        width = max((len(name) for name, _ in self.rows), default=0)
-        return [f'{name:<{width}}  {figures}' for name, figures in self.rows]
 
 
 def clearance(watch: Watch) -> str:

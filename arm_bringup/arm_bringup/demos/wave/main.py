@@ -4,62 +4,23 @@
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from functools import partial
 import itertools
 import os
 import sys
 
-from demo_runner import REFRESH_PERIOD, run_demo
-from process_supervisor import (
-    parse_with_ros,
-    RosOptions,
-    SupervisorError,
-    USAGE_ERROR,
-)
-from process_supervisor.arguments import seconds_from
+from process_supervisor import RosOptions
 
 from ...description import joint_limits
-from ...exceptions import BringupError
 from ...groups import joints_of_groups, moved_groups, MovedGroups
 from ...robots import Robot
-from ...session import add_arguments, robots_epilog, Session, session, SIMULATED_BUS
 from ...stack import MASTER
 from ..figures import Figures
-from ..table import ArmView
+from ..program import DemoProgram, Play, Stage
 from .plan import plan_wave, WaveStyle
 from .scenario import Client, WaveScenario
 from .wave import Wave
-
-
-def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
-    """Parse the command line.
-
-    Args:
-        argv: Arguments without the program's name.
-
-    Returns:
-        What was asked for, and the options of all nodes.
-    """
-    parser = argparse.ArgumentParser(
-        prog='ros2 run arm_bringup demo',
-        description='Bring a simulated arm up, enable all its drives and let it wave. In a '
-        'terminal a live table shows what it does; elsewhere a line every few seconds. Ctrl-C '
-        'stops the wave, disables the drives and ends everything.',
-        epilog=robots_epilog(),
-        allow_abbrev=False,
-    )
-    add_arguments(parser, default_bus=f'{SIMULATED_BUS}: vcan0 when it is there, else multicast')
-    parser.add_argument(
-        '--duration',
-        metavar='S',
-        type=seconds_from(0.0),
-        help='end after so many seconds of wave, with a summary; the exit code says whether all '
-        'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
-        'Ctrl-C)',
-    )
-    return parse_with_ros(parser, argv)
 
 
 def join_ros(wave: Wave, namespace: str, given_up: Callable[[], bool]) -> Client:
@@ -113,62 +74,40 @@ def waving_joints(robot: Robot, drives: Collection[str]) -> Collection[str]:
     return list(itertools.chain(*joints.values()))
 
 
-def run(arm: Session, duration: float | None) -> int:
-    """Run the demo.
-
-    Args:
-        arm: The arm, prepared.
-        duration: How long the wave runs in [s]; None until Ctrl-C.
-
-    Returns:
-        0, or 1 when something went wrong.
+def prepare(stage: Stage) -> Play:
+    """Plan the wave.
 
     Raises:
         WaveError: No joint has a drive, or one cannot swing.
     """
+    arm = stage.arm
     for name in sorted(set(arm.drives) - set(joint_limits(arm.urdf))):
         sys.stdout.write(
             f'warning: no joint of the description is called {name!r}; its drive stands still\n'
         )
-    if arm.start:
-        sys.stdout.write(f'{arm.start}\n')
-    bus_config = os.path.relpath(arm.robot.bus_config)
-    waving = waving_joints(arm.robot, arm.drives)
-    view = ArmView(
-        f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}',
-        {name: limits for name, limits in joint_limits(arm.urdf).items() if name in arm.drives},
-    )
-    joints = {name: limits for name, limits in view.limits.items() if name in waving}
-    style = WaveStyle()
+    waving, style = waving_joints(arm.robot, arm.drives), WaveStyle()
+    joints = {name: limits for name, limits in stage.limits.items() if name in waving}
     wave = Wave(plan_wave(joints, [name for name in arm.drives if name in joints], style), style)
+    bus_config = os.path.relpath(arm.robot.bus_config)
     candump = f'ros2 run canopen_tools candump {arm.bus} --bus-config {bus_config}'
-    return run_demo(
-        arm.processes,
-        view=view,
-        figures=Figures(),
-        commands=commands(arm.drives[0], arm.mode_service, candump, arm.ros),
-        make_scenario=lambda display: WaveScenario(display, joints, arm.mode_service, duration),
-        make_client=partial(join_ros, wave, arm.ros.namespace),
-        endless=duration is None,
+    return Play(
+        commands(arm.drives[0], arm.mode_service, candump, arm.ros),
+        lambda display: WaveScenario(display, joints, arm.mode_service, stage.duration),
+        partial(join_ros, wave, arm.ros.namespace),
+        Figures(),
     )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the demo until its end or Ctrl-C.
-
-    Args:
-        argv: Arguments without the program's name; None takes those of the process.
-
-    Returns:
-        0 when all went well, 1 when something did not, 2 when nothing was started.
-    """
-    arguments, ros = parse(sys.argv[1:] if argv is None else argv)
-    parameters = {'diagnostics_period': f'{REFRESH_PERIOD}'}
-    try:
-        with session(
-            arguments, ros, simulate=True, master=MASTER, master_parameters=parameters
-        ) as arm:
-            return run(arm, arguments.duration)
-    except (BringupError, SupervisorError) as error:
-        sys.stderr.write(f'{error}\n')
-        return USAGE_ERROR
+DEMO = DemoProgram(
+    name='demo',
+    description='Bring a simulated arm up, enable all its drives and let it wave. In a '
+    'terminal a live table shows what it does; elsewhere a line every few seconds. Ctrl-C '
+    'stops the wave, disables the drives and ends everything.',
+    duration='end after so many seconds of wave, with a summary; the exit code says whether all '
+    'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
+    'Ctrl-C)',
+    master=MASTER,
+    prepare=prepare,
+    endless=True,
+)
+main = DEMO.main  # the entry point

@@ -4,37 +4,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-import itertools
+from collections.abc import Mapping, Sequence
 import math
 import time
 from typing import Protocol
 
 from urdf_reader import JointRange
 
-from demo_runner import DemoClient, DemoResult, DemoScenario, Display
+from demo_runner import DemoResult, Display
 from process_supervisor import Notice, Severity
 
-from ...enabling import enabling_services
 from ..figures import Figures
 from ..report import problems, summary_lines, warnings
+from ..scenario import ArmScenario, DriveClient
 
-ENABLE_TIMEOUT = 15.0
-"""Longest time in [s] for all drives to be enabled, and for them to be in their mode."""
 HALT_TIMEOUT = 10.0
 """Longest time in [s] for the drives to come to rest."""
 
 
-class Client(DemoClient, Protocol):
+class Client(DriveClient, Protocol):
     """What the demo needs of ROS; :class:`.client.WaveClient` is the real one."""
-
-    figures: Figures
-
-    def prepare(self, services: Iterable[str]) -> None:
-        """Look for services that will be called."""
-
-    def call(self, services: list[str], timeout: float) -> dict[str, str]:
-        """Call services side by side."""
 
     def start_wave(self) -> None:
         """Stream targets to the drives that can follow."""
@@ -46,10 +35,8 @@ class Client(DemoClient, Protocol):
         """Return which drives have left the wave, and why."""
 
 
-class WaveScenario(DemoScenario[Client]):
+class WaveScenario(ArmScenario[Client]):
     """Lets the arm wave."""
-
-    opening = 'booting'
 
     def __init__(
         self,
@@ -66,29 +53,23 @@ class WaveScenario(DemoScenario[Client]):
             mode_service: Service of a drive that selects the mode of the wave.
             duration: How long the wave runs in [s]; None until :meth:`leave`.
         """
-        super().__init__(display)
+        super().__init__(display, joints, mode_service, duration)
         self._joints = joints
-        self._enabling = enabling_services(list(joints), mode_service)
-        self._duration = math.inf if duration is None else duration
 
-    def _prepare(self, client: Client) -> None:
-        halts = [f'{name}/halt' for name in self._joints]
-        client.prepare([*itertools.chain(*self._enabling), *halts])
+    @property
+    def _others(self) -> Sequence[str]:
+        return _halts(list(self._joints))
 
-    def _perform(self, client: Client) -> None:
-        self._enter('enabling')
-        for services in self._enabling:
-            client.call(services, ENABLE_TIMEOUT)
+    def _move(self, client: Client) -> None:
         client.start_wave()
         self._enter('waving')
         begun = time.monotonic()
-        self._moving.set()
         end = begun + self._duration
         self._wait(client, lambda: self._ends(client, end), math.inf, 'the end')
         self._conclude(client.figures, time.monotonic() - begun)
         self._enter('stopping')
-        if halts := [f'{name}/halt' for name in client.stop_wave()]:
-            client.call(halts, HALT_TIMEOUT)
+        if active := client.stop_wave():
+            client.call(_halts(active), HALT_TIMEOUT)
 
     def _ends(self, client: Client, end: float) -> bool:
         """Report who left the wave; return whether it ends."""
@@ -102,3 +83,7 @@ class WaveScenario(DemoScenario[Client]):
             problems(figures, self._joints),
             warnings(figures),
         )
+
+
+def _halts(names: Sequence[str]) -> list[str]:
+    return [f'{name}/halt' for name in names]
