@@ -7,11 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-import shutil
 import subprocess
 import sys
-
-from arm_model import example_files
 
 CHECKOUT = Path(__file__).parents[1]
 READMES = (
@@ -29,7 +26,6 @@ READMES = (
     'robot_viewer',
 )
 """Packages that are libraries without ROS, too."""
-BESIDE_A_PANDA = ('arm_planning', 'arm_servo', 'robot_viewer')
 PORT = '/dev/ttyAMA0'  # of the robot, in the READMEs
 TIMEOUT = 120.0  # [s]
 
@@ -41,13 +37,10 @@ def run_examples(
 
     Args:
         package: The package.
-        folder: An empty folder; those of :data:`BESIDE_A_PANDA` run in it, with its files.
+        folder: An empty folder.
         python: The interpreter whose packages are used.
         env: Environment of the processes; its ROS domain chooses the CAN bus.
     """
-    if package in BESIDE_A_PANDA:
-        for file in example_files():
-            shutil.copy(file, folder)
     text = (CHECKOUT / package / 'README.md').read_text()
     readme, port = folder / 'README.md', folder / 'xgo'
     readme.write_text(text.replace(PORT, str(port)))
@@ -60,7 +53,7 @@ def run_examples(
             assert process.stdout.readline()  # it is there
         return subprocess.run(
             [python, Path(__file__).with_name('readme_examples.py'), readme],
-            cwd=folder if package in BESIDE_A_PANDA else CHECKOUT,
+            cwd=CHECKOUT,
             env=env,
             capture_output=True,
             text=True,

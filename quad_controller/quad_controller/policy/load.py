@@ -13,7 +13,7 @@ from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
-from .check import check_answers, check_contract, Report
+from .check import check_answers, check_contract, Report, Row
 from .contract.build import build_contract
 from .contract.declared import read_declared
 from .contract.document import ContractDocument, document_of
@@ -21,7 +21,7 @@ from .contract.files import read_contract_file
 from .contract.mjlab import CONTRACT_KEY, read_metadata
 from .contract.model import PolicyContract, Source
 from .interface import PolicyInputs
-from .network import Network, OnnxNetwork
+from .network import Floats, Network, OnnxNetwork
 from .options import ImuFrame, PolicyOptions
 from .runner import PolicyRunner
 
@@ -146,41 +146,43 @@ def validate_policy(
     """
     document = document_for(network, options)
     contract = build_contract(document)
-    report = Report(
-        tuple(
-            check_contract(
-                network,
-                contract,
-                robot,
-                stand,
-                document=document,
-                declared=read_declared(network.metadata),
-                hold_missing=options.hold_missing,
-                period=period,
-            )
-        )
+    fit = check_contract(
+        network,
+        contract,
+        robot,
+        stand,
+        document=document,
+        declared=read_declared(network.metadata),
+        hold_missing=options.hold_missing,
+        period=period,
     )
-    if report.refused:
-        raise PolicyError(f'policy {name} does not fit this robot:\n{report}', report.reason)
+    checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
     network.recur(contract.recurrence)
     runner = PolicyRunner(name, network, contract, robot, options=options, period=period)
-    runner.reset(stand)
-    still = JointSample(stand, (0.0,) * len(stand))
-    standing = runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0)))
+    standing, held = _observed(runner, stand), runner.in_its_order(stand)
     try:
-        answers = tuple(
-            check_answers(
-                network,
-                standing,
-                contract,
-                runner.in_its_order(stand),
-                period=period,
-                clock=clock,
-            )
-        )
+        answers = check_answers(network, standing, contract, held, period=period, clock=clock)
+        rows = (*checked.rows, *answers)
     except Exception as error:
         raise PolicyError(f'policy {name} cannot be run: {error}') from error
-    report = Report((*report.rows, *answers))
-    if report.refused:
-        raise PolicyError(f'policy {name} does not behave:\n{report}', report.reason)
+    report = _accepted(rows, f'policy {name} does not behave')
     return LoadedPolicy(runner, contract, document, report, network.digest, dict(network.metadata))
+
+
+def _accepted(rows: tuple[Row, ...], verdict: str) -> Report:
+    """Return the rows of a check as a report.
+
+    Raises:
+        PolicyError: It refuses the policy; the message has the verdict and the table.
+    """
+    report = Report(rows)
+    if report.refused:
+        raise PolicyError(f'{verdict}:\n{report}', report.reason)
+    return report
+
+
+def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
+    """Return what a policy observes of a robot that stands."""
+    runner.reset(stand)
+    still = JointSample(stand, (0.0,) * len(stand))
+    return runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0)))
