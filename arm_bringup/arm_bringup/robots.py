@@ -84,7 +84,7 @@ class Robot:
 
     @property
     def folder(self) -> Path:
-        """The folder."""
+        """Where its files are: that of bus.yml."""
         return self.bus_config.parent
 
     @property

@@ -147,7 +147,7 @@ SECTIONS: tuple[tuple[str, str, tuple[Key, ...], type], ...] = (
 
 
 def page() -> str:
-    """Return the page."""
+    """Return docs/bus_yml.md: a table of keys for each part of bus.yml."""
     return '\n'.join([HEAD, *(line for section in SECTIONS for line in _table(*section))])
 
 

@@ -112,7 +112,7 @@ KINDS: Mapping[str, Callable[[np.random.Generator], Boxes]] = {
 
 
 def panda() -> RobotModel:
-    """Return the Panda."""
+    """Build the arm of all problems, from its robot folder."""
     folder = installed_robots_folder() / 'panda'
     urdf, srdf = expand_xacro(folder / 'panda.urdf.xacro'), (folder / 'panda.srdf').read_text()
     return RobotModel(urdf, srdf, load_limits(folder / 'limits.yaml'))

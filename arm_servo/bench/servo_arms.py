@@ -33,7 +33,7 @@ def texts(name: str) -> tuple[str, str]:
 
 @cache
 def robot(name: str) -> RobotModel:
-    """Return a robot."""
+    """Build the main group of an installed robot folder, once for all."""
     return RobotModel(*texts(name), load_limits(installed_robots_folder() / name / 'limits.yaml'))
 
 

@@ -51,7 +51,7 @@ class DeviceRunner:
 
     @property
     def bus_name(self) -> str:
-        """Name of the bus."""
+        """Where the devices are, as `can_interface_name` writes it."""
         return self._bus.name
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:

@@ -83,7 +83,7 @@ class Findings:
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """All warnings."""
+        """What is to be looked at, as it was found; other files' included."""
         return tuple(self._warnings.values())
 
     def raise_errors(self) -> None:

@@ -175,7 +175,7 @@ class FastScan:
     following: int = 0
 
     def message(self) -> LssMessage:
-        """Return the message."""
+        """Return the question of this step, as it goes over the bus (CiA 305, fast scan)."""
         parameters = struct.pack('<IBBB', self.number, self.bit, self.part, self.following)
         return LssMessage(LssCommand.FAST_SCAN, parameters)
 

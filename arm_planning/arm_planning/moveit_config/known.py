@@ -80,17 +80,17 @@ def signed(pattern: str, sign: float) -> Known:
 
 
 def flag(pattern: str) -> Known:
-    """Return a switch."""
+    """Return parameters that are on or off."""
     return Known(pattern, 'true or false', lambda value: isinstance(value, bool))
 
 
 def text(pattern: str) -> Known:
-    """Return a text."""
+    """Return parameters with a string, whatever is in it."""
     return Known(pattern, 'a text', lambda value: isinstance(value, str))
 
 
 def texts(pattern: str) -> Known:
-    """Return a list of texts."""
+    """Return parameters with strings in order."""
 
     def fits(value: object) -> bool:
         is_list = isinstance(value, Sequence) and not isinstance(value, str | bytes)

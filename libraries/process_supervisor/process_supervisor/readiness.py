@@ -51,7 +51,7 @@ class ReadinessSocket:
         return ready
 
     def close(self) -> None:
-        """Close it."""
+        """Hear the process no more."""
         self._socket.close()
 
 

@@ -59,12 +59,12 @@ def write_parameters(path: Path, changes: Mapping[str, object]) -> None:
 
 
 def servo_parameters(servos: Iterable[JointServo]) -> Tree:
-    """Return the parameters of servos."""
+    """Return what was measured of servos, by joint as hardware_node reads it."""
     return {'joints': {servo.joint: _servo(servo) for servo in servos}}
 
 
 def imu_parameters(mounting: ImuMounting) -> Tree:
-    """Return the parameters of the mounting of the IMU."""
+    """Return how the IMU sits in the body, as hardware_node reads it; signs where checked."""
     gyro: Tree = (
         {'rate_signs': list(mounting.rate_signs), 'rates_checked': True}
         if mounting.rates_checked

@@ -15,7 +15,7 @@ _ACCESS = {Access.READ: 'R', Access.WRITE: 'W', Access.PUSH: 'push'}
 
 
 def protocol_page() -> str:
-    """Return the page."""
+    """Return PROTOCOL.md: frames, motors, registers and functions of both protocols."""
     lines = [
         '# Serial protocols of the XGO',
         '',

@@ -81,7 +81,7 @@ class PlanSequence:
 
     @property
     def client(self) -> PlanningClient:
-        """The client."""
+        """Through which it calls and sees move_group."""
         return self.motions.client
 
     @property

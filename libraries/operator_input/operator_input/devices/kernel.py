@@ -88,7 +88,7 @@ class KernelDevice:
             raise self._gone(error) from None
 
     def close(self) -> None:
-        """Close it."""
+        """Let the kernel have it back; one that was unplugged is no error."""
         with contextlib.suppress(OSError):
             self._device.close()
 

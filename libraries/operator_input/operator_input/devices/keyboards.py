@@ -72,7 +72,7 @@ class Keyboards:
         return events
 
     def close(self) -> None:
-        """Close all."""
+        """Let go of every keyboard that is open."""
         for device in self._open.values():
             device.close()
         self._open.clear()

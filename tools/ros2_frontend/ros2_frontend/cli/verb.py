@@ -20,14 +20,14 @@ class Arguments(Protocol):
     """A parser of argparse, or a group of one."""
 
     def add_argument(self, *names: str, **options: Any) -> Any:  # noqa: ANN401  # as in argparse
-        """Add an argument."""
+        """Declare an option or a positional, as argparse does."""
 
 
 class Parser(Arguments, Protocol):
     """A parser of argparse."""
 
     def add_mutually_exclusive_group(self) -> Arguments:
-        """Add a group."""
+        """Return a place for options of which one may be given."""
 
 
 Argument = Callable[[Parser], object]
