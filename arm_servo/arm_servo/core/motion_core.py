@@ -48,16 +48,10 @@ from .requests import (
 from .safety_filter import SafetyFilter
 from .set_point import SetPoint, Source
 from .settings import CoreSettings
+from .stop_distances import StopDistances
 
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
-
-ARM_DISTANCE = 0.005
-"""Least distance to another arm that moves, for what is no jog, in [m]."""
-
-UNCHECKED_CLEARANCE = 0.001
-"""Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
-that is stopped there is not in contact and can be led away. Planned paths keep as much."""
 
 MAX_JOINTS = 8
 """Joints of the longest chain that is jogged."""
@@ -110,8 +104,7 @@ class MotionCore:
         self._paused = False
         self._sequence = 0
         self._last_change = ''
-        self._loose = False
-        self._unchecked: Execution | None = None  # in the present scene
+        self._distances = StopDistances(self._settings, self._arbiter)
         self._scene = self.prepare_scene(model.scene, 0, None)
 
     @property
@@ -250,8 +243,8 @@ class MotionCore:
         self._scene = scene
         self._filter.forget()
         is_checked = self.source is Source.TRAJECTORY and scene.check is not None
-        self._unchecked = self.execution if is_checked else None
-        return self._unchecked
+        self._distances.unchecked = self.execution if is_checked else None
+        return self._distances.unchecked
 
     def conclude_check(self, execution: Execution, scene: PreparedScene, problem: str) -> None:
         """Go on with a trajectory whose path is clear in a scene, or end it on its path.
@@ -261,10 +254,10 @@ class MotionCore:
             scene: The scene; nothing is done when it does not count any more.
             problem: What is in the way; empty when nothing is.
         """
-        if scene is not self._scene or execution is not self._unchecked:
+        if scene is not self._scene or execution is not self._distances.unchecked:
             return
         if not problem:
-            self._unchecked = None
+            self._distances.unchecked = None
         elif self.motion is execution and execution.ending is None:
             self._end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, problem))
 
@@ -358,9 +351,14 @@ class MotionCore:
             speed_scaling=self.speed_scaling,
             paused=self._paused,
         )
-        clearance = self._clearance(state)
+        self._distances.update(moving=state.moving)
         after, limiter = self._filter.step(
-            state, wanted, period, clearance, now=now, apart=self._apart
+            state,
+            wanted,
+            period,
+            self._distances.between_links,
+            now=now,
+            apart=self._distances.between_arms,
         )
         self._state = after
         if limiter is not None:
@@ -374,48 +372,13 @@ class MotionCore:
         """Speed override that counts, 0 to 1: none while it is paused."""
         return 0.0 if self._paused else self._speed
 
-    def _clearance(self, state: RobotState) -> float | None:
-        """Return the distance that links must keep on a stop in [m].
-
-        None for what is on a path that was checked: a stop stays on it.
-        """
-        jogged = self.source in {Source.JOG, Source.NONE}
-        self._loose = jogged or (self._loose and state.moving and self._arbiter.brakes)
-        if self._loose:
-            return self._settings.clearance
-        is_unchecked = self._unchecked is not None and self._unchecked is self.execution
-        is_clear = self._arbiter.on_path and not is_unchecked
-        if is_clear or not self._settings.check_self_collision:
-            return None
-        return UNCHECKED_CLEARANCE if is_unchecked else 0.0
-
-    @property
-    def _apart(self) -> float | None:
-        """The distance that other arms must keep on a stop of all in [m]; None is any."""
-        if self._loose:
-            return self._settings.clearance
-        return ARM_DISTANCE if self._settings.check_self_collision else None
-
     def _give_up(self, limiter: Limiter, *, is_at_rest: bool) -> None:
         """End a motion that the safety filter does not let go on; the arm comes to rest."""
-        is_target, code = self.source is Source.TARGET, GoalCode.PATH_TOLERANCE_VIOLATED
+        code = GoalCode.PATH_TOLERANCE_VIOLATED
         if limiter.cause is Cause.COLLISION:
-            if self._filter.is_near_neighbour:
-                near = f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm'
-                where = 'to another arm; begin when that is out of the way, or keep more distance'
-                self._arbiter.end(Outcome(code, f'{near} {where}'))
-                return
-            if is_target:
-                where = 'on the way to the target from where the arm is; go around that'
-            elif self._unchecked is self.execution:
-                where = 'on the trajectory: the scene changed; lead it around that'
-            else:
-                where = (
-                    'while the arm catches up with the path; begin at rest, or give the first'
-                    ' point more time'
-                )
-            self._arbiter.end(Outcome(code, f'{limiter.name} would collide {where}'))
-        elif is_target and is_at_rest:
+            near_arm = self._filter.is_near_neighbour
+            self._arbiter.end(Outcome(code, self._distances.refusal(limiter, near_arm=near_arm)))
+        elif self.source is Source.TARGET and is_at_rest:
             self._arbiter.end(Outcome(code, f'no way to the target from here: {limiter}'))
 
     def _jog(self, request: JogRequest, now: float) -> None:

@@ -16,7 +16,7 @@ from arm_model import Array
 from process_supervisor import CallError
 
 from .observer import Watch
-from .orders import MotionEnd, MotionOrder, MotionRun, PlanningClient, SUCCESS
+from .orders import DisplayedPath, MotionEnd, MotionOrder, MotionRun, PlanningClient, SUCCESS
 from .results import apart, PlanResults, WORST_JOINT, WORST_PLACE, WORST_TURN
 
 MOTION_TIMEOUT = 120.0
@@ -158,6 +158,22 @@ class Motions:
         """Let a time in [s] pass."""
         end = self.clock() + duration
         self.wait(lambda: self.clock() > end, duration + SETTLE_TIMEOUT, 'a pause')
+
+    def ahead(self, path: DisplayedPath) -> Sequence[Array]:
+        """Return positions of all joints on what is left of a path, from where they are."""
+        observer = self.client.observer
+        rows = [observer.row(dict(zip(path.joints, row, strict=True))) for row in path.rows]
+        here = self.positions
+        passed = min(range(len(rows)), key=lambda row: float(np.abs(rows[row] - here).max()))
+        return [here, *rows[passed + 1 :]]
+
+    def share(self, path: DisplayedPath) -> float:
+        """Return which share of the way from the begin to the end of a path is done."""
+        begin, end = np.array(path.rows[0]), np.array(path.rows[-1])
+        joints = list(self.client.observer.joints)
+        here = self.positions[[joints.index(name) for name in path.joints]]
+        way = float(np.abs(end - begin).max())
+        return float(np.abs(here - begin).max()) / way if way > 0.0 else 1.0
 
     def _is_displayed(self, order: MotionOrder) -> bool:
         """Whether a viewer got a path, with the state in which it begins, that ends at a goal."""

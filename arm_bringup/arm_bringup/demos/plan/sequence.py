@@ -19,7 +19,6 @@ from .boxes import box_ahead, distance_of, Swing
 from .motions import Motions, SETTLE_TIMEOUT
 from .orders import (
     BLOCKED,
-    DisplayedPath,
     MotionEnd,
     MotionOrder,
     MotionRun,
@@ -256,12 +255,12 @@ class PlanSequence:
             lambda: run.done or (run.executing and len(client.paths) > shown), 60.0, 'motion'
         )
         self.motions.wait(
-            lambda: run.done or self._share(client.paths[-1]) > EARLY, 60.0, 'motion'
+            lambda: run.done or self.motions.share(client.paths[-1]) > EARLY, 60.0, 'motion'
         )
         path = client.paths[-1] if len(client.paths) > shown else None
         box = None
         if path is not None and not run.done:
-            box = box_ahead(arm.model, observer.scene, self._ahead(path), VISITOR)
+            box = box_ahead(arm.model, observer.scene, self.motions.ahead(path), VISITOR)
         if box is None:
             self.motions.finish(name, order, run, watch)
             self.results.problem(name, 'no place was found for a box in its way')
@@ -365,22 +364,6 @@ class PlanSequence:
         self.results.add(
             name, f'{" and ".join(goals)}, {overlap:.1f} s side by side, without a contact'
         )
-
-    def _ahead(self, path: DisplayedPath) -> Sequence[Array]:
-        """Return positions of all joints on what is left of a path, from where they are."""
-        observer = self.client.observer
-        rows = [observer.row(dict(zip(path.joints, row, strict=True))) for row in path.rows]
-        here = self.motions.positions
-        passed = min(range(len(rows)), key=lambda row: float(np.abs(rows[row] - here).max()))
-        return [here, *rows[passed + 1 :]]
-
-    def _share(self, path: DisplayedPath) -> float:
-        """Return which share of the way from the begin to the end of a path is done."""
-        begin, end = np.array(path.rows[0]), np.array(path.rows[-1])
-        joints = list(self.client.observer.joints)
-        here = self.motions.positions[[joints.index(name) for name in path.joints]]
-        way = float(np.abs(end - begin).max())
-        return float(np.abs(here - begin).max()) / way if way > 0.0 else 1.0
 
     def _stop(self, run: MotionRun, begun: float) -> str:
         """Wait until no joint moves; say how long after a time in [s] that was, and how near."""
