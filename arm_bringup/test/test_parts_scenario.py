@@ -46,7 +46,7 @@ class Client:
 
 
 @dataclass
-class Played:
+class FakeParts:
     """Parts that note what is called, and do something in the second run."""
 
     second: Callable[[], None]
@@ -59,7 +59,7 @@ class Played:
         self.called.append('set up')
 
     def run(self) -> None:
-        """Play."""
+        """Note it."""
         self.called.append('run')
         self.results.add('part', f'{self.called.count("run")}')
         if self.called.count('run') == 2:
@@ -76,14 +76,14 @@ class Played:
         self.results.warnings.append('noted')
 
 
-def played(
-    second: Callable[[PartsScenario[Client], Played], None],
-) -> tuple[PartsScenario[Client], Played, FakeSupervisor]:
+def repeated(
+    second: Callable[[PartsScenario[Client], FakeParts], None],
+) -> tuple[PartsScenario[Client], FakeParts, FakeSupervisor]:
     """Run a scenario without end; in the second run something happens."""
-    made: list[Played] = []
+    made: list[FakeParts] = []
 
-    def make(client: Client, enter: Callable[[str], None], look: Callable[[], None]) -> Played:
-        made.append(Played(lambda: second(scenario, made[0]), look))
+    def make(client: Client, enter: Callable[[str], None], look: Callable[[], None]) -> FakeParts:
+        made.append(FakeParts(lambda: second(scenario, made[0]), look))
         return made[0]
 
     scenario = PartsScenario[Client](FakeDisplay(), ['joint1'], 'cyclic_position_mode', None, make)
@@ -92,12 +92,12 @@ def played(
     return scenario, made[0], supervisor
 
 
-def fail(scenario: PartsScenario[Client], parts: Played) -> None:
+def fail(scenario: PartsScenario[Client], parts: FakeParts) -> None:
     """Find a problem."""
     parts.results.problem('part', 'it is wrong')
 
 
-def give_up(scenario: PartsScenario[Client], parts: Played) -> None:
+def give_up(scenario: PartsScenario[Client], parts: FakeParts) -> None:
     """Wait for something in vain."""
     raise CallError('nobody answers')
 
@@ -106,10 +106,10 @@ def give_up(scenario: PartsScenario[Client], parts: Played) -> None:
     ('second', 'problem'), [(fail, 'part: it is wrong'), (give_up, 'nobody answers')]
 )
 def test_parts_are_repeated_until_something_goes_wrong(
-    second: Callable[[PartsScenario[Client], Played], None], problem: str
+    second: Callable[[PartsScenario[Client], FakeParts], None], problem: str
 ) -> None:
     """One more run would hide it; the summary is that of the last one."""
-    scenario, parts, supervisor = played(second)
+    scenario, parts, supervisor = repeated(second)
     assert parts.called == ['set up', 'run', 'run', 'conclude']
     assert scenario.result.problems == [problem]
     assert scenario.result.summary == ['part  2']
@@ -120,7 +120,7 @@ def test_parts_are_repeated_until_something_goes_wrong(
 def test_ctrl_c_brings_what_moves_to_rest_before_the_processes_stop() -> None:
     """The robot moves, so the supervisor leaves it to the scenario."""
     answers: list[bool] = []
-    scenario, parts, supervisor = played(lambda each, _: answers.append(each.leave()))
+    scenario, parts, supervisor = repeated(lambda each, _: answers.append(each.leave()))
     assert answers == [True]
     assert parts.called == ['set up', 'run', 'run', 'rest', 'conclude']
     assert scenario.left

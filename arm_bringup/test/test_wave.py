@@ -28,8 +28,8 @@ from arm_bringup.exceptions import WaveError
 
 pytestmark = pytest.mark.slow
 
-PERIOD = 0.02  # [s] between targets
-OBSERVED = 10  # targets between two observations
+PERIOD = 0.04  # [s] between targets
+OBSERVED = 5  # targets between two observations
 STYLE = WaveStyle()
 ENABLED = DriveFigures(online=True, state='Operation enabled', mode='Cyclic position')
 
@@ -56,8 +56,9 @@ class Arm:
                 self.wave.observe(self.drives, self.now)
             self._count += 1
             self.now += PERIOD
-            for name, target in self.wave.targets(self.now).items():
-                if name not in self.foreign:
+            for name in self.drives:
+                target = self.wave.target(name, self.now)
+                if target is not None and name not in self.foreign:
                     self.move(name, target)
             for name, drive in self.drives.items():
                 self.tracks[name].append(drive.setpoint)
@@ -112,7 +113,7 @@ def test_a_joint_moves_from_where_it_stands_no_faster_than_planned(
         steps = [abs(after - before) for before, after in pairwise(track)]
         assert max(steps) <= swing.velocity * PERIOD * (1 + 1e-9)
         moving = next(step for step in steps if step)
-        assert moving <= 0.02 * swing.velocity * PERIOD  # from rest
+        assert moving <= 0.05 * swing.velocity * PERIOD  # from rest
         assert min(track) >= min(track[0], each.lower) - 1e-12
         assert max(track) <= max(track[0], each.upper) + 1e-12
         entered = swing.entry_duration(track[0], STYLE) + 1.0
@@ -171,14 +172,14 @@ def test_a_drive_that_somebody_else_has_gets_no_target_until_the_next_start(
     (text,) = arm.wave.departures()
     assert text.startswith('joint1 left the wave')
     assert reason in text
-    assert 'joint1' not in arm.wave.targets(arm.now)
+    assert arm.wave.target('joint1', arm.now) is None
     assert list(arm.wave.active) == [f'joint{i}' for i in (0, 2, 3, 4, 5)]
     arm.foreign.clear()
     arm.drives['joint1'] = replace(arm.drives['joint1'], mode=ENABLED.mode, state=ENABLED.state)
     rest = arm.drives['joint1'].setpoint
     arm.run(1.0)
     assert arm.drives['joint1'].setpoint == rest
-    assert len(set(arm.tracks['joint0'][-40:])) == 40
+    assert len(set(arm.tracks['joint0'][-20:])) == 20
     arm.wave.start()
     arm.run(0.6)
     assert 'joint1' in arm.wave.active
@@ -228,13 +229,13 @@ def test_before_a_start_and_after_a_stop_nobody_is_sent_anywhere() -> None:
     """The stop returns who was."""
     arm = panda()
     arm.run(1.0)
-    assert arm.wave.targets(arm.now) == {}
+    assert all(arm.wave.target(name, arm.now) is None for name in arm.drives)
     assert list(arm.wave.stop()) == []
     arm.wave.start()
     arm.run(1.0)
     assert list(arm.wave.stop()) == list(arm.drives)
     arm.run(1.0)
-    assert arm.wave.targets(arm.now) == {}
+    assert all(arm.wave.target(name, arm.now) is None for name in arm.drives)
     assert arm.wave.departures() == []
 
 

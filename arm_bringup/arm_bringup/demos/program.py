@@ -51,29 +51,29 @@ class MakeFiles(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
-    """An arm on which a demo is about to be played.
+class DemoArm:
+    """A simulated arm, for which a demo is about to be set up.
 
     Attributes:
-        arm: The arm, prepared.
+        session: Its processes, prepared.
         limits: Its joints that have a drive.
         duration: How long the demo runs in [s]; None until Ctrl-C.
         groups: Its groups that are moved; none for a demo of drives.
     """
 
-    arm: Session
+    session: Session
     limits: Mapping[str, JointRange]
     duration: float | None
     groups: MovedGroups
 
 
 @dataclass(frozen=True, slots=True)
-class Play:
-    """What a demo plays.
+class DemoSetup:
+    """What a demo runs on its arm.
 
     Attributes:
         commands: Commands to try in a second terminal.
-        make_scenario: Makes its scenario, for a display.
+        make_scenario: Makes its scenario, for a dissetup.
         make_client: Makes its ROS client, in the thread of the scenario.
         figures: The first ones, before there are any.
     """
@@ -93,7 +93,7 @@ class DemoProgram:
         description: What it does, for the help.
         duration: What ``--duration`` does, for the help.
         master: What runs the bus.
-        prepare: Makes what is played.
+        set_up: Makes what it runs on an arm.
         beside: What runs beside the drives, for the title.
         label: What its own line in the table begins with; without one it has none.
         find_robot: Finds the robot that is asked for.
@@ -107,7 +107,7 @@ class DemoProgram:
     description: str
     duration: str
     master: Executable
-    prepare: Callable[[Stage], Play]
+    set_up: Callable[[DemoArm], DemoSetup]
     beside: str = ''
     label: str = ''
     find_robot: Callable[[argparse.Namespace], Robot] = locate
@@ -173,22 +173,22 @@ class DemoProgram:
             master_files=make_files,
             plan=self.plan,
         ) as arm:
-            return self._play(arm, groups, arguments.duration)
+            return self._run_on(arm, groups, arguments.duration)
 
-    def _play(self, arm: Session, groups: MovedGroups, duration: float | None) -> int:
+    def _run_on(self, arm: Session, groups: MovedGroups, duration: float | None) -> int:
         limits = {
             name: each for name, each in joint_limits(arm.urdf).items() if name in arm.drives
         }
-        play = self.prepare(Stage(arm, limits, duration, groups))
+        setup = self.set_up(DemoArm(arm, limits, duration, groups))
         if arm.start:
             sys.stdout.write(f'{arm.start}\n')
         title = f'{arm.robot.name}: {len(arm.drives)} simulated drives on {arm.bus}{self.beside}'
         return run_demo(
             arm.processes,
             view=ArmView(title, limits, self.label),
-            figures=play.figures,
-            commands=play.commands,
-            make_scenario=play.make_scenario,
-            make_client=play.make_client,
+            figures=setup.figures,
+            commands=setup.commands,
+            make_scenario=setup.make_scenario,
+            make_client=setup.make_client,
             endless=self.endless and duration is None,
         )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the scenarios of the demos share: drives are enabled, parts played again and again."""
+"""What the scenarios of the demos share: drives are enabled, parts run again and again."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class ArmScenario(DemoScenario[DriveClientT]):
 
 
 class Parts(Protocol):
-    """What is played again and again.
+    """Motions that are run again and again.
 
     Each method but the last raises CallError, where somebody does not answer or what others rest
     on failed, GivenUpError, where the processes have ended, and EndRequested.
@@ -103,7 +103,7 @@ class Parts(Protocol):
         """Do what comes before the first part."""
 
     def run(self) -> None:
-        """Play every part once."""
+        """Run every part once."""
 
     def come_to_rest(self) -> None:
         """Cancel what is on its way, and wait for its end."""
@@ -113,12 +113,12 @@ class Parts(Protocol):
 
 
 MakeParts = Callable[[DriveClientT, Callable[[str], None], Callable[[], None]], Parts]
-"""Makes what is played, for a client; one argument is called with the name of each part, one
+"""Makes the parts, for a client; one argument is called with the name of each part, one
 often: it shows how it goes, and raises EndRequested."""
 
 
 class PartsScenario(ArmScenario[DriveClientT]):
-    """Plays parts until the time is over, once at least; after a problem no more."""
+    """Runs parts until the time is over, once at least; after a problem no more."""
 
     def __init__(
         self,
@@ -135,7 +135,7 @@ class PartsScenario(ArmScenario[DriveClientT]):
             joints: Names of the joints with a drive.
             mode_service: Service of a drive that selects the mode of streams.
             duration: How long it is repeated in [s]; None until :meth:`leave`.
-            make_parts: Makes what is played.
+            make_parts: Makes the parts.
         """
         super().__init__(display, joints, mode_service, duration)
         self._make_parts = make_parts

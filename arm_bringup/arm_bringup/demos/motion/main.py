@@ -16,7 +16,7 @@ from ...groups import MovedGroups
 from ...motion import controller_names, motion_files
 from ...robots import Robot
 from ...stack import MOTION_NODE
-from ..program import DemoProgram, Play, Stage
+from ..program import DemoArm, DemoProgram, DemoSetup
 from ..scenario import PartsScenario
 from .client import MotionClient
 from .figures import MotionFigures
@@ -75,7 +75,7 @@ def build_model(robot: Robot, urdf: str, group: str) -> RobotModel:
     )
 
 
-def prepare(stage: Stage) -> Play:
+def set_up(demo: DemoArm) -> DemoSetup:
     """Choose where the arm begins; the first group shows what it can.
 
     Raises:
@@ -83,18 +83,18 @@ def prepare(stage: Stage) -> Play:
     """
     from arm_canopen import load_bus
 
-    arm, groups = stage.arm, stage.groups
+    arm, groups = demo.session, demo.groups
     model = build_model(arm.robot, arm.urdf, groups.arms[0])
     start = choose_start(model)
     period = load_bus(arm.robot.bus_config).master.sync_period
     controller = controller_names(arm.robot, groups)[groups.names[0]]
-    return Play(
+    return DemoSetup(
         commands(controller, arm.ros),
         lambda display: PartsScenario(
             display,
-            stage.limits,
+            demo.limits,
             arm.mode_service,
-            stage.duration,
+            demo.duration,
             lambda client, enter, look: MotionSequence(client, model, start, period, enter, look),
         ),
         lambda given_up: MotionClient(given_up, model, controller, period, arm.ros.namespace),
@@ -123,7 +123,7 @@ DEMO = DemoProgram(
     'in its middle, and one that is canceled. Ends with what was measured.',
     duration='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
     master=MOTION_NODE,
-    prepare=prepare,
+    set_up=set_up,
     label='motion',
     files=demo_files,
     errors=(ArmError,),

@@ -24,7 +24,7 @@ from ...motion import controller_names, planning_files
 from ...robots import Robot
 from ...session import locate
 from ...stack import MOTION_NODE
-from ..program import DemoProgram, Play, Stage
+from ..program import DemoArm, DemoProgram, DemoSetup
 from ..scenario import PartsScenario
 from .boxes import find_swing
 from .client import PlanClient
@@ -160,22 +160,22 @@ class Robots:
         return flange_tool(model, home), ''
 
 
-def prepare(stage: Stage) -> Play:
+def set_up(demo: DemoArm) -> DemoSetup:
     """Find a workcell for the first arm, and a motion for each other one.
 
     Raises:
         ModelError: The files do not make arms, or one has no pose to start from.
     """
-    arm = stage.arm
-    arms = Robots(arm.robot, arm.urdf, stage.groups).arms()
+    arm = demo.session
+    arms = Robots(arm.robot, arm.urdf, demo.groups).arms()
     observer, root = Observer(arm.urdf, arms[0].model), read_urdf(arm.urdf).root
-    return Play(
+    return DemoSetup(
         commands(arm.ros),
         lambda display: PartsScenario(
             display,
-            stage.limits,
+            demo.limits,
             arm.mode_service,
-            stage.duration,
+            demo.duration,
             lambda client, enter, look: PlanSequence(
                 arms, enter, Motions(client, PlanResults(), look)
             ),
@@ -204,7 +204,7 @@ DEMO = DemoProgram(
     'arms move in the same scene. Ends with what was measured at the joint states.',
     duration='repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
     master=MOTION_NODE,
-    prepare=prepare,
+    set_up=set_up,
     beside=', and move_group',
     label='plan',
     find_robot=with_gripper,

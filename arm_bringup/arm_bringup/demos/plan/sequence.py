@@ -46,7 +46,7 @@ VISITOR = 'visitor'
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
-    """An arm that plays.
+    """An arm of the demo.
 
     Attributes:
         model: The arm.

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+import itertools
 import threading
 import time
 
@@ -17,7 +18,7 @@ from ..client import ArmClient
 from ..figures import Figures
 from .wave import Wave
 
-PERIOD = 0.02
+PERIOD = 0.04
 """Time between two targets of a drive in [s]."""
 START = 'wave/start'
 """Service that takes drives back into the wave."""
@@ -66,10 +67,15 @@ class WaveClient(ArmClient):
             return self._wave.departures()
 
     def _send(self) -> None:
-        while not self._ended.wait(PERIOD):
+        """Send to one drive after the other: many messages at a time would hold up their cycle."""
+        pause = PERIOD / len(self._publishers)
+        for name, publisher in itertools.cycle(self._publishers.items()):
+            if self._ended.wait(pause):
+                return
             with self._lock:  # what is stopped in it gets no target any more
-                for name, target in self._wave.targets(time.monotonic()).items():
-                    self._publishers[name].publish(Float64(data=target))
+                target = self._wave.target(name, time.monotonic())
+                if target is not None:
+                    publisher.publish(Float64(data=target))
 
     def _take(self, message: DiagnosticArray) -> None:
         super()._take(message)

@@ -17,7 +17,7 @@ from ...groups import joints_of_groups, moved_groups, MovedGroups
 from ...robots import Robot
 from ...stack import MASTER
 from ..figures import Figures
-from ..program import DemoProgram, Play, Stage
+from ..program import DemoArm, DemoProgram, DemoSetup
 from .plan import plan_wave, WaveStyle
 from .scenario import Client, WaveScenario
 from .wave import Wave
@@ -74,25 +74,25 @@ def waving_joints(robot: Robot, drives: Collection[str]) -> Collection[str]:
     return list(itertools.chain(*joints.values()))
 
 
-def prepare(stage: Stage) -> Play:
+def set_up(demo: DemoArm) -> DemoSetup:
     """Plan the wave.
 
     Raises:
         WaveError: No joint has a drive, or one cannot swing.
     """
-    arm = stage.arm
+    arm = demo.session
     for name in sorted(set(arm.drives) - set(joint_limits(arm.urdf))):
         sys.stdout.write(
             f'warning: no joint of the description is called {name!r}; its drive stands still\n'
         )
     waving, style = waving_joints(arm.robot, arm.drives), WaveStyle()
-    joints = {name: limits for name, limits in stage.limits.items() if name in waving}
+    joints = {name: limits for name, limits in demo.limits.items() if name in waving}
     wave = Wave(plan_wave(joints, [name for name in arm.drives if name in joints], style), style)
     bus_config = os.path.relpath(arm.robot.bus_config)
     candump = f'ros2 run canopen_tools candump {arm.bus} --bus-config {bus_config}'
-    return Play(
+    return DemoSetup(
         commands(arm.drives[0], arm.mode_service, candump, arm.ros),
-        lambda display: WaveScenario(display, joints, arm.mode_service, stage.duration),
+        lambda display: WaveScenario(display, joints, arm.mode_service, demo.duration),
         partial(join_ros, wave, arm.ros.namespace),
         Figures(),
     )
@@ -107,7 +107,7 @@ DEMO = DemoProgram(
     'joints were enabled, moved (it takes them 5 s to get going) and followed (default: until '
     'Ctrl-C)',
     master=MASTER,
-    prepare=prepare,
+    set_up=set_up,
     endless=True,
 )
 main = DEMO.main  # the entry point

@@ -76,8 +76,6 @@ class Wave:
         left, self._left = self._left, []
         return left
 
-    def targets(self, now: float) -> Mapping[str, float]:
-        """Return where each drive that is in it is to be at a time, in [rad] or [m]."""
-        omega = self._style.omega
-        targets = {name: axis.target(now, omega) for name, axis in self._axes.items()}
-        return {name: target for name, target in targets.items() if target is not None}
+    def target(self, name: str, now: float) -> float | None:
+        """Return where a drive is to be at a time, in [rad] or [m]; None when it is not in it."""
+        return self._axes[name].target(now, self._style.omega)
