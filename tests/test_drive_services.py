@@ -138,5 +138,5 @@ def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
         stopped = arm.client.trigger(f'{JOINT}/quick_stop')
         assert stopped.success, stopped.message
         stream.publish(Float64(data=0.5))
-        arm.master.wait_for('~/target: panda_joint4 takes no target')
+        arm.master.wait_for('~/target: panda_joint4 takes no stream of targets')
         assert 'Switch on disabled' in arm.client.trigger(f'{JOINT}/shutdown').message
