@@ -73,7 +73,7 @@ class DemoSetup:
 
     Attributes:
         commands: Commands to try in a second terminal.
-        make_scenario: Makes its scenario, for a dissetup.
+        make_scenario: Makes its scenario, for a display.
         make_client: Makes its ROS client, in the thread of the scenario.
         figures: The first ones, before there are any.
     """
