@@ -15,7 +15,7 @@ import pytest
 from urdf_reader import JointRange
 
 from arm_bringup.demos.figures import DriveFigures
-from arm_bringup.demos.wave.axis import PATIENCE, STANDING
+from arm_bringup.demos.wave.axis import READY_WITHIN, STANDING
 from arm_bringup.demos.wave.plan import (
     plan_swing,
     plan_wave,
@@ -217,11 +217,11 @@ def test_a_drive_that_moves_or_has_no_mode_yet_is_waited_for_a_little(*, moves: 
         arm.drives['joint1'] = replace(arm.drives['joint1'], mode=ENABLED.mode)
         arm.run(3 * OBSERVED * PERIOD)
 
-    keep(PATIENCE - 2)
+    keep(READY_WITHIN - 2)
     assert 'joint1' in arm.wave.active
     arm.wave.stop()
     arm.wave.start()
-    keep(PATIENCE)
+    keep(READY_WITHIN)
     assert 'joint1' not in arm.wave.active
 
 

@@ -51,7 +51,7 @@ class ReadinessSocket:
         return ready
 
     def close(self) -> None:
-        """Hear the process no more."""
+        """Close the socket; what the process reports from now on is lost."""
         self._socket.close()
 
 

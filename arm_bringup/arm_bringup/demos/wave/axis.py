@@ -10,7 +10,7 @@ import math
 from ..figures import AxisFigures, DriveFigures
 from .plan import Swing, WaveStyle
 
-PATIENCE = 5
+READY_WITHIN = 5
 """Observations within which a drive that was asked for has to be ready; later it stays out."""
 STANDING = 3
 """Observations in which a set-point stands beside the wave before it is somebody else's."""
@@ -90,7 +90,7 @@ class WaveAxis:
 
     def ask(self) -> None:
         """Let it take part as soon as it stands and can follow."""
-        self._asked = PATIENCE
+        self._asked = READY_WITHIN
 
     def target(self, now: float, omega: float) -> float | None:
         """Return where it is to be; None when it takes no part.
