@@ -22,6 +22,7 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 
 from arm_msgs.srv import InjectFault
+from robot_viewer.page.target_panel import UNLOCK
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -64,6 +65,12 @@ class Seen:
         """Show a tab of the page."""
         self.page.get_by_role('tab', name=tab).click()
         return self.page
+
+    def unlock(self) -> None:
+        """Let the sliders send again, where there was a STOP before."""
+        button = self.page.get_by_role('button', name=UNLOCK)
+        if button.is_visible():
+            button.click()
 
     def position(self, joint: str = 'panda_joint1') -> float:
         """Return where a joint is in [rad]."""
@@ -121,6 +128,7 @@ def seen() -> Iterator[Seen]:
 def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
     """The robot is drawn; its joint states follow the slider; another page shows the same."""
     page, other = seen.show(TARGETS), chromium.open_page(seen.browser, seen.url)
+    seen.unlock()
     other.get_by_role('tab', name=TARGETS).click()
     before = chromium.picture(page, 'arm')
     assert chromium.colors_of_scene(before) > 100
@@ -155,6 +163,7 @@ def test_stop_of_any_page_ends_a_jog(seen: Seen) -> None:
 def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     """The arm stands on the way, and the page says so; the key presses no button."""
     page = seen.show(TARGETS)
+    seen.unlock()
     chromium.drag(page, JOINT1, 0.1)
     wanted = chromium.slider_value(page, JOINT1)
     seen.wait(seen.moves, 'a motion')
@@ -163,6 +172,14 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     assert abs(seen.position() - wanted) > 0.2
     page.get_by_text('halted').wait_for()
     chromium.picture(page, 'stopped')
+    page.get_by_role('button', name=UNLOCK).wait_for()
+    chromium.drag(page, JOINT1, 0.1)  # as if one were dragged on, or late
+    seen.wait_for_rest()
+    assert abs(seen.position() - wanted) > 0.2
+    seen.unlock()
+    chromium.drag(page, JOINT1, 0.1)
+    seen.wait(seen.moves, 'a motion again')
+    page.get_by_text('target: reached').wait_for()
 
 
 @pytest.mark.parametrize('way', ['asleep', 'elsewhere'])

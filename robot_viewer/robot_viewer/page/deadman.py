@@ -65,22 +65,3 @@ class Deadman:
             return False
         self._holder, self._last = page, now
         return gap >= LEAST_GAP
-
-
-class StopLatch:
-    """After a stop nothing counts that goes on from before it: a slider that is dragged."""
-
-    def __init__(self) -> None:
-        """Begin with nothing stopped."""
-        self._stopped = False
-        self._last = -math.inf
-
-    def stop(self, now: float) -> None:
-        """Let nothing count until there was silence for a moment; steady time in [s]."""
-        self._stopped, self._last = True, now
-
-    def passes(self, now: float) -> bool:
-        """Take what somebody did at a steady time in [s]; return whether it counts."""
-        gap, self._last = now - self._last, now
-        self._stopped = self._stopped and gap < RELEASED_AFTER
-        return not self._stopped

@@ -27,7 +27,7 @@ from viser import (
 )
 
 from .aim import History
-from .deadman import Deadman, HEARTBEAT, StopLatch
+from .deadman import Deadman, HEARTBEAT
 from .drive_table import drive_html
 from .gate import Gate
 from .overlay import Overlay
@@ -128,7 +128,7 @@ class RobotPage:
             actions: What people do on it.
         """
         self._actions = actions
-        self._deadman, self._latch = Deadman(), StopLatch()
+        self._deadman = Deadman()
         gate = Gate(host, Overlay(self._stop))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
@@ -287,7 +287,7 @@ class RobotPage:
         known = [movable[name] for name in joints if name in movable]
         with self._tab('Targets'):
             self._targets[controller] = TargetPanel(
-                self._server, known, self._latch, partial(self._actions.aim, controller)
+                self._server, known, partial(self._actions.aim, controller)
             )
         return True
 
@@ -330,7 +330,8 @@ class RobotPage:
 
     def _stop(self) -> None:
         self._deadman.stop()  # or a button that is held would go on
-        self._latch.stop(time.monotonic())  # or a slider that is dragged
+        for panel in list(self._targets.values()):
+            panel.lock()  # or a slider that is dragged
         self._actions.stop()
 
     def say(self, text: str, *, failed: bool = False) -> None:

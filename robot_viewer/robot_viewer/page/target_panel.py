@@ -19,11 +19,11 @@ from viser import (
 )
 
 from .aim import History, KEPT
-from .deadman import StopLatch
 from .robot_scene import travel
 
 UNTOUCHED = 1.0
 """Time in [s] after which a slider follows its joint again."""
+UNLOCK = 'Stopped: let the sliders send again'
 HEIGHT = 170
 """Of a plot in [px]."""
 TARGET_COLOR, POSITION_COLOR, ERROR_COLOR = '#e8590c', '#1971c2', '#c2255c'
@@ -35,25 +35,24 @@ Aim = Callable[[Mapping[str, float], float], None]
 class TargetPanel:
     """A slider for each joint of a controller: whoever moves one sends all where they show.
 
-    Only what a person does in a browser sends anything; sliders that follow the robot do not.
+    Only what a person does in a browser sends anything; sliders that follow the robot do not, nor
+    do any after STOP until they are unlocked.
     """
 
-    def __init__(
-        self, server: ViserServer, joints: Sequence[Joint], latch: StopLatch, aim: Aim
-    ) -> None:
+    def __init__(self, server: ViserServer, joints: Sequence[Joint], aim: Aim) -> None:
         """Add it to the tab that is open.
 
         Args:
             server: Of the page.
             joints: The joints that move together.
-            latch: After STOP no slider counts until nobody has moved one for a moment.
             aim: Sends them somewhere.
         """
         self._aim = aim
-        self._latch = latch
         self._touched = 0.0
         gui = server.gui
         gui.add_markdown('Moves to where a slider is put; STOP ends it.')
+        self._unlock = gui.add_button(UNLOCK, color='orange', visible=False)
+        self._unlock.on_click(lambda _: self._set_locked(locked=False))
         self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 20.0)
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
         for joint in joints:
@@ -76,12 +75,19 @@ class TargetPanel:
             if abs(position - slider.value) > slider.step:
                 slider.value = position  # type: ignore[misc]  # it has a setter
 
+    def lock(self) -> None:
+        """Send nothing until somebody unlocks the sliders: one may be dragged, or be late."""
+        self._set_locked(locked=True)
+
+    def _set_locked(self, *, locked: bool) -> None:
+        self._unlock.visible = locked
+
     def _moved(self, event: GuiEvent[GuiSliderHandle[float]]) -> None:
         if event.client_id is None:  # it follows its joint
             return
-        self._touched = now = time.monotonic()
-        if not self._latch.passes(now):
+        if self._unlock.visible:
             return
+        self._touched = time.monotonic()
         targets = {name: slider.value for name, slider in self._sliders.items()}
         self._aim(targets, self._speed.value / 100.0)
 
