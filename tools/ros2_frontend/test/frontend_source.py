@@ -3,10 +3,13 @@
 """Publishes numbered messages for the recording tests.
 
 The number of messages and their period [s] are arguments; the first waits for the subscriptions.
+After SIGUSR1 as many follow once more.
 """
 
 from __future__ import annotations
 
+from itertools import count
+import signal
 import sys
 import time
 
@@ -25,7 +28,8 @@ BEST_EFFORT = QoSProfile(  # type: ignore[no-untyped-call]
 
 def main() -> None:
     """Publish, and print `published`."""
-    count, period = int(sys.argv[1]), float(sys.argv[2])
+    length, period = int(sys.argv[1]), float(sys.argv[2])
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
     rclpy.init()
     node = Node('source')
     latched = node.create_publisher(String, 'latched', LATCHED)
@@ -36,13 +40,13 @@ def main() -> None:
     while not (numbers.get_subscription_count() and loose.get_subscription_count()):
         time.sleep(0.01)
     print('connected', flush=True)
-    for number in range(count):
+    for number in count():
         numbers.publish(UInt32(data=number))
         loose.publish(UInt32(data=number))
         time.sleep(period)
-    print('published', flush=True)
-    while True:
-        time.sleep(1.0)
+        if (number + 1) % length == 0:
+            print('published', flush=True)
+            signal.sigwait({signal.SIGUSR1})
 
 
 if __name__ == '__main__':

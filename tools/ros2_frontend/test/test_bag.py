@@ -196,24 +196,27 @@ def test_a_split_recording_with_compression(
 
 
 def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_path: Path) -> None:
-    """A recorder that keeps ten messages is stopped while a thousand come."""
+    """A recorder that keeps a hundred messages is stopped while a thousand more come."""
     overrides = tmp_path / 'qos.yaml'
-    overrides.write_text('/numbers: {history: keep_last, depth: 10}\n')
+    overrides.write_text('/numbers: {history: keep_last, depth: 100}\n')
     folder = tmp_path / 'bag'
     words = ['--topics', '/numbers', '/loose', '--qos-profile-overrides-path', str(overrides)]
     with record(env, folder, *words) as recorder:
         recorder.wait_for(RECORDING)
-        with source(env, 2000) as publisher:
-            recorder.wait_for("Subscribed to topic '/numbers'")
-            publisher.wait_for('connected')
-            recorder.signal(signal.SIGSTOP)
+        with source(env, 1000) as publisher:
             publisher.wait_for('published')
+            file = folder / 'bag_0.mcap'
+            until(lambda: b'/numbers' in file.read_bytes(), recorder)
+            recorder.signal(signal.SIGSTOP)
+            publisher.signal(signal.SIGUSR1)
+            publisher.wait_for('published', count=2)
             recorder.signal(signal.SIGCONT)
             recorder.wait_for("messages of '/numbers' were lost")
             recorder.stop()
     numbers = read(folder)['/numbers']
-    # what came before the first one that arrived is no gap
-    lost = 2000 - int(str(numbers[0])) - len(numbers)
+    # what came before the first one that arrived, and after the last one, is no gap
+    first, last = int(str(numbers[0])), int(str(numbers[-1]))
+    lost = last - first + 1 - len(numbers)
     assert lost > 0
     assert f'/numbers: {lost}' in recorder.output
 
