@@ -10,6 +10,7 @@ from typing import Any, TYPE_CHECKING
 
 import rclpy
 from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -112,7 +113,7 @@ class RosClient:
         """Leave the domain."""
         self._executor.shutdown()
         for waitable in list(self.node.waitables):
-            if isinstance(waitable, ActionClient):  # rclpy leaves it, and it keeps the node alive
-                waitable.destroy()
+            if isinstance(waitable, (ActionClient, ActionServer)):
+                waitable.destroy()  # rclpy leaves it, and it keeps the node in its domain
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
