@@ -33,6 +33,9 @@ PATIENT = {'joint_state_timeout': '3.0', 'following_delay': '0.8'}
 PANDA = {'/forward_position_controller/commands': JOINTS}
 """Joints of the topics on which set-points of the Panda arrive."""
 
+KEPT = 1000
+"""How many set-points wait for the drives: one that a busy machine loses looks like a jump."""
+
 RECEIVED_STATES = 10
 """Joint states that a subscriber has received before the arm counts as there."""
 
@@ -109,7 +112,7 @@ class TopicArm:
         self._states = node.create_publisher(JointState, '/joint_states', 10)
         for topic, names in topics.items():
             take = partial(self._take_array, self.joints.index(names[0]))
-            node.create_subscription(Float64MultiArray, topic, take, 10)
+            node.create_subscription(Float64MultiArray, topic, take, KEPT)
         node.create_subscription(
             JointTrajectory, f'{CONTROLLER}/joint_trajectory', self._take_trajectory, 10
         )
