@@ -9,6 +9,7 @@ from collections.abc import Callable, Collection, Iterator
 import contextlib
 from dataclasses import dataclass, replace
 import heapq
+import os
 from pathlib import Path
 import re
 import struct
@@ -16,9 +17,10 @@ import tempfile
 from typing import IO
 
 from mcap.exceptions import McapError
-from mcap.reader import make_reader
+from mcap.reader import FOOTER_SIZE, make_reader
 from mcap.records import Channel, Message, Schema
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.summary import Summary
 import zstandard
 
 from .exceptions import BagError
@@ -230,18 +232,23 @@ def _in_order(
 
 def has_index(stream: IO[bytes]) -> bool:
     """Whether the messages of a file can be found by time without reading all of it."""
-    try:
-        summary = make_reader(stream).get_summary()
-    except _DAMAGE:
-        return False
+    summary = _summary(stream)
     return summary is not None and bool(summary.chunk_indexes)
 
 
+def _summary(stream: IO[bytes]) -> Summary | None:
+    """Return what the end of a file says of it; None where that is missing or damaged."""
+    if stream.seek(0, os.SEEK_END) < FOOTER_SIZE + MAGIC_SIZE:
+        return None  # the library would seek to before the begin
+    try:
+        return make_reader(stream).get_summary()
+    except _DAMAGE:
+        return None
+
+
 def _definitions(stream: IO[bytes]) -> dict[str, str]:
-    schemas: list[Schema] = []
-    with contextlib.suppress(*_DAMAGE):
-        summary = make_reader(stream).get_summary()
-        schemas = list(summary.schemas.values()) if summary else []
+    summary = _summary(stream)
+    schemas = list(summary.schemas.values()) if summary else []
     return {schema.name: schema.data.decode() for schema in schemas}
 
 
