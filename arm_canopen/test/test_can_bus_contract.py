@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 import math
 import socket
-from threading import Barrier, Thread
+from threading import Barrier, Thread, Timer
 from time import monotonic
 from typing import TypeAlias
 
@@ -159,6 +159,15 @@ def test_receive_returns_what_is_there_although_it_could_wait(connect: Open) -> 
     sender, receiver = connect(), connect()
     sender.send(Frame(1))
     assert unstamped(receiver.receive(math.inf)) == [Frame(1)]
+
+
+def test_a_wait_without_an_end_lasts_until_it_is_woken(connect: Open) -> None:
+    """However far the receiver has come by then."""
+    bus = connect()
+    alarm = Timer(0.05, bus.wake)
+    alarm.start()
+    assert bus.receive(math.inf) == []
+    alarm.join(DEADLINE)
 
 
 def test_wake_ends_a_wait_in_another_thread(connect: Open) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from threading import Condition, Lock
+from threading import Condition, Lock, TIMEOUT_MAX
 from time import monotonic
 from weakref import WeakValueDictionary
 
@@ -63,7 +63,7 @@ class VirtualBus(Bus):
     def receive(self, timeout: float) -> list[Frame]:
         """Wait for frames; see :meth:`Bus.receive`."""
         with self._arrived:
-            self._arrived.wait_for(self._is_ready, timeout=max(0.0, timeout))
+            self._arrived.wait_for(self._is_ready, min(max(0.0, timeout), TIMEOUT_MAX))
             if self._closed:
                 raise BusError(f'{self.name} is closed')
             self._woken = False
