@@ -27,6 +27,7 @@ from .requests import ImmediateRequest, JogRequest, MotionRequest, PauseRequest,
 from .scene_exchange import SceneExchange
 from .set_point import JOGGING, MOTIONS, SetPoint, Source
 from .snapshot import Snapshot
+from .trajectory_stream import TrajectoryStream
 
 MAX_QUEUED_JOGS = 1000
 """Jog commands that may wait for the cycle."""
@@ -49,6 +50,7 @@ class CommandGateway:
     Attributes:
         model: The arm.
         holds: Which clients hold a jog, and have to let go after the arm had stopped following.
+        stream: What comes on the topic of trajectories, and ends in the same way.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class CommandGateway:
         self._clock = clock
         self._order = CommandOrder()
         self.holds = HoldToRun()
+        self.stream = TrajectoryStream(clock)
         self._motions = MotionQueue(
             core, self._orders, self._order, worker, clock, rest=self._rest
         )
@@ -87,7 +90,7 @@ class CommandGateway:
         return self._snapshot
 
     def command(
-        self, request: ImmediateRequest, get_ready: Callable[[], None] = lambda: None
+        self, request: ImmediateRequest, get_ready: Callable[[], object] = lambda: None
     ) -> Future[None]:
         """Have a jog, a stop, a pause or a speed override count from the next cycle on.
 
@@ -136,7 +139,7 @@ class CommandGateway:
         return future
 
     def request(
-        self, request: MotionRequest, get_ready: Callable[[], None] = lambda: None
+        self, request: MotionRequest, get_ready: Callable[[], object] = lambda: None
     ) -> MotionCommand:
         """Have a motion prepared, and begun when it is found to be clear.
 
@@ -189,6 +192,8 @@ class CommandGateway:
             positions: Positions last commanded to the drives in [rad].
         """
         self._core.reset(positions)
+        if self.stream.begin():
+            self._order.void((Source.TRAJECTORY,), BEGINS)
         if self.holds.begin(self._clock()):
             self._order.void((Source.JOG,), BEGINS)
 
@@ -295,6 +300,7 @@ class CommandGateway:
     def _interrupt(self, reason: str) -> None:
         self._order.void(MOTIONS, reason)
         self.holds.interrupt(reason, self._clock())
+        self.stream.interrupt(reason)
 
     def _rest(self) -> RobotState | None:
         """Return where the arm stands while others have its drives; None where it follows."""

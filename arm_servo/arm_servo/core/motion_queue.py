@@ -77,7 +77,7 @@ class MotionCommand:
     request: MotionRequest
     number: int
     requested: float
-    get_ready: Callable[[], None] = lambda: None
+    get_ready: Callable[[], object] = lambda: None
     future: Future[Execution | None] = field(default_factory=Future)
     ended: Future[Outcome] = field(default_factory=Future)
     motion: Motion | None = None
@@ -137,7 +137,7 @@ class MotionQueue:
         self._waiting: deque[MotionCommand] = deque()
         self._preparing: MotionCommand | None = None
 
-    def request(self, request: MotionRequest, get_ready: Callable[[], None]) -> MotionCommand:
+    def request(self, request: MotionRequest, get_ready: Callable[[], object]) -> MotionCommand:
         """Have a motion prepared, and begun when it is found to be clear.
 
         Args:

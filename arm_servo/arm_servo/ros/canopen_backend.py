@@ -79,10 +79,12 @@ class BusDrives:
         """Whether the cycle asks for set-points."""
         return bool(self.gateway.snapshot.time)
 
-    def prepare(self) -> None:
+    def prepare(self) -> bool:
         """Get back the drives that were taken away, for the motion that follows."""
-        if self._source.detached:
+        is_detached = self._source.detached
+        if is_detached:
             self._source.attach(self._master.attach)
+        return is_detached
 
 
 def _check_drives(master: MasterProcess, model: RobotModel) -> None:

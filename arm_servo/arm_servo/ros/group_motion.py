@@ -47,8 +47,13 @@ class Drives(Protocol):
     def gateway(self) -> CommandGateway:
         """Commands to the core."""
 
-    def prepare(self) -> None:
-        """Get back drives that were taken away, for the motion that follows."""
+    def prepare(self) -> bool:
+        """Get back drives that were taken away, for the motion that follows.
+
+        Returns:
+            Whether there were any.
+        """
+        ...
 
 
 AnyDrives = TypeVar('AnyDrives', bound=Drives)

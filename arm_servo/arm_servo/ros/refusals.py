@@ -17,13 +17,32 @@ NUMBER_PATTERN = re.compile(r'(?<![\w.])\d+(\.\d+)?')
 """What differs from message to message of one stream, such as the age of its stamps."""
 
 
+class LoggedReasons:
+    """Which reasons of one stream are in the log already."""
+
+    def __init__(self) -> None:
+        """None is."""
+        self._logged = ('', -math.inf)
+
+    def is_new(self, reason: str, now: float) -> bool:
+        """Return whether a reason is to be logged; one that differs in numbers only is not.
+
+        Args:
+            reason: Why something was refused.
+            now: Steady time in [s].
+        """
+        kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
+        self._logged = (kind, now)
+        return kind != logged or now - seen >= REPEAT_PERIOD
+
+
 class Refusals:
     """Remembers the last refusal; any thread may note one, a single thread reports."""
 
     def __init__(self) -> None:
         """Nothing was refused yet."""
         self._last = ('', -math.inf)
-        self._logged = ('', -math.inf)
+        self._logged = LoggedReasons()
 
     def note(self, reason: str, now: float) -> None:
         """Note why a command was refused.
@@ -54,8 +73,4 @@ class Refusals:
             now: Steady time in [s].
         """
         reason = self.fresh(now)
-        if not reason:
-            return ''
-        kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
-        self._logged = (kind, now)
-        return '' if kind == logged and now - seen < REPEAT_PERIOD else reason
+        return reason if reason and self._logged.is_new(reason, now) else ''

@@ -227,5 +227,6 @@ class TopicDrives:
         cycle = MotionCycle(self.gateway, feedback, publish, watch)
         self.thread = MotionThread(cycle, loop.period, begin)
 
-    def prepare(self) -> None:
-        """Do nothing: whoever has the drives keeps them."""
+    def prepare(self) -> bool:
+        """Return that nothing was got back: whoever has the drives keeps them."""
+        return False

@@ -27,6 +27,10 @@ NEAR = 0.01
 SETTLING_TIMEOUT = 1.0
 """Time in [s] after the end of a motion at which it is looked at."""
 
+SILENCE = 1.2
+"""Time in [s] in which nothing is sent before an empty trajectory says that a stop was seen: the
+controller takes it for the end of a stream after a second."""
+
 Report = Callable[[str, bool], None]
 """Takes what became of a motion, and whether it failed."""
 
@@ -42,6 +46,8 @@ class Controller:
         wanted: Targets that were not sent yet, and the share of the greatest velocity.
         targets: Where the joints are on their way to; empty when they are not.
         ends: Steady time at which they are there in [s].
+        sent: Steady time of the last trajectory in [s].
+        lets_go: The robot was stopped, and nothing was sent since.
     """
 
     commands: Publisher
@@ -50,6 +56,8 @@ class Controller:
     wanted: tuple[Mapping[str, float], float] | None = None
     targets: Mapping[str, float] = field(default_factory=dict)
     ends: float = -math.inf
+    sent: float = -math.inf
+    lets_go: bool = False
 
     @property
     def busy(self) -> bool:
@@ -106,7 +114,7 @@ class Controllers:
     def _follow(self, name: str) -> Controller:
         command = import_module('trajectory_msgs.msg').JointTrajectory
         state = import_module('control_msgs.msg').JointTrajectoryControllerState
-        publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=1))
+        publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=2))
         controller = Controller(publisher)
         take = partial(self._take, controller)
         self._node.create_subscription(state, f'{name}{STATE}', take, qos_profile_sensor_data)
@@ -132,7 +140,7 @@ class Controllers:
     def stop(self) -> None:
         """Send nothing that was not sent yet, and wait for nothing: the robot was stopped."""
         for controller in self.found.values():
-            controller.wanted, controller.targets = None, {}
+            controller.wanted, controller.targets, controller.lets_go = None, {}, True
 
     def advance(self, velocities: Mapping[str, float]) -> None:
         """Send what is wanted, and report what was reached.
@@ -142,12 +150,17 @@ class Controllers:
         """
         now = time.monotonic()
         for controller in self.found.values():
-            if controller.wanted is not None and controller.positions:
+            if controller.wanted is not None and controller.lets_go:
+                if now - controller.sent > SILENCE:
+                    controller.commands.publish(_empty())
+                    controller.lets_go = False
+            elif controller.wanted is not None and controller.positions:
                 (targets, share), controller.wanted = controller.wanted, None
                 duration = motion_time(controller.positions, targets, velocities, share)
                 # what is not on the page stays where it is
                 controller.targets = {**controller.positions, **targets}
                 controller.ends = now + duration
+                controller.sent = now
                 controller.commands.publish(_trajectory(controller, duration))
             elif controller.busy and controller.arrived:
                 self._conclude(controller, 'target: reached', failed=False)
@@ -158,6 +171,10 @@ class Controllers:
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}
         self._report(text, failed)
+
+
+def _empty() -> Any:  # noqa: ANN401
+    return import_module('trajectory_msgs.msg').JointTrajectory()
 
 
 def _trajectory(controller: Controller, duration: float) -> Any:  # noqa: ANN401

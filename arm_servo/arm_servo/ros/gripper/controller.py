@@ -65,7 +65,7 @@ class GripperController:
         gateway: CommandGateway,
         parameters: GripperParameters,
         check_active: Callable[[], None],
-        prepare: Callable[[], None],
+        prepare: Callable[[], object],
     ) -> None:
         """Offer them; the first only for a gripper of one joint.
 

@@ -52,7 +52,7 @@ class Servo:
         node: Node,
         gateway: CommandGateway,
         parameters: ServoParameters,
-        prepare: Callable[[], None],
+        prepare: Callable[[], object],
     ) -> None:
         """Offer them.
 

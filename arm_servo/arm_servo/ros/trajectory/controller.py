@@ -28,6 +28,7 @@ from ...core.motion_queue import MotionCommand
 from ...core.requests import SpeedRequest, StopRequest
 from ...core.set_point import Source
 from ...exceptions import NotReadyError
+from ..refusals import LoggedReasons
 from .action import TrajectoryAction
 from .messages import difference, goal_of_action, goal_of_trajectory, point_of
 from .parameters import TrajectoryParameters
@@ -46,7 +47,7 @@ class TrajectoryController:
         node: Node,
         gateway: CommandGateway,
         parameters: TrajectoryParameters,
-        prepare: Callable[[], None],
+        prepare: Callable[[], bool],
     ) -> None:
         """Offer them.
 
@@ -54,7 +55,8 @@ class TrajectoryController:
             node: The controller's node.
             gateway: Commands to the core.
             parameters: How it behaves.
-            prepare: Called before a trajectory that is not refused, to get the drives back.
+            prepare: Called before a trajectory that is not refused, to get the drives back;
+                returns whether they were away.
         """
         self.active = True
         self._node = node
@@ -63,6 +65,7 @@ class TrajectoryController:
         self._prepare = prepare
         self._execution: Execution | None = None
         self._news: deque[str] = deque()
+        self._logged = LoggedReasons()
         self._state = node.create_publisher(
             JointTrajectoryControllerState, '~/controller_state', 10
         )
@@ -81,9 +84,10 @@ class TrajectoryController:
     def set_active(self, active: bool) -> None:  # a callback of the manager
         """Take trajectories, or stop on the path and take none."""
         self.active = active
-        if not active:
-            stop = StopRequest('the controller was deactivated', (Source.TRAJECTORY,))
-            self._gateway.command(stop)
+        if active:
+            self._gateway.stream.renew()
+        else:
+            self._stop('the controller was deactivated')
 
     @property
     def _now(self) -> float:
@@ -93,10 +97,16 @@ class TrajectoryController:
         return goal_of_action(request, self._now, self._parameters)
 
     def _follow(self, goal: TrajectoryGoal) -> MotionCommand:
+        return self._request(goal, self._prepare)
+
+    def _request(self, goal: TrajectoryGoal, get_ready: Callable[[], object]) -> MotionCommand:
         self.check_active()
-        command = self._gateway.request(goal, self._prepare)
+        command = self._gateway.request(goal, get_ready)
         command.future.add_done_callback(self._remember)
         return command
+
+    def _stop(self, reason: str) -> None:
+        self._gateway.command(StopRequest(reason, (Source.TRAJECTORY,)))
 
     def check_active(self) -> None:
         """Make sure that it is active.
@@ -113,8 +123,14 @@ class TrajectoryController:
             self._execution = future.result()
 
     def _take(self, message: JointTrajectory) -> None:
+        if not message.joint_names and not message.points:
+            self._stop('an empty trajectory came')
+            self._gateway.stream.renew()
+            return
         try:
-            command = self._follow(goal_of_trajectory(message, self._now, self._parameters))
+            self._gateway.stream.take()
+            goal = goal_of_trajectory(message, self._now, self._parameters)
+            command = self._request(goal, lambda: self._gateway.stream.ask(self._prepare))
         except ArmError as error:
             self._news.append(f'trajectory refused: {error}')
             return
@@ -155,7 +171,9 @@ class TrajectoryController:
 
     def _publish_state(self) -> None:
         while self._news:
-            self._node.get_logger().warning(self._news.popleft())
+            reason = self._news.popleft()
+            if self._logged.is_new(reason, time.monotonic()):
+                self._node.get_logger().warning(reason)
         if not self._state.get_subscription_count():  # it costs a tenth of a processor
             return
         snapshot = self._gateway.snapshot

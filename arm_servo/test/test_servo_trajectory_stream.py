@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trajectories on the controller's topic: one is a request, a stream that goes on is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from servo_drives import Drives, PERIOD
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from arm_canopen import Refusal, RefusalCause
+from arm_servo import NotReadyError
+from arm_servo.core.hold_to_run import GONE_AFTER
+from arm_servo.core.trajectory_stream import TOGETHER, TrajectoryStream
+from arm_servo.ros.trajectory.controller import TrajectoryController
+from arm_servo.ros.trajectory.parameters import declare_trajectory
+
+STEP = 0.004
+"""How far each trajectory of a stream goes in [rad]."""
+
+MOVED = 0.01
+"""Farther than this a stream has moved the arm in [rad]."""
+
+
+class Arm:
+    """A trajectory controller whose messages the test hands over, cycle by cycle."""
+
+    def __init__(self, node: Any) -> None:
+        """Let the arm follow."""
+        self.drives = Drives()
+        joints = self.drives.gateway.model.joints
+        parameters = declare_trajectory(node, joints)
+        self.controller = TrajectoryController(
+            node, self.drives.gateway, parameters, self._get_ready
+        )
+        self.taken_back = 0
+        self._joints = list(joints)
+        (self._subscription,) = (
+            each for each in node.subscriptions if each.topic_name.endswith('/joint_trajectory')
+        )
+        self.drives.attach()
+        self.drives.run(2)
+
+    def send(self, target: float, duration: float = 0.02) -> None:
+        """Send the first joint to a place in [rad], and run a few cycles."""
+        row = [axis.setpoint for axis in self.drives.axes]
+        point = JointTrajectoryPoint(positions=[target, *row[1:]])
+        point.time_from_start.nanosec = round(duration * 1e9)
+        self._subscription.callback(JointTrajectory(joint_names=self._joints, points=[point]))
+        self.drives.run(2)
+
+    def stream(self, count: int) -> None:
+        """Send trajectories as moveit_servo does: each goes on from where the arm is sent."""
+        for _ in range(count):
+            self.send(self.position + STEP)
+
+    def let_go(self) -> None:
+        """Send an empty trajectory."""
+        self._subscription.callback(JointTrajectory())
+        self.drives.run(2)
+
+    def wait(self, seconds: float) -> None:
+        """Send nothing."""
+        self.drives.run(round(seconds / PERIOD))
+
+    @property
+    def position(self) -> float:
+        """Where the first joint was sent in [rad]."""
+        return self.drives.axes[0].setpoint
+
+    def _get_ready(self) -> bool:
+        is_detached = self.drives.source.detached
+        if is_detached:
+            self.taken_back += 1
+            self.drives.attach()
+        return is_detached
+
+
+@pytest.fixture
+def arm(isolation: Isolation) -> Iterator[Arm]:
+    """The controller on a node."""
+    context = Context()
+    rclpy.init(context=context, domain_id=isolation.domain_id)
+    node: Any = Node('panda_arm_controller', context=context, enable_rosout=False)
+    try:
+        yield Arm(node)
+    finally:
+        for waitable in list(node.waitables):
+            waitable.destroy()
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+def halts(arm: Arm) -> None:
+    """Somebody halts a drive."""
+    arm.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
+
+
+def faults(arm: Arm) -> None:
+    """A drive faults, and somebody resets it."""
+    axis = arm.drives.axes[1]
+    arm.drives.axes[1] = replace(axis, followable=False, refusal=Refusal(RefusalCause.FAULT))
+    arm.drives.run(100)
+    arm.drives.axes[1] = axis
+
+
+@pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
+@pytest.mark.parametrize('happens', [halts, faults])
+def test_a_stream_that_goes_on_moves_no_arm_that_was_stopped(
+    arm: Arm, happens: Callable[[Arm], None], pause: float
+) -> None:
+    """Not after a pause either, as a stalled process makes it; let go and begun anew, it does."""
+    begin = arm.position
+    arm.stream(40)
+    assert arm.position > begin + MOVED
+    happens(arm)
+    arm.wait(0.5)
+    rest = arm.position
+    arm.wait(pause)
+    arm.stream(40)
+    arm.let_go()  # of no avail while it goes on
+    arm.stream(10)
+    assert arm.position == pytest.approx(rest, abs=1e-6)
+    assert arm.taken_back == 0
+    arm.wait(TOGETHER + 0.1)
+    arm.let_go()
+    arm.stream(40)
+    assert arm.position > rest + MOVED
+
+
+def test_a_stream_moves_no_arm_that_is_enabled(arm: Arm) -> None:
+    """It began while the drives were disabled; they were enabled for something else."""
+    enabled, disabled = list(arm.drives.axes), Refusal(RefusalCause.NOT_ENABLED)
+    arm.drives.axes = [replace(axis, followable=False, refusal=disabled) for axis in enabled]
+    arm.wait(0.1)
+    arm.stream(5)
+    arm.drives.axes = enabled
+    rest = arm.position
+    arm.stream(40)
+    assert arm.position == pytest.approx(rest, abs=1e-6)
+
+
+def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
+    """Its first trajectory is a request; those that follow are not ended by it."""
+    halts(arm)
+    arm.wait(0.5)
+    rest = arm.position
+    arm.stream(40)
+    assert arm.position > rest + MOVED
+    assert arm.taken_back == 1
+
+
+def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:
+    """Each is a request, after a halt as well."""
+    arm.send(0.1, 1.0)
+    arm.wait(TOGETHER + 0.1)
+    halts(arm)
+    arm.wait(0.1)
+    arm.send(0.2, 1.0)
+    arm.wait(1.5)
+    assert arm.position == pytest.approx(0.2, abs=1e-6)
+
+
+def test_an_empty_trajectory_stops(arm: Arm) -> None:
+    """On the way, without a jump."""
+    arm.send(1.0, 4.0)
+    arm.wait(1.5)
+    between = arm.position
+    arm.let_go()
+    arm.wait(1.0)
+    rest = arm.position
+    assert between <= rest < 0.6
+    arm.wait(1.0)
+    assert arm.position == rest
+    assert max(abs(b[0] - a[0]) for a, b in pairwise(arm.drives.path)) < 0.02
+
+
+class Clock:
+    """Steady time that the test moves."""
+
+    def __init__(self) -> None:
+        """Begin somewhere."""
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        """Return it in [s]."""
+        return self.now
+
+
+PAUSES = st.floats(0.0, GONE_AFTER - 0.1)
+
+
+@given(PAUSES, st.lists(PAUSES, max_size=20))
+def test_no_pause_lets_a_stream_in(before: float, pauses: list[float]) -> None:
+    """Only silence with a request, or one so long that whoever sent it is gone."""
+    clock = Clock()
+    stream = TrajectoryStream(clock)
+    stream.take()
+    stream.take()
+    last = clock.now
+    clock.now += before
+    stream.interrupt('halted')
+    for pause in pauses:
+        clock.now = max(clock.now, last + pause)
+        last = clock.now
+        with pytest.raises(NotReadyError, match='halted; a stream of trajectories does not go on'):
+            stream.take()
+        stream.renew()  # it has just come
+    clock.now += GONE_AFTER + 0.1
+    stream.take()
+
+
+def test_who_gets_the_drives_back_for_a_stream_counts_once() -> None:
+    """The next time they are enabled, it was somebody else."""
+    stream = TrajectoryStream(Clock())
+    for _ in range(2):
+        stream.take()
+        stream.ask(lambda: True)
+    stream.begin()
+    stream.take()
+    stream.begin()
+    with pytest.raises(NotReadyError, match='begun to follow'):
+        stream.take()
