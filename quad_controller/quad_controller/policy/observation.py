@@ -112,26 +112,28 @@ class ObservationBuilder:
             contract: What the policy expects.
             source: Of the direction of gravity.
         """
-        self._gravity = source
+        self._defaults: Floats = np.array(contract.default_positions, np.float32)
         widths = [term.width for term in contract.terms]
         ends = np.cumsum([0, *widths]).tolist()
         self._terms = [
-            (term, slice(start, end))
+            (self._reader(term, source), slice(start, end))
             for term, start, end in zip(contract.terms, ends, ends[1:], strict=False)
         ]
-        self._defaults: Floats = np.array(contract.default_positions, np.float32)
         self._scale: Floats = _joined([term.scale for term in contract.terms])
         self._offset: Floats = _joined([term.offset for term in contract.terms])
         clips = [term.clip or (-math.inf, math.inf) for term in contract.terms]
         self._lowest: Floats = np.repeat(np.array([c[0] for c in clips], np.float32), widths)
         self._highest: Floats = np.repeat(np.array([c[1] for c in clips], np.float32), widths)
         self._clips = any(term.clip for term in contract.terms)
+        self._scales = bool((self._scale != 1.0).any())
+        self._offsets = bool(self._offset.any())
         self._clip = contract.clip
         # the newest step first
         self._history: Floats = np.zeros(
             (max((term.history for term in contract.terms), default=1), sum(widths)), np.float32
         )
         self._places = observed_places(contract)
+        self._is_one_step = len(self._history) == 1
         self._repeats = contract.history_start is HistoryStart.REPEAT
         self._begun = False
         self._time = 0.0
@@ -153,31 +155,39 @@ class ObservationBuilder:
             observed: What is measured and commanded.
         """
         past, frame = self._history[1:], self._history[0]
-        past[:] = self._history[:-1]
-        for term, place in self._terms:
-            frame[place] = self._numbers(term, observed)
+        if len(past):
+            past[:] = self._history[:-1]
+        for read, place in self._terms:
+            frame[place] = read(observed)
         if self._clips:
-            np.clip(frame, self._lowest, self._highest, out=frame)
-        frame *= self._scale
-        frame += self._offset
+            _clip(frame, self._lowest, self._highest)
+        if self._scales:
+            frame *= self._scale
+        if self._offsets:
+            frame += self._offset
         if self._clip is not None:
-            np.clip(frame, -self._clip, self._clip, out=frame)
+            _clip(frame, -self._clip, self._clip)
         if not self._begun:
             self._begun = True
             if self._repeats:
                 past[:] = frame
+        if self._is_one_step:
+            return self._history.copy()
         row: Floats = self._history.ravel()[self._places][np.newaxis, :]
         return row
 
-    def _numbers(self, term: ObservationTerm, observed: Observed) -> npt.ArrayLike:
-        """Return one step of a term, before clip and scale."""
+    def _reader(
+        self, term: ObservationTerm, source: GravitySource
+    ) -> Callable[[Observed], npt.ArrayLike]:
+        """Return what gives one step of a term, before clip and scale."""
         if term.source is Source.GRAVITY:
-            return gravity(observed.imu, self._gravity)
+            return lambda seen: gravity(seen.imu, source)
         if term.source is Source.PHASE:
-            return self._phase(term, observed.velocity)
+            return lambda seen: self._phase(term, seen.velocity)
         if term.source is Source.JOINT_POSITIONS and term.relative:
-            return observed.positions - self._defaults
-        return MEASURED[term.source](observed, term)
+            return lambda seen: seen.positions - self._defaults
+        measured = MEASURED[term.source]
+        return lambda seen: measured(seen, term)
 
     def _phase(self, term: ObservationTerm, velocity: Velocity) -> tuple[float, float]:
         if math.hypot(velocity.x, velocity.y, velocity.yaw) < term.phase_threshold:
@@ -214,6 +224,12 @@ def observed_places(contract: PolicyContract) -> npt.NDArray[np.intp]:
                 places.extend(range(first, first + term.width))
             start += term.width
     return np.array(places, np.intp)
+
+
+def _clip(numbers: Floats, lowest: npt.ArrayLike, highest: npt.ArrayLike) -> None:
+    """Clip in place, at a third of what numpy.clip() costs."""
+    np.maximum(numbers, lowest, out=numbers)
+    np.minimum(numbers, highest, out=numbers)
 
 
 def _joined(rows: Sequence[Sequence[float]]) -> Floats:

@@ -134,7 +134,8 @@ class PolicyRunner:
     def observe(self, inputs: PolicyInputs) -> Floats:
         """Return the observation; its history goes on by one step."""
         joints = inputs.joints
-        self._positions[:] = self.in_its_order(joints.positions)
+        # joints that only the policy has keep their defaults
+        self._positions[self._policy_places] = np.array(joints.positions)[self._robot_places]
         if joints.velocities is not None:
             self._velocities[self._policy_places] = np.array(joints.velocities)[self._robot_places]
         return self._builder.build(
@@ -169,7 +170,8 @@ class PolicyRunner:
             action = np.clip(action, *self._clip)
         self._previous[:] = action
         self._waits = self._decimation - 1
-        self._wanted = np.clip(self._offset + self._scale * action, self._lower, self._upper)
+        target = self._offset + self._scale * action
+        self._wanted = np.minimum(np.maximum(target, self._lower), self._upper)
         return PolicyStep(self._targets(self._wanted, dt))
 
     def _command(self, velocity: Velocity) -> Velocity:
