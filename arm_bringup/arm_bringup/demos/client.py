@@ -1,15 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS client of the demos: calls services of the drives, and receives /diagnostics."""
+"""The ROS client of the demos: services of drives, goals of actions, and /diagnostics."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.action.client import ActionClient
+
+from process_supervisor import CallError
+from process_supervisor.graph_client import GraphClient
 
 from ..service_client import ServiceClient
 from .figures import Figures
+
+ANSWER_TIMEOUT = 30.0
+"""Longest time for an answer in [s]."""
 
 
 class ArmClient(ServiceClient):
@@ -32,3 +40,65 @@ class ArmClient(ServiceClient):
 
     def _take(self, message: DiagnosticArray) -> None:
         self.figures = self.figures.updated(message.status)
+
+
+class ActionRun:
+    """A goal on its way.
+
+    Attributes:
+        feedback: What the server has sent so far.
+    """
+
+    def __init__(
+        self,
+        client: GraphClient,
+        action: ActionClient,
+        goal: Any,  # noqa: ANN401  # goals have no type
+        name: str,
+    ) -> None:
+        """Send it, and wait until it is accepted.
+
+        Args:
+            client: Who sends it.
+            action: The action.
+            goal: The goal.
+            name: Name of the action, for messages.
+
+        Raises:
+            CallError: It was not accepted, or nobody answers.
+            GivenUpError: It is no longer wanted.
+        """
+        self.feedback: list[Any] = []
+        self._client, self._name = client, name
+        client.wait_until(action.server_is_ready, ANSWER_TIMEOUT, name)
+        sent = action.send_goal_async(goal, lambda each: self.feedback.append(each.feedback))
+        client.wait_until(sent.done, ANSWER_TIMEOUT, f'the answer of {name}')
+        if not sent.result().accepted:
+            raise CallError(f'{name}: the goal was not accepted')
+        self._handle = sent.result()
+        self._result = self._handle.get_result_async()
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        return bool(self._result.done())
+
+    @property
+    def status(self) -> int:
+        """The action_msgs/GoalStatus it ended with, once it is done."""
+        return int(self._result.result().status)
+
+    @property
+    def result(self) -> Any:  # noqa: ANN401
+        """Its result, once it is done."""
+        return self._result.result().result
+
+    def cancel(self) -> None:
+        """Ask for its end.
+
+        Raises:
+            CallError: Nobody answers.
+            GivenUpError: It is no longer wanted.
+        """
+        answer = self._handle.cancel_goal_async()
+        self._client.wait_until(answer.done, ANSWER_TIMEOUT, f'the cancel of {self._name}')

@@ -171,9 +171,11 @@ class ObservationBuilder:
             self._begun = True
             if self._repeats:
                 past[:] = frame
+        row: Floats
         if self._is_one_step:
-            return self._history.copy()
-        row: Floats = self._history.ravel()[self._places][np.newaxis, :]
+            row = self._history.copy()
+        else:
+            row = self._history.ravel()[self._places][np.newaxis, :]
         return row
 
     def _reader(

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 import math
-from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
@@ -21,13 +20,10 @@ from arm_model import Array, RobotModel
 from node_runner import LATCHED
 from process_supervisor import CallError
 
-from ..client import ArmClient
+from ..client import ActionRun, ArmClient
 from ..figures import AxisFigures
 from .figures import MotionFigures
 from .samples import cycles_between, peak_jerk, Sample
-
-ANSWER_TIMEOUT = 15.0
-"""Longest time for an answer in [s]."""
 
 
 class MotionClient(ArmClient):
@@ -115,7 +111,7 @@ class MotionClient(ArmClient):
         """
         self._speed.publish(SpeedScalingFactor(factor=speed))
 
-    def send(self, end: Array, duration: float) -> GoalRun:
+    def send(self, end: Array, duration: float) -> ActionRun:
         """Send a trajectory to a pose, at rest there, and wait until it is accepted.
 
         Args:
@@ -126,7 +122,6 @@ class MotionClient(ArmClient):
             CallError: It was refused, or nobody answers.
             GivenUpError: It is no longer wanted.
         """
-        self.wait_until(self._action.server_is_ready, ANSWER_TIMEOUT, 'the trajectory controller')
         rest = [0.0] * len(end)
         point = JointTrajectoryPoint(positions=end.tolist(), velocities=rest, accelerations=rest)
         point.time_from_start.sec = int(duration)
@@ -135,11 +130,7 @@ class MotionClient(ArmClient):
         goal = FollowJointTrajectory.Goal(
             trajectory=JointTrajectory(joint_names=names, points=[point])
         )
-        sent = self._action.send_goal_async(goal)
-        self.wait_until(sent.done, ANSWER_TIMEOUT, 'the answer to a trajectory')
-        if not sent.result().accepted:
-            raise CallError(f'the trajectory was refused: {self.words}')
-        return GoalRun(self, sent.result())
+        return ActionRun(self, self._action, goal, 'the trajectory controller')
 
     def _state(self, message: JointTrajectoryControllerState) -> None:
         position, velocity, acceleration = (
@@ -188,38 +179,3 @@ class MotionClient(ArmClient):
         self.words = message.message
         if message.code > 0:
             self.limited.append(message.message)
-
-
-class GoalRun:
-    """A trajectory on its way."""
-
-    def __init__(self, client: MotionClient, handle: Any) -> None:  # noqa: ANN401  # has no type
-        """Ask for its result.
-
-        Args:
-            client: Who sent it.
-            handle: What rclpy calls a goal handle.
-        """
-        self._client = client
-        self._handle = handle
-        self._result = handle.get_result_async()
-
-    @property
-    def done(self) -> bool:
-        """Whether it has ended."""
-        return bool(self._result.done())
-
-    def cancel(self) -> None:
-        """Ask it to end.
-
-        Raises:
-            CallError: Nobody answers.
-            GivenUpError: It is no longer wanted.
-        """
-        future = self._handle.cancel_goal_async()
-        self._client.wait_until(future.done, ANSWER_TIMEOUT, 'the answer to the cancel')
-
-    def end(self) -> tuple[int, str]:
-        """Return how it ended: status of the action, and why in words; once it is done."""
-        answer = self._result.result()
-        return int(answer.status), f'{answer.result.error_code}: {answer.result.error_string}'

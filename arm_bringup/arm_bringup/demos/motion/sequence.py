@@ -15,7 +15,8 @@ import numpy as np
 from arm_model import Array, RobotModel
 from process_supervisor import CallError
 
-from .client import GoalRun, MotionClient
+from ..client import ActionRun
+from .client import MotionClient
 from .goals import duration
 from .poses import free_end, free_way, SIDE, SIDES, SPEED, square_fits
 from .results import MotionResults, Square, WORST_PATH
@@ -64,7 +65,7 @@ class MotionSequence:
     enter: Callable[[str], None]
     look: Callable[[], None]
     results: MotionResults = field(default_factory=MotionResults)
-    _run: GoalRun | None = None
+    _run: ActionRun | None = None
 
     def set_up(self) -> None:
         """Have nothing to set up: each run begins at the start pose."""
@@ -209,10 +210,10 @@ class MotionSequence:
         self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of the canceled')
         self._rest()
         error = self._path_error(first, begin, end)
-        status, words = run.end()
         done = float(np.linalg.norm(self.client.last.position - begin))
         share = done / float(np.linalg.norm(end - begin))
-        problem = '' if status == GoalStatus.STATUS_CANCELED else f'it was not canceled: {words}'
+        is_canceled = run.status == GoalStatus.STATUS_CANCELED
+        problem = '' if is_canceled else f'it was not canceled: {_why(run)}'
         if error > WORST_PATH:
             problem = f'{1e3 * error:.1f} mrad off the path'
         elif np.abs(self.client.last.velocity).max() > 0.0:
@@ -255,17 +256,16 @@ class MotionSequence:
         way = float(np.linalg.norm(recent[-1].tool - recent[0].tool))
         return way < STUCK * SETTLE
 
-    def _send(self, end: Array, nominal: float) -> GoalRun:
+    def _send(self, end: Array, nominal: float) -> ActionRun:
         self._run = run = self.client.send(end, nominal)
         return run
 
-    def _finish(self, run: GoalRun) -> None:
+    def _finish(self, run: ActionRun) -> None:
         self.client.wait_until(lambda: self._seen(run), MOTION_TIMEOUT, 'the end of a trajectory')
-        status, words = run.end()
-        if status != GoalStatus.STATUS_SUCCEEDED:
-            raise CallError(f'a trajectory failed: {words}')
+        if run.status != GoalStatus.STATUS_SUCCEEDED:
+            raise CallError(f'a trajectory failed: {_why(run)}')
 
-    def _reach(self, run: GoalRun, begin: Array, end: Array, share: float) -> None:
+    def _reach(self, run: ActionRun, begin: Array, end: Array, share: float) -> None:
         """Wait until a share of the way is done: times say little on a computer that is busy."""
         way = end - begin
 
@@ -279,7 +279,7 @@ class MotionSequence:
         times = [each.time for each in self.client.samples[first:] if each.velocity.any()]
         return times[-1] - times[0] if times else 0.0
 
-    def _seen(self, run: GoalRun) -> bool:
+    def _seen(self, run: ActionRun) -> bool:
         self.look()
         return run.done
 
@@ -298,6 +298,10 @@ class MotionSequence:
         while (left := end - time.monotonic()) > 0:
             self.client.listen(min(left, PERIOD))
             self.look()
+
+
+def _why(run: ActionRun) -> str:
+    return f'{run.result.error_code}: {run.result.error_string}'
 
 
 def straight_ahead(tool: Array) -> Array:

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from control_msgs.action import GripperCommand
@@ -34,14 +34,12 @@ from arm_planning import PlanningCode
 from node_runner import LATCHED
 from process_supervisor import CallError
 
-from ..client import ArmClient
+from ..client import ActionRun, ANSWER_TIMEOUT, ArmClient
 from .figures import PlanFigures
 from .observer import Observer
 from .orders import DisplayedPath, DisplayedScene, MotionEnd, MotionOrder, SceneChange
 from .tool import quaternion
 
-ANSWER_TIMEOUT = 30.0
-"""Longest time for an answer in [s]."""
 PLANNING_TIME = 5.0
 """Longest time for planning in [s], as MoveGroupInterface asks for."""
 IK_TIMEOUT = 0.5
@@ -159,7 +157,7 @@ class PlanClient(ArmClient):
         places = dict(zip(state.name, state.position, strict=True))
         return {name: places[name] for name in seed}
 
-    def send(self, order: MotionOrder) -> GoalRun:
+    def send(self, order: MotionOrder) -> SentMotion:
         """Send a goal to move_action, as MoveGroupInterface::move does.
 
         Args:
@@ -179,8 +177,7 @@ class PlanClient(ArmClient):
         options.planning_scene_diff.is_diff = True
         options.planning_scene_diff.robot_state.is_diff = True
         options.replan = order.replan
-        self.wait_until(self._move.server_is_ready, ANSWER_TIMEOUT, 'move_action')
-        return GoalRun(self, self._move, goal, 'move_action')
+        return SentMotion(ActionRun(self, self._move, goal, 'move_action'))
 
     def grip(self, controller: str, position: float) -> None:
         """Move a gripper, and wait until it is there.
@@ -198,8 +195,7 @@ class PlanClient(ArmClient):
         action = self._grippers[name]
         goal = GripperCommand.Goal()
         goal.command.position = position
-        self.wait_until(action.server_is_ready, ANSWER_TIMEOUT, name)
-        run = GoalRun(self, action, goal, name)
+        run = ActionRun(self, action, goal, name)
         self.wait_until(lambda: run.done, ANSWER_TIMEOUT, f'the end of {name}')
         if not run.result.reached_goal:
             raise CallError(f'{name}: {position:.4f} was not reached: {run.result.position:.4f}')
@@ -279,30 +275,11 @@ class PlanClient(ArmClient):
         )
 
 
-class GoalRun:
-    """A goal of an action on its way."""
+@dataclass(frozen=True, slots=True)
+class SentMotion:
+    """A goal of move_action on its way."""
 
-    def __init__(self, client: PlanClient, action: ActionClient, goal: Any, name: str) -> None:  # noqa: ANN401
-        """Send it and wait until it is accepted.
-
-        Args:
-            client: Who sends it.
-            action: The action.
-            goal: The goal.
-            name: Name of the action.
-
-        Raises:
-            CallError: It was not accepted, or nobody answers.
-        """
-        self._states: list[str] = []
-        sent = action.send_goal_async(
-            goal, lambda each: self._states.append(getattr(each.feedback, 'state', ''))
-        )
-        client.wait_until(sent.done, ANSWER_TIMEOUT, f'the answer of {name}')
-        if not sent.result().accepted:
-            raise CallError(f'{name}: the goal was not accepted')
-        self._handle = sent.result()
-        self._result = self._handle.get_result_async()
+    run: ActionRun
 
     @property
     def executing(self) -> bool:
@@ -312,23 +289,22 @@ class GoalRun:
     @property
     def done(self) -> bool:
         """Whether it has ended."""
-        return bool(self._result.done())
-
-    @property
-    def result(self) -> Any:  # noqa: ANN401
-        """Its result, once it is done."""
-        return self._result.result().result
+        return self.run.done
 
     def cancel(self) -> None:
         """Ask for its end."""
-        self._handle.cancel_goal_async()
+        self.run.cancel()
 
     def end(self) -> MotionEnd:
-        """Return how a motion ended; once it is done."""
-        result = self.result
+        """Return how it ended; once it is done."""
+        result = self.run.result
         code = result.error_code
         plans = self._states.count('PLANNING')
         return MotionEnd(code_name(code.val), code.message, result.planning_time, plans)
+
+    @property
+    def _states(self) -> Sequence[str]:
+        return [each.state for each in self.run.feedback]
 
 
 def code_name(value: int) -> str:
