@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 from typing import NoReturn
 
 import numpy as np
 
-from arm_model import Array, JointLimits
+from arm_model import Array, frozen, JointLimits
 from arm_trajectory import Path, quintics, Segment
 
 from ..curves import Curve
@@ -64,7 +65,7 @@ POSE = 6
 
 _FIELDS = ('positions', 'first', 'second')
 
-BETWEEN = (0.5, 0.3, 0.7, 0.15, 0.85)
+BETWEEN = frozen([0.5, 0.3, 0.7, 0.15, 0.85])
 """Where between two places the link is looked for, as shares of the time.
 
 The error has a factor :math:`t^3 (1 - t)^3`; it is greatest near 0.5, or near 0.3 and 0.7 where
@@ -254,14 +255,15 @@ class _Tracer:
     def _error(self, place: _Place, following: _Place) -> float:
         """Return how far the link leaves the curve between two places, over the tolerance."""
         durations, pieces = self._pieces((place, following))
+        powers = np.vander(BETWEEN * durations, pieces.shape[1], increasing=True)
         worst = 0.0
-        for part in BETWEEN:
-            *positions, share = (part * durations[0]) ** np.arange(6.0) @ pieces[0]
-            error = pose_error(self._curve.at(share), self._link.pose(np.array(positions)))
+        for row in powers @ pieces[0]:
+            error = pose_error(self._curve.at(float(row[-1])), self._link.pose(row[:-1]))
+            x, y, z, *turn = error.tolist()
             worst = max(
                 worst,
-                float(np.linalg.norm(error[:3])) / POSITION_TOLERANCE,
-                float(np.linalg.norm(error[3:])) / ROTATION_TOLERANCE,
+                math.hypot(x, y, z) / POSITION_TOLERANCE,
+                math.hypot(*turn) / ROTATION_TOLERANCE,
             )
             if worst > 1.0:
                 break

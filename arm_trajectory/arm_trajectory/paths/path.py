@@ -205,9 +205,9 @@ class Path:
             places: Numbers of the segments (m).
             times: Times since their begin in [s] (m).
         """
-        factors, exponents = np.ones(6), np.arange(6.0)
-        for _ in range(order):
-            factors, exponents = factors * exponents, np.maximum(exponents - 1.0, 0.0)
-        powers = factors * times[:, None] ** exponents
-        derived: Array = np.einsum('mp,mpn->mn', powers, self.coefficients[places])
+        count = self.coefficients.shape[1]
+        powers = np.vander(times, count - order, increasing=True)
+        factors = [math.perm(power, order) for power in range(order, count)]
+        rows = self.coefficients[places, order:]
+        derived: Array = np.einsum('mp,mpn->mn', powers * factors, rows)
         return derived

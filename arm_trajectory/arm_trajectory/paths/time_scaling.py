@@ -50,6 +50,9 @@ LIMIT_FACTORS = (0.99, 0.96, 0.9)
 BETWEEN_FACTORS = (1.0, 1.01, 1.03)
 """How much greater velocity, acceleration and jerk may be between the places, as factors."""
 
+INTEGRAL = np.array([1.0, 11.0, 11.0, 1.0]) / 24.0
+"""Of the four parts of a uniform cubic B-spline over a cell, by its width."""
+
 MAX_SEGMENT_DURATION = 0.02
 """Greatest length of the new segments in [s] of the given path."""
 
@@ -134,7 +137,7 @@ class Timing:
         scaling = TimeScaling(np.ones(count + 3), self._path.duration)
         cells, basis = scaling.basis(self._times)
         for _ in range(MAX_ITERATIONS):
-            r, slope, bend = (scaling.derived(cells, row) for row in basis)
+            r, slope, bend = scaling.derived(cells, basis)
             needed = self._needed(r, slope, bend, full)
             if needed.max() <= 1.0:
                 return scaling
@@ -159,22 +162,23 @@ class Timing:
             + 3.0 * acceleration * (rate * change)[:, None]
             + speed * jolt[:, None],
         ]
-        needed: Array = self._time_factors(scaled, full).max(axis=(0, 2))
+        speed, acceleration, jerk = (each.max(axis=1) for each in self._shares(scaled, full))
+        needed: Array = np.maximum(np.maximum(speed, np.sqrt(acceleration)), np.cbrt(jerk))
         return needed
 
     def _time_factors(self, rates: list[Array], full: float) -> Array:
         """Return the factors of time (3, m, n) by velocity, acceleration and jerk."""
+        speed, acceleration, jerk = self._shares(rates, full)
+        return np.array((speed, np.sqrt(acceleration), np.cbrt(jerk)))
+
+    def _shares(self, rates: list[Array], full: float) -> list[Array]:
+        """Return velocity, acceleration and jerk (m, n) as shares of what they may be."""
         limits = self._limits
-        speed, acceleration, jerk = (
-            np.abs(rate) * (more / full) for rate, more in zip(rates, BETWEEN_FACTORS, strict=True)
-        )
-        return np.array(
-            (
-                speed / limits.velocity,
-                np.sqrt(acceleration / limits.acceleration),
-                np.cbrt(jerk / limits.jerk),
-            )
-        )
+        most = (limits.velocity, limits.acceleration, limits.jerk)
+        return [
+            np.abs(rate) * (more / full / limit)
+            for rate, more, limit in zip(rates, BETWEEN_FACTORS, most, strict=True)
+        ]
 
 
 class TimeScaling:
@@ -188,23 +192,26 @@ class TimeScaling:
     @property
     def duration(self) -> float:
         """How long the scaled path lasts in [s]."""
-        return float(self.times(np.array([0.0, self.length]))[-1])
+        cells = np.convolve(self.coefficients, INTEGRAL, 'valid')
+        return float(self._width * cells.sum())
 
     def basis(self, times: Array) -> tuple[Places, Array]:
         """Return the cells (m) of times, and the weights of their four coefficients (3, m, 4)."""
         last = len(self.coefficients) - 4
         cells = np.clip((times / self._width).astype(int), 0, last)
-        f = (times / self._width - cells)[:, None]
+        f = times / self._width - cells
         g, h = 1.0 - f, self._width
-        value = np.hstack((g**3, 3 * f**3 - 6 * f**2 + 4, 3 * g**3 - 6 * g**2 + 4, f**3)) / 6
-        slope = np.hstack((-(g**2), 3 * f**2 - 4 * f, 4 * g - 3 * g**2, f**2)) / (2 * h)
-        bend = np.hstack((g, 3 * f - 2, 3 * g - 2, f)) / h**2
-        return cells, np.array([value, slope, bend])
+        f2, g2 = f * f, g * g
+        value = (g * g2, (3 * f - 6) * f2 + 4, (3 * g - 6) * g2 + 4, f * f2)
+        slope = (-g2, 3 * f2 - 4 * f, 4 * g - 3 * g2, f2)
+        bend = (g, 3 * f - 2, 3 * g - 2, f)
+        scales = np.array([1 / 6, 0.5 / h, 1 / h**2])
+        return cells, np.array([value, slope, bend]).transpose(0, 2, 1) * scales[:, None, None]
 
     def derived(self, cells: Places, weights: Array) -> Array:
-        """Return the spline, or a derivative of it, by weights of :meth:`basis`."""
+        """Return the spline, or derivatives of it (..., m), by weights of :meth:`basis`."""
         near = self.coefficients[cells[:, None] + np.arange(4)]
-        derived: Array = np.sum(near * weights, axis=1)
+        derived: Array = np.einsum('mj,...mj->...m', near, weights)
         return derived
 
     def times(self, places: Array) -> Array:
@@ -241,7 +248,7 @@ def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
     places, offsets = np.append(places, len(counts) - 1), np.append(offsets, lasts[-1])
     given = path.starts[places] + offsets
     cells, basis = scaling.basis(given)
-    r, slope = (scaling.derived(cells, row) for row in basis[:2])
+    r, slope = scaling.derived(cells, basis[:2])
     q, speed, bend = (path.derived(order, places, offsets) for order in range(3))
     velocity = speed / r[:, None]
     acceleration = bend / (r**2)[:, None] - speed * (slope / r**3)[:, None]
