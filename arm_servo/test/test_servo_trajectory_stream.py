@@ -163,13 +163,26 @@ def test_a_stream_that_begins_takes_the_arm_back(arm: Arm) -> None:
 
 def test_one_trajectory_after_another_is_no_stream(arm: Arm) -> None:
     """Each is a request, after a halt as well."""
-    arm.send(0.1, 1.0)
-    arm.wait(TOGETHER + 0.1)
+    for target in (0.05, 0.1):
+        arm.send(target, 1.0)
+        arm.wait(TOGETHER + 0.1)
     halts(arm)
     arm.wait(0.1)
     arm.send(0.2, 1.0)
     arm.wait(1.5)
     assert arm.position == pytest.approx(0.2, abs=1e-6)
+
+
+def test_who_activates_the_controller_lets_a_stream_in(arm: Arm) -> None:
+    """A person has requested it, while none came."""
+    arm.stream(10)
+    halts(arm)
+    arm.wait(TOGETHER + 0.1)
+    arm.controller.set_active(False)
+    arm.controller.set_active(True)
+    rest = arm.position
+    arm.stream(40)
+    assert arm.position > rest + MOVED
 
 
 def test_an_empty_trajectory_stops(arm: Arm) -> None:
