@@ -4,17 +4,37 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
+import onnx
 from policy_export import joined
 import pytest
 
 from quad_controller import find_policy
+from quad_controller.attach_contract import run as attach
+from quad_controller.policy.contract.build import build_contract
+from quad_controller.policy.contract.mjlab import read_metadata
+from quad_controller.policy.contract.model import PolicyContract
+from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy_check.main import run
 from quad_gait_policies import metadata, write_policy
 from quad_gait_rig import ROBOT
 
 SHIPPED = str(find_policy('trot_imitation'))
+TURN = ['--walk', '0.2', '0', '0.3', '--duration', '4']
+"""A way and a turn, for which left is not right."""
+DAMPING = -0.2
+"""Of an action by the angular velocity in [s/rad]."""
+MIRRORS = {
+    name: name[0] + name[1].translate(str.maketrans('lr', 'rl')) + name[2:] for name in ROBOT.names
+}
+
+
+def load_contract() -> PolicyContract:
+    """Return the contract of the shipped policy."""
+    return build_contract(read_metadata(OnnxNetwork(Path(SHIPPED)).metadata))
 
 
 def test_the_shipped_policy_passes_and_walks(capsys: pytest.CaptureFixture[str]) -> None:
@@ -36,7 +56,95 @@ def test_a_policy_that_only_stands_walks_nowhere(
     output = capsys.readouterr().out
     went = output.partition(' went ')[2]
     assert float(went.split()[0]) == pytest.approx(0.0, abs=0.02)
-    assert '% of its way; is it made for other servos' in output
+    assert 'too slow: is it made for other servos' in output
+
+
+def damped(path: Path) -> Path:
+    """Write the shipped policy with a feedback that damps roll and pitch by the angular velocity.
+
+    Forward legs give way where the body pitches down, as do those of the side it rolls to.
+    """
+    model = onnx.load(SHIPPED)
+    (seen,), (answer,) = model.graph.input, model.graph.output
+    for node in model.graph.node:
+        node.output[:] = ['undamped' if name == answer.name else name for name in node.output]
+    gains = np.zeros((load_contract().width, len(ROBOT.names)), np.float32)
+    for column, name in enumerate(ROBOT.names):
+        share = {'thigh': 0.5, 'calf': -1.0}.get(name.split('_')[1], 0.0)
+        gains[0, column] = DAMPING * share * (-1.0 if name[1] == 'l' else 1.0)
+        gains[1, column] = DAMPING * share * (1.0 if name[0] == 'f' else -1.0)
+    model.graph.initializer.append(onnx.numpy_helper.from_array(gains, 'gains'))
+    model.graph.node.append(onnx.helper.make_node('MatMul', [seen.name, 'gains'], ['damping']))
+    model.graph.node.append(onnx.helper.make_node('Add', ['undamped', 'damping'], [answer.name]))
+    onnx.save(model, path)
+    return path
+
+
+WRONG: dict[str, dict[str, object]] = {
+    'joints of the other side': {'joints': [MIRRORS[name] for name in ROBOT.names]},
+    'joints by kind': {'joints': sorted(ROBOT.names, key=lambda name: name.split('_')[1])},
+    'frame of the IMU': {'observation.terms.ang_vel.frame': 'yawed'},
+    'scale of actions': {'action.scale': 0.5},
+    'scale of a velocity': {'observation.terms.ang_vel.scale': 5.0},
+    'sign of actions': {'action.scale': -0.25},
+    'sign of a velocity': {'observation.terms.ang_vel.scale': -1.0},
+    'sign of commands': {'observation.terms.cmd.scale': -1.0},
+    'sign of gravity': {'observation.terms.gravity.scale': -1.0},
+    'absolute positions': {'observation.terms.joint_pos.relative': False},
+    'rate': {'period': 0.01},
+}
+
+
+@pytest.mark.parametrize('kind', [*WRONG, 'none'])
+def test_a_wrong_contract_is_found_before_a_motor_moves(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the table, or by a walk and a turn in physics; the right one passes."""
+    path = damped(tmp_path / 'policy.onnx')
+    settings = [f'{key}={json.dumps(value)}' for key, value in WRONG.get(kind, {}).items()]
+    assert attach([str(path), *(part for text in settings for part in ('--set', text))]) == 0
+    capsys.readouterr()
+    assert run([str(path), *TURN]) == (1 if kind in WRONG else 0), capsys.readouterr().out
+
+
+HISTORY = 6
+"""Steps that a policy of the tests sees."""
+
+
+def with_history(path: Path) -> Path:
+    """Write the shipped policy as one that sees steps, of each term the newest last."""
+    model = onnx.load(SHIPPED)
+    (given,) = model.graph.input
+    widths = [term.width for term in load_contract().terms]
+    places, start = list[int](), 0
+    for width in widths:
+        start += HISTORY * width
+        places.extend(range(start - width, start))
+    model.graph.initializer.append(onnx.numpy_helper.from_array(np.array(places), 'newest'))
+    pick = onnx.helper.make_node('Gather', ['steps', 'newest'], [given.name], axis=1)
+    model.graph.node.insert(0, pick)
+    kind = onnx.helper.make_tensor_value_info('steps', onnx.TensorProto.FLOAT, [1, start])
+    model.graph.input.remove(given)
+    model.graph.input.append(kind)
+    onnx.save(model, path)
+    return path
+
+
+@pytest.mark.parametrize('newest', ['last', 'first'])
+@pytest.mark.parametrize('layout', ['per_term', 'frames'])
+def test_a_wrong_layout_of_the_history_is_found(
+    layout: str, newest: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A policy that sees several steps walks with the layout of its training only."""
+    path = with_history(tmp_path / 'history.onnx')
+    names = [term.name for term in load_contract().terms]
+    settings = [f'observation.terms.{name}.history={HISTORY}' for name in names]
+    settings += [f'observation.history.layout={layout}', f'observation.history.newest={newest}']
+    given = [part for setting in settings for part in ('--set', setting)]
+    assert attach([str(path), *given]) == 0
+    capsys.readouterr()
+    fits = (layout, newest) == ('per_term', 'last')
+    assert run([str(path), *TURN]) == (0 if fits else 1), capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

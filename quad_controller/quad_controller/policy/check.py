@@ -17,6 +17,7 @@ from .contract.document import ContractDocument
 from .contract.mjlab import VENDOR
 from .contract.model import PolicyContract
 from .network import FLOAT, Floats, Network, observation_ports
+from .observation import observed_places
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
 MAX_SCALE = 1.0  # [rad] an action of one may move a joint by
@@ -25,6 +26,8 @@ MAX_PERIOD_ERROR = 0.02  # of the loop's period, that of the training may differ
 WARM_UP = 20
 TIMED_RUNS = 100
 MAX_LATENCY_RATIO = 0.25  # of the period
+PROBES, PROBE = 20, 0.1  # changes of an observation, and their deviation
+MIN_NEWEST = 0.1  # share of what the oldest step of a history does that the newest must do
 
 
 class Verdict(Enum):
@@ -177,6 +180,7 @@ def check_answers(
     network.reset()
     steady = all(bool(np.isfinite(network.run(standing)).all()) for _ in range(WARM_UP))
     yield _row('answers one after the other', 'numbers', 'numbers' if steady else 'NaN', steady)
+    yield from _history(run, standing, contract)
     times = []
     for _ in range(TIMED_RUNS):
         start = clock()
@@ -186,6 +190,28 @@ def check_answers(
     most = MAX_LATENCY_RATIO * period
     verdict = Verdict.OK if late < most else Verdict.WARN
     yield Row('time, p99', f'below {most * 1e3:.1f} ms', f'{late * 1e3:.3f} ms', verdict)
+
+
+def _history(
+    run: Callable[[Floats], Floats], standing: Floats, contract: PolicyContract
+) -> Iterator[Row]:
+    """Compare what the newest and the oldest step of a history do to the action."""
+    ages = observed_places(contract) // sum(term.width for term in contract.terms)
+    if not ages.any():
+        return
+    draw, rest = np.random.default_rng(0), run(standing).copy()
+
+    def effect(age: int) -> float:
+        changes = PROBE * draw.normal(size=(PROBES, len(ages))) * (ages == age)
+        moved = [run(standing + change.astype(np.float32)[np.newaxis, :]) for change in changes]
+        return float(np.mean([np.abs(action - rest).mean() for action in moved]))
+
+    newest, oldest = effect(0), effect(int(ages.max()))
+    verdict = Verdict.OK if newest >= oldest else Verdict.WARN
+    if newest < MIN_NEWEST * oldest:
+        verdict = Verdict.REFUSE
+    found = f'it moves an action by {newest:.2g}, the oldest by {oldest:.2g}'
+    yield Row('newest step of the history', 'counts most', found, verdict)
 
 
 def _shape(

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import math
 from pathlib import Path
 import signal
@@ -28,10 +28,10 @@ SERVOS = ('firm', 'vendor_rl')
 
 MIN_DURATION, MAX_DURATION = 0.5, 600.0
 """Times of a walk in [s]."""
-MIN_RATIO = 0.5
-"""Share of the commanded way below which a policy does not walk."""
-REACH = 0.1
-"""Distance of a foot from the middle in [m], which weighs turning beside walking."""
+MAX_LACK, MAX_EXCESS = 0.5, 0.2
+"""Shares of what is commanded along an axis that may be missing, and be too much."""
+MAX_DRIFT = Velocity(0.04, 0.04, 0.1)
+"""What a policy may be off along an axis in any case in [m/s] and [rad/s]."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -67,9 +67,7 @@ def run(arguments: Sequence[str]) -> int:
         f'{_text(velocity)}, went {_text(walked.velocity)}, '
         f'tilt at most {math.degrees(walked.tilt):.1f} deg'
     )
-    trouble = walked.trouble
-    if not trouble and (share := _share(walked.velocity, velocity)) < MIN_RATIO:
-        trouble = f'it went {100 * share:.0f} % of its way; is it made for other servos (--servo)?'
+    trouble = walked.trouble or '; '.join(_astray(walked.velocity, velocity))
     if trouble:
         _print(f'it did not go well: {trouble}')
     return 1 if trouble else 0
@@ -151,15 +149,20 @@ def _duration(text: str) -> float:
     return value
 
 
-def _share(went: Velocity, commanded: Velocity) -> float:
-    """Return which share of what was commanded was gone; 1 where nothing was."""
-    pairs = [
-        (went.x, commanded.x),
-        (went.y, commanded.y),
-        (went.yaw * REACH, commanded.yaw * REACH),
-    ]
-    asked = sum(want**2 for _, want in pairs)
-    return sum(got * want for got, want in pairs) / asked if asked else 1.0
+def _astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
+    """Yield along which axes it went otherwise than commanded, and what that hints at."""
+    for axis in ('x', 'y', 'yaw'):
+        got, want, drift = (getattr(each, axis) for each in (went, commanded, MAX_DRIFT))
+        most = MAX_EXCESS if got * want > want**2 else MAX_LACK
+        if abs(got - want) <= max(most * abs(want), drift):
+            continue
+        if got * want < 0.0:
+            hint = 'the other way: look at the order of its joints, and at signs (scales below 0)'
+        elif abs(got) < abs(want):
+            hint = 'too slow: is it made for other servos (--servo), or a smaller scale?'
+        else:
+            hint = 'too far: look at its scales, and at the frame of the IMU'
+        yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
 
 
 def _text(velocity: Velocity) -> str:
