@@ -132,7 +132,10 @@ def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
 
 
 def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
-    """The last of several counts; what the page does not move stays; a stop forgets it."""
+    """The last of several counts; what the page does not move stays; a stop forgets it.
+
+    What follows after that is a new request, which an empty trajectory says.
+    """
     sent: list[Any] = []
     kind = import_module('trajectory_msgs.msg').JointTrajectory  # no dependency of the package
     state = import_module('control_msgs.msg').JointTrajectoryControllerState()
@@ -169,3 +172,9 @@ def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
     assert len(sent) == 1
     assert not controllers.found['/arm_controller'].busy
     assert controllers.history.of('a')[-1].target == 0.5
+    for count in (3, 5):  # after a stop, and after a target that was not reached
+        robot.viewer.aim('/arm_controller', {'a': 1.0}, 1.0)
+        robot.spin_until(lambda count=count: len(sent) == count, 'an empty trajectory and another')
+        assert not sent[-2].points
+        assert sent[-1].points
+        robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')

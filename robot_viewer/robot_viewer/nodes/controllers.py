@@ -28,8 +28,8 @@ SETTLING_TIMEOUT = 1.0
 """Time in [s] after the end of a motion at which it is looked at."""
 
 SILENCE = 1.2
-"""Time in [s] in which nothing is sent before an empty trajectory says that a stop was seen: the
-controller takes it for the end of a stream after a second."""
+"""Time in [s] without a trajectory before an empty one says that what follows is a new request: a
+controller that was stopped in a stream wants a second."""
 
 Report = Callable[[str, bool], None]
 """Takes what became of a motion, and whether it failed."""
@@ -47,7 +47,7 @@ class Controller:
         targets: Where the joints are on their way to; empty when they are not.
         ends: Steady time at which they are there in [s].
         sent: Steady time of the last trajectory in [s].
-        lets_go: The robot was stopped, and nothing was sent since.
+        lets_go: The robot was stopped, or did not follow, and nothing was sent since.
     """
 
     commands: Publisher
@@ -167,6 +167,7 @@ class Controllers:
             elif controller.busy and now > controller.ends + SETTLING_TIMEOUT:
                 why = 'target: not reached; are the drives enabled? /rosout has the reason'
                 self._conclude(controller, why, failed=True)
+                controller.lets_go = True
 
     def _conclude(self, controller: Controller, text: str, *, failed: bool) -> None:
         controller.targets = {}
