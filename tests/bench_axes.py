@@ -119,15 +119,20 @@ def write_bus(folder: Path, scenario: Scenario) -> Path:
 def boot_and_init(arm: SimulatedArm, recorder: BusRecorder) -> Rows:
     """Time the boot and the parallel init from the frames on the bus."""
     nodes = range(FIRST_NODE_ID, FIRST_NODE_ID + len(arm.joints))
+
+    def starts() -> list[float]:
+        return [
+            f.timestamp
+            for f in recorder.frames
+            if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in (ALL_NODES, *nodes)
+        ]
+
+    arm.client.spin_until(lambda: bool(starts()), 5.0, 'NMT start of a node')
     boot_ups = [f.timestamp for f in recorder.frames if is_boot_up(f.can_id, f.data)]
-    starts = [
-        f.timestamp
-        for f in recorder.frames
-        if f.can_id == CobId.NMT and f.data[0] == 1 and f.data[1] in (ALL_NODES, *nodes)
-    ]
+    started = max(starts())
     init = arm.init_all()
     return {
-        'last boot-up to all operational': f'{max(starts) - max(boot_ups):.3f} s',
+        'last boot-up to all operational': f'{started - max(boot_ups):.3f} s',
         'init of all joints': f'{init:.3f} s (at once)',
     }
 
