@@ -28,6 +28,7 @@ from .streaming import TargetStream
 T = TypeVar('T')
 Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
+SELECT_MODE = '; select a mode before the first target'
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
 
 
@@ -262,21 +263,26 @@ class DriveCommands:
             if drive.node.online and not steps.quirks.no_mode_zero:
                 drive.control.select(drive.control.modes[OperationMode.NO_MODE])
                 drive.control.halt.end_in(OperationMode.NO_MODE)
-        return f'{drive.view.state.title}{homed}; select a mode before the first target'
+        return f'{drive.view.state.title}{homed}{SELECT_MODE}'
 
     async def enable(self) -> str:
         """Lead to Operation Enabled, without homing and without resetting a fault."""
         await self._steps.ready()
         self._steps.require_no_fault()
         await self._steps.reach(DriveState.OPERATION_ENABLED)
-        return self.drive.describe()
+        return self._enabled()
 
     async def recover(self) -> str:
         """Reset a fault and lead to Operation Enabled, with no target left over."""
         await self._steps.ready()
         await self._steps.reset_fault()
         await self._steps.reach(DriveState.OPERATION_ENABLED)
-        return self.drive.describe()
+        return self._enabled()
+
+    def _enabled(self) -> str:
+        """Describe an enabled drive; one that came back to the bus has lost its mode."""
+        has_mode = self.drive.control.mode.number is not OperationMode.NO_MODE
+        return self.drive.describe() + ('' if has_mode else SELECT_MODE)
 
     async def home(
         self,

@@ -418,6 +418,9 @@ def test_recovery_after_a_power_cut_is_by_policy(policy: RecoveryPolicy) -> None
     assert any('enabled again (recovery: auto)' in text for text in net.reported()) is again
     if again:
         assert net.drives[JOINT].control.mode.number is OperationMode.CYCLIC_POSITION
+        assert 'select a mode' not in net.do(JOINT, 'recover')
+    else:
+        assert 'select a mode before the first target' in net.do(JOINT, 'recover')
 
 
 def test_recovery_does_not_reset_a_fault() -> None:
