@@ -231,7 +231,7 @@ def _parser() -> argparse.ArgumentParser:
         '--log',
         metavar='FILE',
         help="write all frames, shown or not, as can-utils' candump -L; FILE.asc and FILE.blf in "
-        "Vector's formats",
+        "Vector's formats, FILE.pcap for Wireshark",
     )
     add('--read', metavar='FILE', help='show a log, of these formats, instead of a bus')
     add('-n', '--count', type=_positive_int, help='end after so many frames shown')

@@ -4,10 +4,12 @@
 
 - ``.asc``: Vector's text format (can-utils: asc2log)
 - ``.blf``: Vector's binary format
+- ``.pcap``, ``.cap``: a capture for Wireshark, which knows CANopen
 - ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc)
 
-python-can writes all of them, and reads the first two. What candump has written is read here:
-python-can takes its error frames for data frames, and names no line where a log is damaged.
+python-can writes all of them but captures, and reads the first two. What candump has written is
+read here: python-can takes its error frames for data frames, and names no line where a log is
+damaged.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ from arm_canopen.can.adapter import from_message, to_message
 from arm_canopen.can.frame import checked, Frame
 from arm_canopen.exceptions import CodecError
 
+from .pcap import PcapReader, PcapWriter
+
 _ERROR_FLAG = 0x2000_0000
 _STANDARD_DIGITS = 3
 _LINE = re.compile(
@@ -35,9 +39,12 @@ _LINE = re.compile(
 )
 _PLAYABLE = re.compile(r'[A-Za-z0-9_.-]{1,15}')  # names that a network interface can have
 _STAND_IN = 'vcan0'
-_READERS: dict[str, type[can.ASCReader | can.BLFReader]] = {
+_READERS: dict[str, type[can.ASCReader | can.BLFReader | PcapReader]] = {
     '.asc': can.ASCReader,
     '.blf': can.BLFReader,
+    '.pcap': PcapReader,
+    '.cap': PcapReader,
+    '.pcapng': PcapReader,  # which says what to do
 }
 _DAMAGE = (ValueError, LookupError, struct.error, zlib.error, BLFParseError)
 
@@ -59,11 +66,15 @@ class LogWriter:
         """
         suffix = path.suffix.lower()
         self._candump = suffix not in _READERS
-        self._writer: can.CanutilsLogWriter | can.ASCWriter | can.BLFWriter
+        self._writer: can.CanutilsLogWriter | can.ASCWriter | can.BLFWriter | PcapWriter
         if suffix == '.asc':
             self._writer = can.ASCWriter(path)
         elif suffix == '.blf':
             self._writer = can.BLFWriter(path)
+        elif suffix == '.pcapng':
+            raise CodecError(f'{path}: pcapng is not written; name it .pcap')
+        elif suffix in {'.pcap', '.cap'}:
+            self._writer = PcapWriter(path)
         else:
             self._writer = can.CanutilsLogWriter(path, channel=log_channel(bus_name))
         self._offset = wall_offset
@@ -148,7 +159,9 @@ def parse_line(line: str) -> Frame:
     return frame
 
 
-def _read_messages(path: Path, reader: type[can.ASCReader | can.BLFReader]) -> Iterator[Frame]:
+def _read_messages(
+    path: Path, reader: type[can.ASCReader | can.BLFReader | PcapReader]
+) -> Iterator[Frame]:
     number = 0
     try:
         for message in reader(path, relative_timestamp=False):

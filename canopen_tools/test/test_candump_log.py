@@ -7,7 +7,9 @@ from __future__ import annotations
 from contextlib import closing
 import io
 from pathlib import Path
+import re
 import shutil
+import struct
 import subprocess
 import tempfile
 
@@ -21,6 +23,7 @@ from arm_canopen.can import Frame
 from arm_canopen.can.adapter import from_message
 from arm_canopen.exceptions import CodecError
 from canopen_tools.candump_log import log_channel, LogWriter, parse_line, read_lines, read_log
+from canopen_tools.pcap import CAN_SOCKETCAN, MICROSECONDS, NANOSECONDS
 
 EXAMPLES = [
     ('(1700000000.123456) can0 181#27060000', Frame(0x181, b'\x27\x06\x00\x00')),
@@ -53,11 +56,12 @@ def test_lines_are_those_of_candump(line: str, frame: Frame, tmp_path: Path) -> 
     assert parse_line(line)._replace(timestamp=0.0) == frame
 
 
+@pytest.mark.parametrize('suffix', ['.log', '.pcap'])
 @given(times, st.one_of(frames(), error_frames))
-def test_round_trip(time: float, frame: Frame) -> None:
+def test_round_trip(suffix: str, time: float, frame: Frame) -> None:
     """Reading inverts writing, to the microsecond."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'bus.log'
+        path = Path(folder) / f'bus{suffix}'
         with closing(LogWriter(path, 'can0', 0.0)) as log:
             log.write([frame._replace(timestamp=time)])
         (found,) = read_log(path)
@@ -65,7 +69,7 @@ def test_round_trip(time: float, frame: Frame) -> None:
     assert found._replace(timestamp=frame.timestamp) == frame
 
 
-@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', '.BLF', '.txt'])
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', '.BLF', '.pcap', '.txt'])
 def test_every_format_keeps_frames_and_times(suffix: str, tmp_path: Path) -> None:
     """Data frames, remote requests and both lengths of identifiers, to the tenth of a ms."""
     sent = [
@@ -88,6 +92,83 @@ def test_a_damaged_log_is_named(tmp_path: Path) -> None:
     path.write_bytes(b'LOGX' + bytes(200))
     with pytest.raises(CodecError, match=r'bus\.blf: damaged after 0 frames'):
         list(read_log(path))
+
+
+def capture(order: str, magic: int, link: int, *packets: bytes) -> bytes:
+    """Return a capture as another program writes it, with a time of 5.25 s."""
+    fraction = 250_000 if magic == MICROSECONDS else 250_000_000
+    content = struct.pack(f'{order}IHHiIII', magic, 2, 4, 0, 0, 262144, link)
+    for packet in packets:
+        content += struct.pack(f'{order}IIII', 5, fraction, len(packet), len(packet)) + packet
+    return content
+
+
+TPDO = bytes.fromhex('00000182 03000000 370601')  # as SocketCAN has it in the network's order
+
+
+@pytest.mark.parametrize('order', ['<', '>'])
+@pytest.mark.parametrize('magic', [MICROSECONDS, NANOSECONDS])
+def test_captures_of_others_are_read(order: str, magic: int, tmp_path: Path) -> None:
+    """Of machines of either byte order, with either unit of time, padded or not."""
+    path = tmp_path / 'bus.pcap'
+    padded = TPDO.ljust(16, b'\0')
+    path.write_bytes(capture(order, magic, CAN_SOCKETCAN, TPDO, padded))
+    assert list(read_log(path)) == [Frame(0x182, b'\x37\x06\x01', 5.25)] * 2
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        (b'\x0a\x0d\x0d\x0a' + bytes(60), 'save as pcap, not as pcapng'),
+        (b'', 'no capture'),
+        (capture('<', MICROSECONDS, 113, TPDO), 'link type is 113.*on the CAN interface'),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO)[:-1], 'after 0 frames: a packet is cut'),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO) + b'1', 'after 1 frames: .*is cut off'),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:-1]), '2 of 3 bytes'),
+        (
+            capture('<', MICROSECONDS, CAN_SOCKETCAN)
+            + struct.pack('<IIII', 5, 0, 8, 16)  # 8 of 16 bytes were kept
+            + TPDO[:4]
+            + bytes(4),
+            'a packet is cut off',
+        ),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:4]), 'has 4 bytes'),
+        (
+            capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:4] + b'\x0c\x04' + bytes(14)),
+            'CAN FD',
+        ),
+    ],
+)
+def test_what_is_no_capture_of_a_classic_bus_is_refused(
+    content: bytes, words: str, tmp_path: Path
+) -> None:
+    """And what is wrong, and how to do it, is said."""
+    path = tmp_path / 'bus.pcap'
+    path.write_bytes(content)
+    with pytest.raises(CodecError, match=words):
+        list(read_log(path))
+
+
+def test_a_pcapng_is_neither_taken_for_text_nor_written(tmp_path: Path) -> None:
+    """Wireshark writes them by default."""
+    path = tmp_path / 'bus.pcapng'
+    with pytest.raises(CodecError, match='pcapng is not written'):
+        written([], tmp_path, path.name)
+    path.write_bytes(b'\x0a\x0d\x0d\x0a' + bytes(60))
+    with pytest.raises(CodecError, match='save as pcap'):
+        list(read_log(path))
+
+
+@pytest.mark.skipif(shutil.which('tshark') is None, reason='needs tshark, of Wireshark')
+def test_wireshark_reads_our_captures_as_canopen(tmp_path: Path) -> None:
+    """With the dissector that is chosen as the README says."""
+    read = Frame(0x605, bytes.fromhex('4041600000000000'), 1.5)
+    path = written([read, Frame(0x705, b'\x05', 2.0)], tmp_path, 'bus.pcap')
+    command = ['tshark', '-r', str(path), '-t', 'e', '-d', 'can.subdissector,canopen']
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    first, second = shown.splitlines()
+    assert re.search(r'1700000001\.500000 .*CANopen.*SDO.*Initiate upload request', first)
+    assert re.search(r'CANopen.*Operational', second)
 
 
 @given(st.lists(frames(), max_size=20))

@@ -40,7 +40,23 @@ def add_parser(parsers: SubParsers) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check a file; return the exit code."""
-    report = check_file(options.bus_yml, options.bitrate)
+    return show_check(
+        options.bus_yml, options.bitrate, strict=options.strict, frames=options.frames
+    )
+
+
+def show_check(
+    path: Path, bit_rate: int | None = None, *, strict: bool = False, frames: bool = False
+) -> int:
+    """Show what is wrong with a bus.yml; return the exit code.
+
+    Args:
+        path: The file.
+        bit_rate: Of the bus in [bit/s]; None takes that of the file.
+        strict: Whether warnings count as errors.
+        frames: Whether the load of each frame is listed.
+    """
+    report = check_file(path, bit_rate)
     for problem in report.errors:
         print_problem(problem, 'error', RED)
     for problem in report.warnings:
@@ -48,10 +64,10 @@ def run(options: argparse.Namespace) -> int:
     if report.units:
         _print_units(report.units)
     if report.load is not None and report.load.traffic:
-        _print_load(report.load, each=options.frames)
+        _print_load(report.load, each=frames)
     errors, warnings = len(report.errors), len(report.warnings)
-    print_line(f'{options.bus_yml}: {counted(errors, "error")}, {counted(warnings, "warning")}')
-    return 1 if errors or (options.strict and warnings) else 0
+    print_line(f'{path}: {counted(errors, "error")}, {counted(warnings, "warning")}')
+    return 1 if errors or (strict and warnings) else 0
 
 
 def _print_units(units: Iterable[AxisUnits]) -> None:

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen new``: a bus.yml of EDS files, each choice with its reason, and checked."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+import math
+from pathlib import Path
+import re
+import shutil
+import sys
+
+from arm_canopen.config.read.eds import load_eds
+from arm_canopen.standard.drive import OperationMode
+
+from ..new_bus import bus_text, NewDevice, POSITION_MODES, TURN, Units
+from .arguments import node_id, SubParsers, UsageError
+from .check import show_check
+from .output import print_line
+
+DEVICE = re.compile(r'(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
+"""A device on the command line; its name is one of a ROS node."""
+PERIOD_MS = 10
+"""Time between two SYNC in [ms]."""
+
+
+def add_parser(parsers: SubParsers) -> None:
+    """Add the verb."""
+    parser = parsers.add_parser(
+        'new',
+        help='write the bus.yml of a new robot from the EDS files of its devices',
+        description='Write a bus.yml from EDS files: modes, PDOs, SYNC, heartbeats and units, '
+        'each with its reason, and check it. What the files do not say is asked for. Exit code: '
+        '0, 1 with errors, 2 wrong usage.',
+        epilog='example: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000',
+        allow_abbrev=False,
+    )
+    add = parser.add_argument
+    add('devices', metavar='NAME=FILE.eds@NODE', nargs='+', help='name, EDS and node id of each')
+    add(
+        '--turn',
+        metavar='NAME=INCREMENTS',
+        action='append',
+        default=[],
+        help='increments of a drive for one turn of its joint, gear included; negative where it '
+        'turns the other way (default: the factor group of the drive)',
+    )
+    add(
+        '--metre',
+        metavar='NAME=INCREMENTS',
+        action='append',
+        default=[],
+        help='the same for 1 m of a joint that slides',
+    )
+    add(
+        '--mode',
+        metavar='NAME=MODE',
+        action='append',
+        default=[],
+        help='1, 7 or 8: mode of operation of a drive (default: the best one that 0x6502 names)',
+    )
+    add(
+        '--period',
+        metavar='MS',
+        type=_period,
+        default=PERIOD_MS,
+        help='time between two SYNC in ms (default: %(default)s)',
+    )
+    add('--output', metavar='FILE', type=Path, default=Path('bus.yml'), help='default: bus.yml')
+    add('--force', action='store_true', help='overwrite it')
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the file, and check it; return the exit code."""
+    output: Path = options.output
+    if output.exists() and not options.force:
+        raise UsageError(f'{output} is there already; choose another --output, or --force')
+    devices = [_asked(each) if each.has_open_units else each for each in _devices(options)]
+    text = bus_text(devices, options.period)
+    files: dict[str, Path] = {}
+    for path in (device.eds.path for device in devices):
+        for other in (files.setdefault(path.name, path), output.parent / path.name):
+            if other.exists() and other.read_bytes() != path.read_bytes():
+                raise UsageError(f'{path} and {other} have one name; rename one of them')
+    output.parent.mkdir(parents=True, exist_ok=True)
+    for name, path in files.items():
+        if not (output.parent / name).exists():
+            shutil.copy(path, output.parent / name)
+    output.write_text(text, encoding='utf-8')
+    print_line(f'{output} is written; what it says and why is in it')
+    return show_check(output)
+
+
+def _devices(options: argparse.Namespace) -> list[NewDevice]:
+    devices = []
+    for text in options.devices:
+        match = DEVICE.fullmatch(text)
+        if match is None:
+            raise UsageError(f'{text!r} is no device; write it as shoulder=drive.eds@2')
+        try:
+            node = node_id(match['node'])
+        except argparse.ArgumentTypeError as error:
+            raise UsageError(f'{text}: {error}') from error
+        devices.append(NewDevice(match['name'], node, load_eds(Path(match['file']))))
+    drives = [device.name for device in devices if device.is_drive]
+    units = {
+        name: read(name, value)
+        for option, read in (('turn', _turn), ('metre', _metre))
+        for name, value in _pairs(option, getattr(options, option), drives)
+    }
+    modes = {name: _mode(name, value) for name, value in _pairs('mode', options.mode, drives)}
+    return [
+        replace(device, units=units.get(device.name), mode=modes.get(device.name))
+        for device in devices
+    ]
+
+
+def _pairs(option: str, texts: Iterable[str], drives: Sequence[str]) -> Iterator[tuple[str, str]]:
+    seen = set()
+    for text in texts:
+        name, _, value = text.partition('=')
+        if name not in drives:
+            raise UsageError(
+                f'--{option} {text}: no drive {name!r}; drives: {", ".join(drives) or "none"}'
+            )
+        if name in seen:
+            raise UsageError(f'--{option} {text}: {name} has one already; give one')
+        seen.add(name)
+        yield name, value
+
+
+def _turn(name: str, text: str) -> Units:
+    number = _increments('turn', name, text)
+    return Units(number / TURN, f'{number:g} increments a turn, as said; per rad')
+
+
+def _metre(name: str, text: str) -> Units:
+    number = _increments('metre', name, text)
+    return Units(number, f'{number:g} increments per m, as said')
+
+
+def _increments(option: str, name: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number) or number == 0.0:
+        raise UsageError(f'--{option} {name}={text}: give a number of increments, not 0')
+    return number
+
+
+def _mode(name: str, text: str) -> OperationMode:
+    for mode in POSITION_MODES:
+        if text == str(int(mode)):
+            return mode
+    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in POSITION_MODES)
+    raise UsageError(f'--mode {name}={text}: choose one of {known}')
+
+
+def _asked(device: NewDevice) -> NewDevice:
+    """Ask the person at the terminal for the units of a drive; a script learns what to give."""
+    if not sys.stdin.isatty():
+        return device
+    question = (
+        f'{device.name}: increments of the encoder for one turn of the joint, gear included'
+        ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
+    )
+    try:
+        answer = input(question).strip()
+    except EOFError as error:
+        raise UsageError(f'give --turn or --metre {device.name}=INCREMENTS') from error
+    return replace(device, units=_turn(device.name, answer))
+
+
+def _period(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 100:
+        raise argparse.ArgumentTypeError(f'{text!r} is no time of 1 to 100 ms')
+    return int(text)

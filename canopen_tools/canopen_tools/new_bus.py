@@ -1,0 +1,325 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bus.yml of EDS files: modes, PDOs and units are chosen by what they say, with the reasons.
+
+What an EDS leaves open is not guessed: the caller gives it, or learns what is missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+import json
+import math
+
+from arm_canopen.config.model.checks.drive_units import is_coarse
+from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
+from arm_canopen.config.read.eds import Eds
+from arm_canopen.config.resolve.pdo_mapping import is_fixed, mapping_slots
+from arm_canopen.exceptions import CanopenError
+from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.datatypes import bit_length
+from arm_canopen.standard.device_profile import is_drive, profile_number
+from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.objects import AXIS_OFFSET, Index, PDO_BITS_MAX
+from arm_canopen.standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
+
+POSITION_MODES = (
+    OperationMode.CYCLIC_POSITION,
+    OperationMode.INTERPOLATED_POSITION,
+    OperationMode.PROFILE_POSITION,
+)
+"""Modes for arms, the best one first: set-points of each cycle, else moves of the drive's own."""
+HEARTBEAT_MS = 1000
+"""Time between two heartbeats of a device in [ms]."""
+TURN = 2.0 * math.pi
+"""A turn in [rad]."""
+
+
+class NewBusError(CanopenError):
+    """No bus.yml can be made of this; the message names the device and what is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """How far an increment is, as somebody has said.
+
+    Attributes:
+        scale: Increments of the drive per rad or m of the joint; negative for the other direction.
+        said: The same in words.
+    """
+
+    scale: float
+    said: str
+
+
+@dataclass(frozen=True, slots=True)
+class NewDevice:
+    """A device of the new bus.
+
+    Attributes:
+        name: Its name; that of the joint, for a drive.
+        node_id: Its node id.
+        eds: Its EDS.
+        mode: Mode of operation; None takes the best one that the EDS names.
+        units: Units of the joint; None where the factor group says them.
+    """
+
+    name: str
+    node_id: int
+    eds: Eds
+    mode: OperationMode | None = None
+    units: Units | None = None
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a CiA 402 drive."""
+        return is_drive(self.eds.dictionary)
+
+    @property
+    def has_open_units(self) -> bool:
+        """Whether neither its EDS nor anybody says how far an increment of its joint is."""
+        return self.is_drive and self.units is None and not _says_units(_factors(self.eds))
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """An object for a PDO, and what a drive without it there lacks; empty where it does not."""
+
+    index: int
+    subindex: int = 0
+    lack: str = ''
+
+
+FEEDBACK = (
+    _Wanted(Index.STATUSWORD, lack='nobody sees its state in the cycle'),
+    _Wanted(Index.POSITION_ACTUAL, lack='nobody sees where it is in the cycle'),
+    _Wanted(Index.MODE_OF_OPERATION_DISPLAY),
+    _Wanted(Index.VELOCITY_ACTUAL),
+    _Wanted(Index.ERROR_CODE),
+)
+
+
+def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
+    """Return a bus.yml.
+
+    Args:
+        devices: One or more.
+        period_ms: Time between two SYNC in [ms].
+
+    Raises:
+        NewBusError: A name or node id is there twice, or an EDS does not say what is needed.
+    """
+    for what, values in (
+        ('name', [device.name for device in devices]),
+        ('node id', [str(device.node_id) for device in devices]),
+    ):
+        if twice := sorted({value for value in values if values.count(value) > 1}):
+            raise NewBusError(f'{what} {twice[0]} is there twice; give each device its own')
+    free = {*range(NODE_ID_MIN, NODE_ID_MAX + 1)} - {device.node_id for device in devices}
+    lines = [
+        '# Made by `canopen new`: what follows a # is why. After a change: canopen check bus.yml',
+        'options:',
+        '  dcf_path: "@BUS_CONFIG_PATH@"  # the EDS files lie beside this file',
+        '',
+        'master:',
+        f'  node_id: {min(free)}  # the lowest one that no device has',
+        '  driver: "ros2_canopen::MasterDriver"',
+        '  package: "canopen_master_driver"',
+        f'  sync_period: {1000 * period_ms}  # [us]',
+        '',
+    ]
+    kinds = [[*_kind(device, period_ms)] for device in devices]
+    are_alike = len(devices) > 1 and all(kind == kinds[0] for kind in kinds)
+    if are_alike:
+        lines += ['defaults:  # of all devices', *(f'  {line}' for line in kinds[0]), '']
+    lines.append('nodes:')
+    for device, kind in zip(devices, kinds, strict=True):
+        own = [f'node_id: {device.node_id}', *_units(device), *([] if are_alike else kind)]
+        lines += [f'  {device.name}:', *(f'    {line}' for line in own)]
+    return '\n'.join(lines) + '\n'
+
+
+def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
+    """Write what devices with the same EDS have in common."""
+    dictionary = device.eds.dictionary
+    yield f'dcf: {json.dumps(device.eds.path.name)}'
+    kind = 'Cia402Driver' if device.is_drive else 'ProxyDriver'
+    package = '402' if device.is_drive else 'proxy'
+    what = 'a drive (CiA 402)' if device.is_drive else 'no drive'
+    why = '0x1000 of the EDS' if profile_number(dictionary) else 'its objects 0x6040 and 0x6041'
+    yield f'driver: "ros2_canopen::{kind}"  # {what}, by {why}'
+    yield f'package: "canopen_{package}_driver"'
+    if _writable(dictionary.get(Index.PRODUCER_HEARTBEAT)):
+        yield f'heartbeat_producer: {HEARTBEAT_MS}  # [ms], so that its loss is noticed'
+    if not device.is_drive:
+        yield '# PDOs stay as the device has them'
+        return
+    if dictionary.has_index(Index.CONTROLWORD + AXIS_OFFSET):
+        raise NewBusError(
+            f'{device.name}: {device.eds.path.name} has several axes (0x6840); write its channels'
+            ' by hand: num_channels and channel_names, one joint for each'
+        )
+    mode, reason = _mode(device)
+    yield f'position_mode: {int(mode)}  # {mode.title.lower()}: {reason}'
+    if mode in CYCLIC_MODES and dictionary.has_index(Index.INTERPOLATION_PERIOD):
+        yield from _interpolation(device, period_ms)
+    yield from _pdos(device, TPDO, FEEDBACK)
+    index, subindex = TARGET_OBJECTS[mode]
+    controls = (
+        _Wanted(Index.CONTROLWORD, lack='it cannot be led through its states in the cycle'),
+        _Wanted(index, subindex, 'it gets no set-points in the cycle'),
+        _Wanted(Index.MODE_OF_OPERATION),
+    )
+    yield from _pdos(device, RPDO, controls)
+
+
+def _mode(device: NewDevice) -> tuple[OperationMode, str]:
+    if device.mode is not None:
+        return device.mode, 'as asked'
+    entry = device.eds.dictionary.get(Index.SUPPORTED_MODES)
+    bits = 0 if entry is None else _number(entry)
+    offered = [mode for mode in POSITION_MODES if bits & mode.support_bit]
+    for mode in offered:
+        target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
+        if target is not None and RPDO.mappable(target):
+            return mode, f'the best of 0x6502 in the EDS (0x{bits:08X}) whose target can be mapped'
+    if offered:
+        return offered[0], f'the best of 0x6502 in the EDS (0x{bits:08X})'
+    known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in POSITION_MODES)
+    what = f'names no position mode in 0x6502 (0x{bits:08X})' if bits else 'has no 0x6502'
+    raise NewBusError(
+        f'{device.name}: {device.eds.path.name} {what}, the modes that the drive has; look'
+        f' into its manual and choose with --mode {device.name}=8: {known}'
+    )
+
+
+def _interpolation(device: NewDevice, period_ms: int) -> Iterator[str]:
+    parts = [device.eds.dictionary.get(Index.INTERPOLATION_PERIOD, sub) for sub in (1, 2)]
+    if not all(map(_writable, parts)):
+        yield f'# 0x60C2 cannot be written: see to it that the drive expects {period_ms} ms'
+        return
+    yield 'sdo:  # the drive expects a set-point with each SYNC'
+    for subindex, value in ((1, period_ms), (2, -3)):
+        yield f'  - {{index: 0x60C2, sub_index: {subindex}, value: {value}}}'
+
+
+def _units(device: NewDevice) -> Iterator[str]:
+    if not device.is_drive:
+        return
+    factors, units = _factors(device.eds), device.units
+    if units is not None:
+        velocity = units.scale * (factors.velocity_factor or 1.0)
+        why = (
+            'by 0x6096 of the EDS'
+            if factors.velocity_factor
+            else 'increments per second, where the manual says nothing else'
+        )
+        yield f'scale_pos_to_dev: {units.scale!r}  # {units.said}'
+        yield f'scale_pos_from_dev: {1.0 / units.scale!r}'
+        yield f'scale_vel_to_dev: {velocity!r}  # {why}'
+        yield f'scale_vel_from_dev: {1.0 / velocity!r}'
+        if units.scale < 0.0:
+            yield 'scale_eff_to_dev: -1.0  # torque turns with the position'
+            yield 'scale_eff_from_dev: -1.0'
+    elif _says_units(factors):
+        turn = factors.position_scale * TURN
+        yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by the EDS'
+    else:
+        raise NewBusError(
+            f'{device.name}: {device.eds.path.name} does not say how far an increment of the joint'
+            ' is (0x608F or 0x6092, with the gear in 0x6091); give'
+            f' --turn {device.name}=INCREMENTS for a turn of the joint with its gear, or'
+            f' --metre {device.name}=INCREMENTS'
+        )
+
+
+def _says_units(factors: FactorGroup) -> bool:
+    """Whether a factor group says what a turn of the joint is: with its gear, and not 1 to 1."""
+    scale = factors.position_scale
+    return factors.gear is not None and bool(scale) and not is_coarse(scale)
+
+
+def _factors(eds: Eds) -> FactorGroup:
+    """Return the factor group by the defaults of an EDS."""
+
+    def value(index: Index) -> float | None:
+        top, bottom = (eds.dictionary.get(index, sub) for sub in (1, 2))
+        return None if top is None or bottom is None else ratio(_number(top), _number(bottom))
+
+    return FactorGroup(**{name: value(index) for name, index in FACTOR_OBJECTS.items()})
+
+
+def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:
+    """Write the PDOs of a direction: as few as hold the objects, the others off."""
+    dictionary = device.eds.dictionary
+    numbers = direction.numbers(dictionary)
+    free = [number for number in numbers if not is_fixed(direction, number, dictionary)]
+    entries, left_out = _mappable(device, direction, wanted)
+    placed: list[tuple[int, ObjectEntry]] = []
+    place, bits, slots = -1, 0, 0
+    for each, entry in entries:
+        size = bit_length(entry.data_type) or PDO_BITS_MAX
+        while (size > bits or not slots) and place < len(free):
+            place += 1
+            bits = PDO_BITS_MAX
+            slots = mapping_slots(direction, free[place], dictionary) if place < len(free) else 0
+        if place == len(free):
+            what = f'the EDS has {len(free)} {direction.title}s that can be mapped'
+            if each.lack:
+                raise _needed(device, each, what)
+            left_out.append(f'{entry}: {what}')
+            continue
+        placed.append((free[place], entry))
+        bits, slots = bits - size, slots - 1
+    yield f'{direction.name}:'
+    for reason in left_out:
+        yield f'  # without {reason}'
+    used = set()
+    for number, pairs in groupby(placed, key=lambda pair: pair[0]):
+        used.add(number)
+        yield f'  {number}:'
+        yield '    cob_id: "auto"'
+        yield '    transmission: 0x01  # with each SYNC'
+        yield '    mapping:'
+        for _, entry in pairs:
+            index, subindex = entry.address
+            yield f'      - {{index: 0x{index:04X}, sub_index: {subindex}}}  # {entry.name}'
+    for number in numbers:
+        if number not in used:
+            yield f'  {number}: {{enabled: false}}'
+
+
+def _mappable(
+    device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]
+) -> tuple[list[tuple[_Wanted, ObjectEntry]], list[str]]:
+    """Return what a direction can carry, and what not, with the reason."""
+    entries, left_out = [], []
+    for each in wanted:
+        entry = device.eds.dictionary.get(each.index, each.subindex)
+        if entry is not None and direction.mappable(entry):
+            entries.append((each, entry))
+            continue
+        what = 'the EDS lacks it' if entry is None else 'the EDS says it cannot be mapped'
+        if each.lack:
+            raise _needed(device, each, what)
+        left_out.append(f'0x{each.index:04X}: {what}')
+    return entries, left_out
+
+
+def _needed(device: NewDevice, wanted: _Wanted, what: str) -> NewBusError:
+    return NewBusError(
+        f'{device.name}: {device.eds.path.name}: 0x{wanted.index:04X}: {what}, and {wanted.lack};'
+        ' correct the EDS (PDOMapping, AccessType) by the manual'
+    )
+
+
+def _writable(entry: ObjectEntry | None) -> bool:
+    return entry is not None and entry.access.writable
+
+
+def _number(entry: ObjectEntry) -> int:
+    return entry.default if isinstance(entry.default, int) else 0

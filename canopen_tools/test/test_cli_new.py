@@ -1,0 +1,310 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``canopen new``: what it writes is free of findings, boots, and leaves nothing to a guess."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+import math
+from pathlib import Path
+import re
+import tempfile
+import time
+
+from can_addresses import free_virtual
+from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, Row
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+from tool_environment import REPOSITORY
+
+from arm_canopen import CanopenMaster, load_bus
+from arm_canopen.config import check_file
+from arm_canopen.standard.drive import OperationMode
+from canopen_sim import simulated_devices
+from canopen_tools.cli.main import main
+
+DRIVE = REPOSITORY / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+CYCLIC_AND_PROFILE = Row(0x6502, 0, 'Supported drive modes', 7, 'ro', '0x81')
+GEAR = (
+    Row(0x6091, 0, 'Highest sub-index', 5, 'const', '2'),
+    Row(0x6091, 1, 'Motor revolutions', 7, 'rw', '100'),
+    Row(0x6091, 2, 'Shaft revolutions', 7, 'rw', '1'),
+)
+INTERPOLATION = (
+    Row(0x60C1, 0, 'Highest sub-index', 5, 'const', '1'),
+    Row(0x60C1, 1, 'First set-point', 4, 'rww', '0', mappable=True),
+)
+SAMPLE = (*DRIVE_ROWS, *FACTOR_ROWS, *GEAR, *INTERPOLATION, CYCLIC_AND_PROFILE)
+PUMP = tuple(
+    replace(row, default='0x00030191') if row.index == 0x1000 else row
+    for row in DRIVE_ROWS
+    if row.index < 0x2000
+)
+TURN = 2.0 * math.pi
+DEADLINE = 20.0  # [s]
+CLEAN = ': 0 errors, 0 warnings'
+OPTIONAL = (0x6060, 0x6061, 0x606C, 0x603F)
+NEEDED = (0x6040, 0x6041, 0x6064, 0x607A, 0x60C1)
+TWO_AXES = DRIVE.with_name('cia402_two_axes.eds')
+
+
+def written(folder: Path, name: str, rows: Sequence[Row]) -> Path:
+    """Write an EDS."""
+    path = folder / name
+    path.write_text(eds_text(rows))
+    return path
+
+
+def without(*indices: int) -> tuple[Row, ...]:
+    """Return the rows of a drive that lacks objects."""
+    return tuple(row for row in SAMPLE if row.index not in indices)
+
+
+def test_a_new_bus_boots_and_follows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """On simulated drives, in the mode that it has; units by the EDS and as said."""
+    bus_yml = tmp_path / 'robot' / 'bus.yml'
+    devices = [f'shoulder={DRIVE}@2', f'elbow={DRIVE}@7', f'lift={DRIVE}@8']
+    units = ['--turn', 'elbow=-36000', '--metre', 'lift=50000']
+    assert main(['new', *devices, *units, '--output', str(bus_yml)]) == 0
+    assert CLEAN in capsys.readouterr().out
+    bus = free_virtual()
+    with (
+        simulated_devices(bus_yml, bus=bus),
+        CanopenMaster.from_bus_yml(bus_yml, bus=bus) as master,
+    ):
+        master.boot()
+        for name, counts in (('shoulder', 1000.0), ('elbow', -36000 / TURN), ('lift', 50000)):
+            drive = master.drive(name)
+            drive.enable()
+            drive.select_mode(OperationMode.CYCLIC_POSITION)
+            deadline = time.monotonic() + DEADLINE
+            while abs(drive.position - 0.02) > 1e-3 and time.monotonic() < deadline:
+                drive.set_target(0.02)
+            assert master.sdo(name).read(0x6064) == pytest.approx(0.02 * counts, rel=0.06)
+
+
+def test_devices_of_several_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each has its own block; what is no drive keeps its PDOs."""
+    drive, pump = written(tmp_path, 'drive.eds', SAMPLE), written(tmp_path, 'pump.eds', PUMP)
+    bus_yml = tmp_path / 'bus.yml'
+    devices = [f'arm={drive}@1', f'pump={pump}@0x10', f'lift={DRIVE}@3']
+    assert main(['new', *devices, '--period', '4', '--output', str(bus_yml)]) == 0
+    output = capsys.readouterr().out
+    assert CLEAN in output
+    config = load_bus(bus_yml)
+    assert [(node.name, node.is_drive) for node in config.nodes] == [
+        ('arm', True),
+        ('pump', False),
+        ('lift', True),
+    ]
+    assert config.master.node_id == 2
+    assert (tmp_path / DRIVE.name).read_bytes() == DRIVE.read_bytes()
+
+
+def ones() -> tuple[Row, ...]:
+    """Return the rows of a drive whose factor group nobody has set: all ratios are 1."""
+    ratios = (0x608F, 0x6091, 0x6092)
+    return tuple(
+        replace(row, default='1') if row.index in ratios and row.subindex else row
+        for row in SAMPLE
+    )
+
+
+def test_velocity_is_in_the_units_of_the_drive(tmp_path: Path) -> None:
+    """Which its EDS may say by 0x6096; torque turns with the position."""
+    rows = [
+        Row(0x6096, 0, 'Highest sub-index', 5, 'const', '2'),
+        Row(0x6096, 1, 'Numerator', 7, 'rw', '60'),
+        Row(0x6096, 2, 'Divisor', 7, 'rw', '1000'),
+    ]
+    drive = written(tmp_path, 'drive.eds', [*SAMPLE, *rows])
+    bus_yml = tmp_path / 'bus.yml'
+    new = ['new', f'arm={drive}@5', '--turn', 'arm=-1000', '--mode', 'arm=1']
+    assert main([*new, '--output', str(bus_yml)]) == 0
+    (node,) = load_bus(bus_yml).nodes
+    axis = node.axes[0]
+    assert axis.scale_pos_to_dev == pytest.approx(-1000.0 / TURN)
+    assert axis.scale_vel_to_dev == pytest.approx(-60.0 / TURN)
+    assert (axis.scale_eff_to_dev, axis.position_mode) == (-1.0, OperationMode.PROFILE_POSITION)
+
+
+def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:
+    """Interpolated position has another one, with a sub-index."""
+    seventh = replace(CYCLIC_AND_PROFILE, default='0x41')
+    both = written(tmp_path, 'both.eds', [*without(0x6502), seventh])
+    profile = written(tmp_path, 'profile.eds', [*without(0x6502, 0x60C1), seventh])
+    bus_yml = tmp_path / 'bus.yml'
+    devices = [f'a={both}@2', f'b={profile}@3']
+    assert main(['new', *devices, '--output', str(bus_yml)]) == 0
+    first, second = load_bus(bus_yml).nodes
+    assert [node.axes[0].position_mode for node in (first, second)] == [7, 1]
+    mapped = [each.mapping[1] for node in (first, second) for each in node.rpdos if each.mapping]
+    assert [(each.index, each.subindex) for each in mapped] == [(0x60C1, 1), (0x607A, 0)]
+
+
+def test_several_axes_are_not_made_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is said what to write."""
+    monkeypatch.chdir(tmp_path)
+    assert main(['new', f'arm={TWO_AXES}@2', '--turn', 'arm=1000']) == 1
+    assert 'several axes' in capsys.readouterr().err
+    assert not (tmp_path / 'bus.yml').exists()
+
+
+@pytest.mark.parametrize(
+    ('rows', 'options', 'words'),
+    [
+        (without(0x6502), [], r'arm: drive\.eds has no 0x6502.*--mode arm=8'),
+        (
+            (*without(0x6502), replace(CYCLIC_AND_PROFILE, default='0x4')),
+            [],
+            r'names no position mode in 0x6502 \(0x00000004\)',
+        ),
+        (without(0x608F, 0x6092), [], 'how far an increment of the joint is.*--turn arm='),
+        (without(0x6091), [], 'with the gear in 0x6091.*--turn arm=.*--metre arm='),
+        (ones(), [], 'how far an increment of the joint is'),
+        (without(0x607A), [], '0x607A: the EDS lacks it.*no set-points'),
+        (SAMPLE, ['--mode', 'arm=7', '--mode', 'arm=8'], 'arm has one already'),
+        (
+            tuple(replace(row, mappable=False) if row.index == 0x6041 else row for row in SAMPLE),
+            [],
+            '0x6041: the EDS says it cannot be mapped.*correct the EDS',
+        ),
+        (without(*range(0x1800, 0x1806)), [], '0x6041: the EDS has 0 TPDOs that can be mapped'),
+        (SAMPLE, ['--turn', 'leg=1'], "no drive 'leg'; drives: arm"),
+        (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
+        (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
+        (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),
+    ],
+)
+def test_what_is_not_said_is_asked_for(
+    *,
+    rows: Sequence[Row],
+    options: Sequence[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With the option that says it; no file is written."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, 'drive.eds', rows)
+    assert main(['new', 'arm=drive.eds@5', *options]) != 0
+    assert re.search(words, capsys.readouterr().err)
+    assert not (tmp_path / 'bus.yml').exists()
+
+
+@pytest.mark.parametrize(
+    ('devices', 'words'),
+    [
+        (['drive.eds@2'], 'is no device; write it as shoulder=drive.eds@2'),
+        (['2=drive.eds@2'], 'is no device'),
+        (['arm=drive.eds@128'], '128 is no node id'),
+        (['arm=drive.eds@2', 'arm=drive.eds@3'], 'name arm is there twice'),
+        (['arm=drive.eds@2', 'leg=drive.eds@2'], 'node id 2 is there twice'),
+        (['arm=other.eds@2'], 'no such file'),
+    ],
+)
+def test_devices_that_cannot_be(
+    devices: Sequence[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They are named."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, 'drive.eds', SAMPLE)
+    assert main(['new', *devices]) != 0
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / 'bus.yml').exists()
+
+
+def test_nothing_is_overwritten(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a bus.yml, unless --force says so, nor an EDS of the same name."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, 'drive.eds', SAMPLE)
+    (tmp_path / 'bus.yml').write_text('mine')
+    assert main(['new', 'arm=drive.eds@2']) == 2
+    assert (tmp_path / 'bus.yml').read_text() == 'mine'
+    assert main(['new', 'arm=drive.eds@2', '--force']) == 0
+    (tmp_path / 'other').mkdir()
+    written(tmp_path / 'other', 'drive.eds', without(0x603F))
+    assert main(['new', 'arm=drive.eds@2', '--output', 'other/bus.yml']) == 2
+    assert 'rename one' in capsys.readouterr().err
+    devices = ['arm=drive.eds@2', 'leg=other/drive.eds@3']
+    assert main(['new', *devices, '--output', 'third/bus.yml']) == 2
+    assert not (tmp_path / 'third').exists()
+
+
+def test_a_person_is_asked_for_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the EDS does not say them."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, 'drive.eds', without(0x608F, 0x6092))
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
+    monkeypatch.setattr('builtins.input', lambda asked: ' 62831.853 ' if 'arm' in asked else '')
+    assert main(['new', 'arm=drive.eds@2']) == 0
+    (node,) = load_bus(tmp_path / 'bus.yml').nodes
+    assert node.axes[0].scale_pos_to_dev == pytest.approx(10_000.0)
+
+
+def changed(row: Row, fits: set[int], constant: set[int]) -> Row:
+    """Return a row that can be mapped, or written, only where it is among those."""
+    if row.index in {*OPTIONAL, *NEEDED} and row.data_type != 5:
+        row = replace(row, mappable=row.index in fits)
+    is_fixed = row.index in constant and (row.index < 0x1600 or row.subindex == 0)
+    return replace(row, access='const') if is_fixed else row
+
+
+@settings(max_examples=40)
+@given(
+    missing=st.sets(st.sampled_from((*OPTIONAL, *NEEDED)), max_size=3),
+    gone=st.sets(st.sampled_from((0x60C2, 0x1017))),
+    constant=st.sets(st.sampled_from((0x60C2, 0x1017, 0x1600, 0x1601, 0x1A00))),
+    modes=st.integers(0, 0x3FF),
+    pdos=st.tuples(st.integers(0, 6), st.integers(0, 6)),
+    slots=st.integers(1, 8),
+    period=st.integers(1, 100),
+)
+def test_whatever_an_eds_has_the_bus_is_without_findings_or_refused(
+    *,
+    missing: set[int],
+    gone: set[int],
+    constant: set[int],
+    modes: int,
+    pdos: tuple[int, int],
+    slots: int,
+    period: int,
+) -> None:
+    """Refused only where something is missing that a drive cannot do without."""
+    fits = {*OPTIONAL, *NEEDED} - missing
+    without_pdos = {*range(0x1400 + pdos[0], 0x1406), *range(0x1800 + pdos[1], 0x1806)}
+    without_pdos |= {index + 0x200 for index in without_pdos}
+    rows = [
+        changed(row, fits, constant)
+        for row in without(0x6502, *without_pdos, *gone)
+        if not (0x1600 <= row.index < 0x1C00 and row.index & 0x200 and row.subindex > slots)
+    ]
+    rows.append(replace(CYCLIC_AND_PROFILE, default=hex(modes)))
+    free = [
+        len({*range(first, first + count)} - constant) * min(slots, 2)
+        for first, count in zip((0x1600, 0x1A00), pdos, strict=True)
+    ]
+    cyclic, interpolated = modes & 0x81 and 0x607A in fits, modes & 0x40 and 0x60C1 in fits
+    can_be = bool(cyclic or interpolated) and {0x6040, 0x6041, 0x6064} <= fits and min(free) > 1
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        device = f'arm={written(folder, "drive.eds", rows)}@9'
+        arguments = ['--period', str(period), '--output', str(folder / 'bus.yml')]
+        assert (main(['new', device, *arguments]) == 0) is can_be
+        if can_be:
+            report = check_file(folder / 'bus.yml')
+            assert not report.errors
+            remedies = {each.remedy for each in report.warnings}
+            assert remedies <= {'map both into one RPDO', 'write heartbeat_producer: 100'}
+            assert slots == 1 or 0x1017 in gone | constant or not remedies
