@@ -3,8 +3,21 @@
 """Build description of quad_sim."""
 
 from pathlib import Path
+import sys
 
 from setuptools import find_packages, setup
+
+# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
+FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
+
+EXECUTABLES = [
+    'export_mjcf = quad_sim.export_mjcf:main',
+    'fake_xgo = quad_sim.fake_xgo:main',
+]
+COMMANDS = [
+    'fake_xgo = quad_sim.fake_xgo:main',
+    'quad-export-mjcf = quad_sim.export_mjcf:main',
+]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
@@ -38,11 +51,15 @@ setup(
         sibling('quad_description'),
         sibling('quad_hardware'),
     ],
-    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
+    extras_require={
+        'test': ['pytest'],
+        'ros': [sibling('libraries/node_runner')],
+        'env': ['gymnasium>=1.1'],
+    },
     zip_safe=True,
     maintainer='The arm and quad developers',
     maintainer_email='developers@example.org',
     description='The XGO quadruped in physics, behind a board that speaks its serial protocols',
     license='Apache-2.0',
-    entry_points={'console_scripts': ['fake_xgo = quad_sim.fake_xgo:main']},
+    entry_points={'console_scripts': EXECUTABLES if FOR_ROS else COMMANDS},
 )

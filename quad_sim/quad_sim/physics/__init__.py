@@ -4,5 +4,6 @@
 
 from .backend import PhysicsBackend
 from .robot import Robot
+from .variation import Variation
 
-__all__ = ['PhysicsBackend', 'Robot']
+__all__ = ['PhysicsBackend', 'Robot', 'Variation']

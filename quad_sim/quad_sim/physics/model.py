@@ -8,6 +8,7 @@ the shapes of the links are only drawings.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import mujoco
@@ -50,17 +51,47 @@ def build_model(
     Raises:
         SetupError: The URDF is no such robot.
     """
+    return _compiled(urdf, servo, terrain, timestep)[1]
+
+
+def mjcf(
+    urdf: str, servo: ServoParameters, timestep: float, start: Sequence[float], *, floor: bool
+) -> str:
+    """Return the robot as MJCF, for trainers that simulate it themselves (mjlab, Playground).
+
+    Args:
+        urdf: The robot, as for :func:`build_model`.
+        servo: What drives its hinges, but for the interpolation: a trainer sets targets itself.
+        timestep: Of the integration [s].
+        start: Position of base_link [m], its orientation (w, x, y, z), and positions of all
+            joints of the model, for the keyframe ``stand``.
+        floor: With level ground.
+
+    Raises:
+        SetupError: The URDF is no such robot.
+    """
+    spec, model = _compiled(urdf, servo, Terrain() if floor else None, timestep)
+    ctrl = [start[int(model.jnt_qposadr[joint])] for joint in model.actuator_trnid[:, 0]]
+    spec.add_key(name='stand', qpos=list(start), ctrl=ctrl)
+    text: str = spec.to_xml()
+    return text
+
+
+def _compiled(
+    urdf: str, servo: ServoParameters, terrain: Terrain | None, timestep: float
+) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     if mujoco.get_mju_user_warning() is None:  # else it writes a MUJOCO_LOG.TXT where it runs
         mujoco.set_mju_user_warning(_pass_over)
     try:
         spec = _load(urdf)
         _set_options(spec, timestep)
         _add_base(spec)
-        _add_floor(spec, terrain)
+        if terrain is not None:
+            _add_floor(spec, terrain)
         for joint in movable_joints(urdf):
             _add_servo(spec, joint, servo)
         _add_sensors(spec)
-        return spec.compile()
+        return spec, spec.compile()
     except ValueError as error:
         raise SetupError(f'the robot description cannot be simulated: {error}') from error
 
@@ -126,6 +157,8 @@ def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> Non
         biasprm=_padded(0.0, -servo.stiffness, -servo.velocity_gain),
         forcelimited=True,
         forcerange=[-joint.limits.effort, joint.limits.effort],
+        ctrllimited=True,
+        ctrlrange=[joint.limits.lower, joint.limits.upper],
     )
 
 
@@ -146,6 +179,7 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
         spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=IMU)
     for foot in FEET:
         body = _body(spec, foot)
+        body.geoms[0].name = foot
         radius = float(body.geoms[0].size[0]) + _TOUCH_MARGIN
         body.add_site(name=foot, size=[radius] * 3)
         spec.add_sensor(

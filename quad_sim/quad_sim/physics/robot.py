@@ -21,17 +21,18 @@ from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement
 from ..plant.targets import TargetRamp, Targets
 from ..plant.terrain import FLAT, Terrain
 from .inertial import base_rotation, InertialUnit, vector
-from .model import BASE, build_model, FEET
+from .model import BASE, build_model, FEET, mjcf
 from .placing import place, start_positions
+from .variation import AS_MADE, Variation, VariedModel
 
 TIMESTEP: Final = 0.002  # [s]
 STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
 MAX_KICK: Final = 10.0  # [m/s] of a kick
-UNSTABLE: Final = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-)
+UNSTABLE: Final = [
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+]
 
 
 class Robot:
@@ -73,7 +74,7 @@ class Robot:
         if not 0.0 < timestep <= 0.01:
             raise SetupError(f'timestep {timestep} s: give more than 0 and at most 0.01')
         self._servo = servo.parameters if isinstance(servo, ServoModel) else servo
-        self._terrain, self._noise = terrain, noise
+        self._urdf, self._terrain, self._noise = urdf, terrain, noise
         self._model = build_model(urdf, self._servo, terrain, timestep)
         self._data = mujoco.MjData(self._model)
         joints = movable_joints(urdf)
@@ -83,26 +84,34 @@ class Robot:
         self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
         self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]
         self._inertial = InertialUnit(self._model, self._data)
-        self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
+        self._varied = VariedModel(self._model)
         self._ramp = TargetRamp(joints, timestep, self._data.ctrl)
         self._random = np.random.default_rng(seed)
         self.reset(pose=pose, seed=seed)
 
-    def reset(self, *, pose: Mapping[str, float] | None = None, seed: int = 0) -> None:
+    def reset(
+        self,
+        *,
+        pose: Mapping[str, float] | None = None,
+        seed: int = 0,
+        variation: Variation = AS_MADE,
+    ) -> None:
         """Stand on the ground again, as a new robot with these arguments would.
 
         Args:
             pose: Joint positions at the start [rad]; the standing pose for those left out.
             seed: Of the sensors' noise.
+            variation: How robot and ground differ from what they were made as.
 
         Raises:
             SetupError: The pose names joints that the robot lacks.
         """
+        self._varied.vary(self._data, variation)
+        self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
         mujoco.mj_resetData(self._model, self._data)
         self._random = np.random.default_rng(seed)
         self._steps, self._remainder = 0, 0.0
         self._push_until: int | None = None
-        self.set_torque(True)
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
         self._ramp.jump(start)
@@ -202,10 +211,17 @@ class Robot:
         self._remainder += duration / self._model.opt.timestep
         count = int(self._remainder + 1e-6)
         self._remainder -= count
+        model, data, ramp, inertial = self._model, self._data, self._ramp, self._inertial
         for _ in range(count):
-            self._step_once()
+            ramp.advance()
+            if self._push_until is not None and self._steps >= self._push_until:
+                data.xfrc_applied[self._base] = 0.0
+                self._push_until = None
+            mujoco.mj_step(model, data)
+            inertial.sample()
+            self._steps += 1
         # MuJoCo puts such a robot back to its start by itself: only its warnings show it
-        if any(self._data.warning[int(kind)].number for kind in UNSTABLE):
+        if self._data.warning.number[UNSTABLE].any():
             raise SimulationError(
                 f'the physics blew up at {self.time:.3f} s; use a softer servo or a shorter step'
             )
@@ -279,6 +295,15 @@ class Robot:
         """Return where the origin of a link is, in the world [m]."""
         return vector(self._data.body(link).xpos)
 
+    def mjcf(self, *, floor: bool) -> str:
+        """Return the robot as MJCF, with the pose of now as keyframe ``stand``.
+
+        Args:
+            floor: With level ground.
+        """
+        timestep = float(self._model.opt.timestep)
+        return mjcf(self._urdf, self._servo, timestep, self._data.qpos.tolist(), floor=floor)
+
     def measure(self) -> Measurement:
         """Return what the sensors measure, with the noise that the robot was made with."""
         truth = Measurement(
@@ -296,16 +321,6 @@ class Robot:
     @property
     def _base(self) -> int:
         return int(self._model.body(BASE).id)
-
-    def _step_once(self) -> None:
-        data = self._data
-        self._ramp.advance()
-        if self._push_until is not None and self._steps >= self._push_until:
-            data.xfrc_applied[self._base] = 0.0
-            self._push_until = None
-        mujoco.mj_step(self._model, data)
-        self._inertial.sample()
-        self._steps += 1
 
     def _heading_to_world(self, vector: Vector) -> Array:
         yaw = self.base_pose.roll_pitch_yaw[2]

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quad_description import Joint
 
@@ -41,6 +42,7 @@ class TargetRamp:
         self._slope: Array = np.zeros(len(joints))  # [rad] a step; 0 for those that stand still
         self._arrival = np.zeros(len(joints), dtype=np.int64)  # step in which each arrives
         self._step = self._next_arrival = self._last_arrival = 0
+        self._all = np.arange(len(joints))
 
     @property
     def goal(self) -> Array:
@@ -65,12 +67,15 @@ class TargetRamp:
             TargetError: A name is unknown, a value is not finite, or there are too many or few.
         """
         indices, values = self._checked(targets)
-        goal = np.clip(values, self._lower[indices], self._upper[indices])
+        goal = np.minimum(np.maximum(values, self._lower[indices]), self._upper[indices])
         steps = max(round(duration / self._timestep), 1)
         self._goal[indices] = goal
         self._slope[indices] = (goal - self.values[indices]) / steps
         self._arrival[indices] = self._step + steps
-        self._plan()
+        if indices is self._all:
+            self._next_arrival = self._last_arrival = self._step + steps
+        else:
+            self._plan()
 
     def check(self, targets: Targets) -> None:
         """Refuse what :meth:`approach` would refuse, and change nothing.
@@ -97,22 +102,22 @@ class TargetRamp:
         self._next_arrival = int(coming.min()) if len(coming) else self._step
         self._last_arrival = int(coming.max()) if len(coming) else self._step
 
-    def _checked(self, targets: Targets) -> tuple[list[int], Array]:
+    def _checked(self, targets: Targets) -> tuple[NDArray[np.intp], Array]:
         if isinstance(targets, Mapping):
             unknown = sorted(targets.keys() - self._index.keys())
             if unknown:
                 known = ', '.join(self._index)
                 raise TargetError(f'no joint is named {", ".join(unknown)}; there are {known}')
-            indices = [self._index[name] for name in targets]
+            indices = np.array([self._index[name] for name in targets], np.intp)
             values = np.array(list(targets.values()), dtype=np.float64)
         else:
-            indices = list(self._index.values())
+            indices = self._all
             values = np.asarray(targets, dtype=np.float64)
             if values.shape != (len(indices),):
                 raise TargetError(
                     f'{values.shape} targets for {len(indices)} joints; give one for each'
                 )
-        if not np.all(np.isfinite(values)):
+        if not np.isfinite(values).all():
             names = list(self._index)
             bad = [names[indices[k]] for k in np.flatnonzero(~np.isfinite(values))]
             raise TargetError(f'targets of {", ".join(bad)} are not finite; nothing moves')

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in physics as a Gymnasium environment; importing it registers ``quad_sim/Walk-v0``.
+
+Many at once, spread over the cores::
+
+    import gymnasium
+    import quad_sim.env
+
+    envs = gymnasium.make_vec(
+        'quad_sim/Walk-v0', num_envs=16, vectorization_mode='vector_entry_point'
+    )
+"""
+
+from gymnasium.envs.registration import register
+
+from .processes import ProcessVectorEnv
+from .randomization import NO_RANDOMIZATION, Randomization
+from .rewards import RewardWeights
+from .walking import CommandRanges, Observation, WalkingEnv
+
+ID = 'quad_sim/Walk-v0'
+
+register(
+    id=ID,
+    entry_point='quad_sim.env:WalkingEnv',
+    vector_entry_point='quad_sim.env.processes:walking_processes',
+)
+
+__all__ = [
+    'ID',
+    'NO_RANDOMIZATION',
+    'CommandRanges',
+    'Observation',
+    'ProcessVectorEnv',
+    'Randomization',
+    'RewardWeights',
+    'WalkingEnv',
+]

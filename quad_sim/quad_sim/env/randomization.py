@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What is otherwise in each episode, so that a policy learns to live with it: as data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+import math
+from typing import Any
+
+import numpy as np
+
+from ..exceptions import SetupError
+from ..physics.variation import Variation
+from ..plant.noise import BOARD, Noise, NONE
+
+Range = tuple[float, float]
+
+
+def check_range(name: str, span: Range) -> None:
+    """Refuse what is not two finite numbers, the lower one first.
+
+    Raises:
+        SetupError: With the name.
+    """
+    if len(span) != 2 or not -math.inf < span[0] <= span[1] < math.inf:
+        raise SetupError(f'{name} {span}: give two finite numbers, the lower one first')
+
+
+@dataclass(frozen=True, slots=True)
+class Randomization:
+    """Ranges from which each episode draws, all alike likely.
+
+    Attributes:
+        friction: Under the feet.
+        trunk_mass: Factor of the mass of the trunk.
+        stiffness: Factor of the servos' stiffness.
+        damping: Factor of their damping.
+        delay: From a target to the servos in [s], less than a period.
+        gyro_bias: Of each axis of the gyro in [rad/s].
+        level_bias: Of measured roll and pitch in [rad].
+        kick: Change of the velocity at once, ahead and to the side, in [m/s].
+        kick_interval: Mean time between two kicks in [s]; 0 for none.
+        noise: Of the sensors.
+    """
+
+    friction: Range = (0.4, 1.3)
+    trunk_mass: Range = (0.9, 1.25)
+    stiffness: Range = (0.8, 1.2)
+    damping: Range = (0.8, 1.2)
+    delay: Range = (0.0, 0.015)
+    gyro_bias: Range = (-0.05, 0.05)
+    level_bias: Range = (-0.02, 0.02)
+    kick: Range = (-0.4, 0.4)
+    kick_interval: float = 4.0
+    noise: Noise = BOARD
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing can be drawn from."""
+        for field in fields(self):
+            if field.name not in {'kick_interval', 'noise'}:
+                check_range(field.name, getattr(self, field.name))
+        self._variation([span[0] for span in self._spans])  # refuses what no robot has
+        if self.delay[0] < 0.0:
+            raise SetupError(f'delay {self.delay} s: give 0 or more')
+        if not 0.0 <= self.kick_interval < math.inf:
+            raise SetupError(f'kick_interval {self.kick_interval} s: give 0 or a finite time')
+
+    def variation(self, random: np.random.Generator) -> Variation:
+        """Draw a robot and its ground."""
+        return self._variation([float(random.uniform(*span)) for span in self._spans])
+
+    def scaled(self, share: float) -> Randomization:
+        """Return ranges that are nearer to the robot as it is; kicks are weaker. Noise stays.
+
+        Args:
+            share: 0 for the robot as it is, 1 for these ranges.
+
+        Raises:
+            SetupError: The share is not from 0 to 1.
+        """
+        if not 0.0 <= share <= 1.0:
+            raise SetupError(f'share {share}: give 0 to 1')
+        spans: dict[str, Any] = {
+            field.name: tuple(
+                (1.0 - share) * none + share * end
+                for none, end in zip(
+                    getattr(NO_RANDOMIZATION, field.name), getattr(self, field.name), strict=True
+                )
+            )
+            for field in fields(self)
+            if field.name not in {'kick_interval', 'noise'}
+        }
+        return replace(self, **spans)
+
+    @property
+    def _spans(self) -> tuple[Range, ...]:
+        return self.friction, self.trunk_mass, self.stiffness, self.damping
+
+    @staticmethod
+    def _variation(numbers: Sequence[float]) -> Variation:
+        friction, trunk_mass, stiffness, damping = numbers
+        return Variation(friction, trunk_mass, stiffness, damping)
+
+
+NO_RANDOMIZATION = Randomization(
+    friction=(0.8, 0.8),
+    trunk_mass=(1.0, 1.0),
+    stiffness=(1.0, 1.0),
+    damping=(1.0, 1.0),
+    delay=(0.0, 0.0),
+    gyro_bias=(0.0, 0.0),
+    level_bias=(0.0, 0.0),
+    kick=(0.0, 0.0),
+    kick_interval=0.0,
+    noise=NONE,
+)
+"""The robot as it is, on level ground, with ideal sensors."""

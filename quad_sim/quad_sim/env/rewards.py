@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What walking well is worth, as weights; terms as in legged_gym (Rudin et al., 2022)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+import math
+
+from quad_description.rotations import Vector
+
+from ..exceptions import SetupError
+from ..plant.state import Array, BaseVelocity
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What a step brought about.
+
+    Attributes:
+        commanded: Velocity ahead and to the left in [m/s], turning in [rad/s].
+        velocity: How base_link moves.
+        down: Direction of gravity in base_link.
+        torques: Of the joints in [N m].
+        velocities: Of the joints in [rad/s].
+        target_speed: Of the targets since the step before in [rad/s].
+        fallen: The robot has fallen.
+    """
+
+    commanded: Vector
+    velocity: BaseVelocity
+    down: Vector
+    torques: Array
+    velocities: Array
+    target_speed: Array
+    fallen: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RewardWeights:
+    """Weights of the terms of a second, of which a step has its part; a fall counts once.
+
+    Attributes:
+        tracking: exp(-(error / tracking_width)^2) of the linear velocity.
+        turning: exp(-(error / turning_width)^2) of the turning.
+        vertical: Square of the velocity up and down in [m2/s2].
+        rolling: Square of the turning about x and y in [rad2/s2].
+        level: Square of the sine of the tilt.
+        power: Of the servos' torques, before the damping of their motors, in [W].
+        action_rate: Square of the speed of the targets in [rad2/s2].
+        fall: Of a fall.
+        tracking_width: [m/s]
+        turning_width: [rad/s]
+    """
+
+    tracking: float = 2.0
+    turning: float = 1.0
+    vertical: float = -2.0
+    rolling: float = -0.05
+    level: float = -2.0
+    power: float = -0.02
+    action_rate: float = -0.002
+    fall: float = -5.0
+    tracking_width: float = 0.1
+    turning_width: float = 0.4
+
+    def __post_init__(self) -> None:
+        """Refuse numbers of which no reward can be made."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or (field.name.endswith('_width') and value <= 0.0):
+                raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
+
+    def terms(self, moved: Moved, period: float) -> dict[str, float]:
+        """Return what each term is worth in one step.
+
+        Args:
+            moved: What the step brought about.
+            period: Time that it took in [s].
+        """
+        (x, y, up), (roll, pitch, yaw) = moved.velocity.linear, moved.velocity.angular
+        wanted_x, wanted_y, wanted_yaw = moved.commanded
+        off = math.hypot(x - wanted_x, y - wanted_y)
+        tilt = moved.down[0] ** 2 + moved.down[1] ** 2
+        target_speed = float((moved.target_speed * moved.target_speed).sum())
+        rates = {
+            'tracking': self.tracking * math.exp(-((off / self.tracking_width) ** 2)),
+            'turning': self.turning * math.exp(-(((yaw - wanted_yaw) / self.turning_width) ** 2)),
+            'vertical': self.vertical * up * up,
+            'rolling': self.rolling * (roll * roll + pitch * pitch),
+            'level': self.level * tilt,
+            'power': self.power * float(abs(moved.torques * moved.velocities).sum()),
+            'action_rate': self.action_rate * target_speed,
+        }
+        worth = {name: period * rate for name, rate in rates.items()}
+        return worth | {'fall': self.fall if moved.fallen else 0.0}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the terms."""
+        return tuple(field.name for field in fields(self) if not field.name.endswith('_width'))

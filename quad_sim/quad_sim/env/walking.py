@@ -1,0 +1,306 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Walking as commanded: the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+import math
+from typing import Any
+
+import gymnasium
+from gymnasium import spaces
+import numpy as np
+from numpy.typing import NDArray
+
+from quad_description import (
+    ImuSample,
+    JointSample,
+    movable_joints,
+    Pose,
+    pose_positions,
+    robot_urdf,
+    RobotState,
+)
+from quad_description.rotations import down_in_body, from_roll_pitch_yaw, Vector
+
+from ..exceptions import SetupError, TargetError
+from ..physics import Robot
+from ..plant.servo import ServoModel, ServoParameters
+from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
+from .rewards import Moved, RewardWeights
+
+Floats = NDArray[np.float32]
+
+PERIOD = 0.02  # [s]
+MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRanges:
+    """Velocities that are commanded.
+
+    Attributes:
+        x: Ahead in [m/s].
+        y: To the left in [m/s].
+        yaw: Turning to the left in [rad/s].
+        time: Between two commands in [s].
+        rest: Share of the commands that are zero.
+        straight: Share of the others along one axis only.
+    """
+
+    x: Range = (-0.35, 0.35)
+    y: Range = (-0.15, 0.15)
+    yaw: Range = (-1.5, 1.5)
+    time: float = 2.0
+    rest: float = 0.15
+    straight: float = 0.4
+
+    def __post_init__(self) -> None:
+        """Refuse what nothing can be drawn from."""
+        for name in ('x', 'y', 'yaw'):
+            check_range(name, getattr(self, name))
+        if not 0.0 < self.time < math.inf:
+            raise SetupError(f'time {self.time} s: give a finite time above 0')
+        if not (0.0 <= self.rest <= 1.0 and 0.0 <= self.straight <= 1.0):
+            raise SetupError(f'rest {self.rest}, straight {self.straight}: give parts of 0 to 1')
+
+    def draw(self, random: np.random.Generator) -> Vector:
+        """Draw a command."""
+        if random.random() < self.rest:
+            return 0.0, 0.0, 0.0
+        parts = np.array([random.uniform(*span) for span in (self.x, self.y, self.yaw)])
+        if random.random() < self.straight:
+            parts *= np.eye(3)[random.integers(3)]
+        x, y, yaw = parts.tolist()
+        return x, y, yaw
+
+
+class Observation(Enum):
+    """Parts of an observation in their order: what it is, and how many numbers (0: a joint)."""
+
+    ANGULAR_VELOCITY = ('of base_link in its own frame in [rad/s]', 3)
+    DOWN = ('direction of gravity in base_link', 3)
+    COMMAND = ('velocity ahead and to the left in [m/s], turning in [rad/s]', 3)
+    POSITIONS = ('of the joints, from those of a robot that stands, in [rad]', 0)
+    VELOCITIES = ('of the joints in [rad/s]', 0)
+    ACTION = ('of the step before in [rad]', 0)
+
+    def width(self, joints: int) -> int:
+        """Return how many numbers it has."""
+        return self.value[1] or joints
+
+
+class WalkingEnv(gymnasium.Env[Floats, Floats]):
+    """A quadruped that is to walk as commanded.
+
+    An action is how far the targets of the joints are from a robot that stands in [rad]. Robot,
+    servos and sensors are those of the simulation. An episode is terminated by a fall, and
+    truncated after its time.
+
+    Attributes:
+        robot: The robot in physics.
+        state: What its sensors measured last.
+        command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
+        stand: Joint positions of a robot that stands in [rad].
+    """
+
+    def __init__(
+        self,
+        *,
+        preset: str = 'lite',
+        servo: ServoModel | ServoParameters = ServoModel.FIRM,
+        randomization: Randomization = NO_RANDOMIZATION,
+        commands: CommandRanges | None = None,
+        weights: RewardWeights | None = None,
+        period: float = PERIOD,
+        duration: float = 20.0,
+    ) -> None:
+        """Put the robot on the ground.
+
+        Args:
+            preset: The robot.
+            servo: How its servos follow.
+            randomization: What differs in each episode.
+            commands: What is commanded.
+            weights: What walking well is worth.
+            period: Time of a step in [s].
+            duration: Longest time of an episode in [s].
+
+        Raises:
+            SetupError: A time is not above 0, or a target may come later than its step ends.
+            DescriptionError: There is no such preset.
+        """
+        if not (0.0 < period < math.inf and period <= duration < math.inf):
+            raise SetupError(
+                f'period {period} s, duration {duration} s: give 0 < period < duration'
+            )
+        urdf = robot_urdf(preset)
+        self.robot = Robot(urdf, servo, noise=randomization.noise)
+        self.period, self.duration = period, duration
+        self.vary(randomization)
+        self._commands = commands or CommandRanges()
+        self._weights = weights or RewardWeights()
+        names = self.robot.joint_names
+        limits = [joint.limits for joint in movable_joints(urdf)]
+        stand = pose_positions(Pose.STAND)
+        self.stand: Floats = np.array([stand[name] for name in names], np.float32)
+        self._lowest: Floats = np.array([each.lower for each in limits], np.float32) - self.stand
+        self._highest: Floats = np.array([each.upper for each in limits], np.float32) - self.stand
+        self.action_space = spaces.Box(self._lowest, self._highest)
+        width = sum(part.width(len(names)) for part in Observation)
+        self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
+        self.command: Vector = (0.0, 0.0, 0.0)
+        self.state = RobotState()
+        self._action: Floats = np.zeros_like(self.stand)
+        self._begin()
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
+        """Stand on the ground again, as another robot of the ranges.
+
+        Args:
+            seed: Of all that is drawn from now on.
+            options: ``command``: three numbers that are commanded in all of this episode.
+
+        Raises:
+            SetupError: The command is not three finite numbers, or there is another option.
+        """
+        super().reset(seed=seed)
+        self._begin(_lasting_command(options or {}))
+        return self._observation(), {}
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Send joint targets, and let a period pass.
+
+        Args:
+            action: From the joints of a robot that stands in [rad]; what leads beyond a limit is
+                taken to the limit.
+
+        Raises:
+            TargetError: A number is not finite, or there are too many or few.
+            SimulationError: The physics blew up.
+        """
+        wanted = np.asarray(action, np.float32)
+        if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
+            raise TargetError(
+                f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
+            )
+        wanted = np.clip(wanted, self._lowest, self._highest)
+        robot, random = self.robot, self.np_random
+        interval = self._randomization.kick_interval
+        if interval and random.random() < self.period / interval:
+            robot.kick((*random.uniform(*self._randomization.kick, 2).tolist(), 0.0))
+        if self._delay:
+            robot.step(self._delay)
+        robot.set_targets((self.stand + wanted).astype(np.float64))
+        robot.step(self.period - self._delay)
+        self._steps += 1
+        moved = self._moved(wanted)
+        terms = self._weights.terms(moved, self.period)
+        for name, value in terms.items():
+            self._sums[name] += value
+        self._action = wanted
+        is_over = self._steps >= round(self.duration / self.period)
+        info: dict[str, Any] = {}
+        if moved.fallen or is_over:
+            info['reward_terms'] = dict(self._sums)
+        if not self._is_command_lasting and self._steps % self._command_steps == 0:
+            self.command = self._commands.draw(random)  # what is seen now is judged next
+        self.state = self._sense()
+        return (
+            self._observation(),
+            sum(terms.values()),
+            moved.fallen,
+            is_over and not moved.fallen,
+            info,
+        )
+
+    def vary(self, randomization: Randomization) -> None:
+        """Let other things differ from the next episode on; noise stays as it was made.
+
+        Raises:
+            SetupError: A target may come later than its step ends.
+        """
+        if randomization.delay[1] >= self.period:
+            raise SetupError(
+                f'delay {randomization.delay} s: give less than a period, {self.period} s'
+            )
+        self._randomization = randomization
+
+    def _begin(self, command: Vector | None = None) -> None:
+        random, ranges = self.np_random, self._randomization
+        self.robot.reset(seed=int(random.integers(2**31)), variation=ranges.variation(random))
+        self._delay = float(random.uniform(*ranges.delay))
+        self._gyro_bias = random.uniform(*ranges.gyro_bias, 3)
+        self._level_bias = random.uniform(*ranges.level_bias, 2).tolist()
+        self._is_command_lasting = command is not None
+        self.command = command or self._commands.draw(random)
+        self._steps = 0
+        self._command_steps = max(round(self._commands.time / self.period), 1)
+        self._sums = dict.fromkeys(self._weights.names, 0.0)
+        self._action = np.zeros_like(self.stand)
+        self.state = self._sense()
+
+    def _sense(self) -> RobotState:
+        measured = self.robot.measure()
+        roll, pitch, yaw = measured.imu.roll_pitch_yaw
+        orientation = from_roll_pitch_yaw(
+            roll + self._level_bias[0], pitch + self._level_bias[1], yaw
+        )
+        x, y, z = (np.array(measured.imu.angular_velocity) + self._gyro_bias).tolist()
+        return RobotState(
+            JointSample(
+                tuple(measured.positions.tolist()),
+                tuple(measured.velocities.tolist()),
+                self.robot.time,
+            ),
+            ImuSample(orientation, (x, y, z), measured.imu.specific_force),
+            time=self.robot.time,
+        )
+
+    def _observation(self) -> Floats:
+        joints, imu = self.state.joints, self.state.imu
+        if (
+            joints is None
+            or imu is None
+            or joints.velocities is None
+            or imu.angular_velocity is None
+        ):
+            raise SetupError('a robot in physics measures joints and attitude')
+        parts = {
+            Observation.ANGULAR_VELOCITY: imu.angular_velocity,
+            Observation.DOWN: imu.down,
+            Observation.COMMAND: self.command,
+            Observation.POSITIONS: np.asarray(joints.positions) - self.stand,
+            Observation.VELOCITIES: joints.velocities,
+            Observation.ACTION: self._action,
+        }
+        return np.concatenate([np.asarray(parts[part], np.float32) for part in Observation])
+
+    def _moved(self, action: Floats) -> Moved:
+        robot = self.robot
+        pose = robot.base_pose
+        return Moved(
+            commanded=self.command,
+            velocity=robot.base_velocity,
+            down=down_in_body(pose.orientation),
+            torques=robot.joint_torques,
+            velocities=robot.joint_velocities,
+            target_speed=(action.astype(np.float64) - self._action) / self.period,
+            fallen=pose.tilt > MAX_TILT,
+        )
+
+
+def _lasting_command(options: Mapping[str, Any]) -> Vector | None:
+    if others := options.keys() - {'command'}:
+        raise SetupError(f'option {", ".join(sorted(others))}: there is only command')
+    if 'command' not in options:
+        return None
+    numbers = [float(number) for number in options['command']]
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise SetupError(f'command {numbers}: give x and y in [m/s] and yaw in [rad/s]')
+    return numbers[0], numbers[1], numbers[2]

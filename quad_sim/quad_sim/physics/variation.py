@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that is a little heavier, softer or on smoother ground than the one it was made as."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+import mujoco
+
+from ..exceptions import SetupError
+from .model import BASE, FLOOR
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """How a robot and its ground differ from what they were made as.
+
+    Attributes:
+        friction: Of the ground; None leaves that of the terrain.
+        trunk_mass: Factor of mass and inertia of the trunk.
+        stiffness: Factor of the servos' stiffness.
+        damping: Factor of the joints' damping, and of the servos' gain against speed.
+    """
+
+    friction: float | None = None
+    trunk_mass: float = 1.0
+    stiffness: float = 1.0
+    damping: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no robot has."""
+        friction = 1.0 if self.friction is None else self.friction
+        positive = (friction, self.trunk_mass, self.stiffness)
+        if not (all(0.0 < n < math.inf for n in positive) and 0.0 <= self.damping < math.inf):
+            raise SetupError(f'{self}: all must be finite, and above 0 (damping: 0 or more)')
+
+
+AS_MADE = Variation()
+"""The robot as it was made."""
+
+
+class VariedModel:
+    """A model that can be varied again and again; each variation counts from the original."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        """Keep what may change.
+
+        Args:
+            model: Is varied in place.
+        """
+        self._model = model
+        self._floor, self._base = int(model.geom(FLOOR).id), int(model.body(BASE).id)
+        self._friction = float(model.geom_friction[self._floor, 0])
+        self._mass = float(model.body_mass[self._base])
+        self._inertia = model.body_inertia[self._base].copy()
+        self._damping = model.dof_damping.copy()
+        self._gains = model.actuator_gainprm.copy()
+        self._biases = model.actuator_biasprm.copy()
+        self._present = AS_MADE
+
+    def vary(self, data: mujoco.MjData, variation: Variation) -> None:
+        """Let the robot be as a variation says; its servos hold.
+
+        Args:
+            data: Is at its reference position afterwards.
+            variation: How it differs from the original.
+        """
+        model = self._model
+        model.actuator_gainprm[:] = self._gains * variation.stiffness
+        model.actuator_biasprm[:] = self._biases
+        model.actuator_biasprm[:, 1] *= variation.stiffness
+        model.actuator_biasprm[:, 2] *= variation.damping
+        if variation == self._present:
+            return
+        self._present = variation
+        friction = self._friction if variation.friction is None else variation.friction
+        model.geom_friction[self._floor, 0] = friction
+        model.body_mass[self._base] = self._mass * variation.trunk_mass
+        model.body_inertia[self._base] = self._inertia * variation.trunk_mass
+        model.dof_damping[:] = self._damping * variation.damping
+        mujoco.mj_setConst(model, data)

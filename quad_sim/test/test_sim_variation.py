@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that differs from what it was made as, and the same robot as MJCF."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from quad_description import robot_urdf
+from quad_sim import ServoModel, ServoParameters, SetupError, Terrain
+from quad_sim.export_mjcf import run
+from quad_sim.options import parse_servo
+from quad_sim.physics import Robot, Variation
+from quad_sim.physics.model import build_model
+from quad_sim.physics.robot import TIMESTEP
+
+FIRM = ServoModel.FIRM.parameters
+
+
+def settled(robot: Robot) -> tuple[object, ...]:
+    """Return the state after a second of moving."""
+    start = robot.joint_positions
+    for step in range(50):
+        robot.set_targets((start + 0.1 * math.sin(0.4 * step)).tolist())
+        robot.step(0.02)
+    return robot.base_pose, robot.joint_positions.tolist(), robot.joint_torques.tolist()
+
+
+def test_a_varied_robot_is_the_one_that_was_made_so() -> None:
+    """Softer servos on smoother ground are what those arguments make."""
+    varied = Robot(robot_urdf())
+    varied.reset(variation=Variation(friction=0.3, stiffness=0.5, damping=2.0))
+    softer = ServoParameters(
+        stiffness=0.5 * FIRM.stiffness,
+        velocity_gain=2.0 * FIRM.velocity_gain,
+        damping=2.0 * FIRM.damping,
+        interpolation=FIRM.interpolation,
+    )
+    made = Robot(robot_urdf(), softer, Terrain(friction=0.3))
+    assert settled(varied) == settled(made)
+
+
+def test_the_trunk_gets_heavier() -> None:
+    """By its own mass only; the legs carry it, and it turns more slowly."""
+    plain, heavy = Robot(robot_urdf()), Robot(robot_urdf())
+    heavy.reset(variation=Variation(trunk_mass=2.0))
+    assert plain.mass < heavy.mass < 2.0 * plain.mass
+    for robot in (plain, heavy):
+        robot.step(0.5)
+    carried = [np.abs(robot.joint_torques).sum() for robot in (plain, heavy)]
+    assert carried[1] > 1.3 * carried[0]
+    for robot in (plain, heavy):
+        robot.push((0.0, 3.0, 0.0), 0.02)
+        robot.step(0.02)
+    assert abs(heavy.base_velocity.linear[1]) < 0.8 * abs(plain.base_velocity.linear[1])
+
+
+def test_the_next_reset_forgets_it() -> None:
+    """Bit for bit."""
+    robot = Robot(robot_urdf())
+    robot.reset(variation=Variation(0.2, 1.5, 0.6, 1.5))
+    settled(robot)
+    robot.reset()
+    assert settled(robot) == settled(Robot(robot_urdf()))
+
+
+def test_a_servo_that_was_off_holds_with_its_own_stiffness() -> None:
+    """That of the variation."""
+    one, other = Robot(robot_urdf()), Robot(robot_urdf())
+    for robot in (one, other):
+        robot.reset(variation=Variation(stiffness=0.5))
+    other.set_torque(False, ['fl_calf_joint'])
+    other.set_torque(True, ['fl_calf_joint'], hold=False)
+    assert settled(one) == settled(other)
+
+
+@pytest.mark.parametrize(
+    'wrong', [{'friction': 0.0}, {'trunk_mass': -1.0}, {'stiffness': math.nan}, {'damping': -0.1}]
+)
+def test_what_no_robot_has_is_refused(wrong: dict[str, float]) -> None:
+    """With the numbers."""
+    with pytest.raises(SetupError, match=next(iter(wrong))):
+        Variation(**wrong)
+
+
+def of_dynamics(model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """Return the arrays that decide how a model moves."""
+    names = (
+        *('body_mass', 'body_inertia', 'body_pos', 'jnt_range'),
+        *('dof_damping', 'dof_armature', 'dof_frictionloss'),
+        *('actuator_gainprm', 'actuator_biasprm', 'actuator_forcerange', 'actuator_ctrlrange'),
+        *('sensor_type', 'sensor_adr'),
+    )
+    return {name: getattr(model, name) for name in names}
+
+
+def test_mjcf_is_the_same_robot(tmp_path: Path) -> None:
+    """Masses, joints, servos and sensors; on the floor it moves as ours does from its keyframe."""
+    path = tmp_path / 'xgo.xml'
+    servo = 'kp=6,kv=0.2,damping=0.05,interpolation=0'
+    assert run([str(path), '--servo', servo, '--floor']) == 0
+    model = mujoco.MjModel.from_xml_path(str(path))
+    parameters = parse_servo(servo)
+    assert isinstance(parameters, ServoParameters)
+    original = build_model(robot_urdf(), parameters, Terrain(), TIMESTEP)
+    for name, values in of_dynamics(original).items():
+        assert getattr(model, name) == pytest.approx(values, rel=1e-4, abs=1e-6), name
+    robot = Robot(robot_urdf(), parameters)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key('stand').id)
+    start = robot.joint_positions
+    for step in range(50):
+        targets = start + 0.05 * math.sin(0.3 * step)
+        robot.set_targets(targets.tolist(), 0.0)
+        data.ctrl[:] = targets
+        robot.step(0.02)
+        mujoco.mj_step(model, data, 10)
+    assert data.qpos[:3] == pytest.approx(robot.base_pose.position, abs=2e-3)
+
+
+def test_mjcf_without_a_floor_is_the_robot_alone(tmp_path: Path) -> None:
+    """For a scene of the trainer; its feet have names to give them friction by."""
+    path = tmp_path / 'xgo.xml'
+    assert run([str(path), '--servo', 'vendor_rl']) == 0
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, 'floor') == -1
+    assert {model.geom(foot).name for foot in Robot(robot_urdf()).feet}
+    names = [model.actuator(index).name for index in range(model.nu)]
+    assert tuple(names) == Robot(robot_urdf()).joint_names
+
+
+def test_a_file_that_cannot_be_written_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As are servos that there are not."""
+    assert run([str(tmp_path / 'no' / 'xgo.xml')]) == 1
+    assert run([str(tmp_path / 'xgo.xml'), '--servo', 'wrong']) == 1
+    said = capsys.readouterr().err
+    assert 'No such file' in said
+    assert '--servo' in said
