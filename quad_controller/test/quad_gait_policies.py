@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from policy_export import export, joined
-from policy_mlp import Mlp
+from policy_export import export, Layers
 
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -61,7 +61,26 @@ class FakeNetwork:
 
 def write_policy(path: Path, values: Mapping[str, str], width: int = 47) -> Path:
     """Write an ONNX file whose network answers nearly nothing."""
-    network = Mlp((width, 8, 12), np.random.default_rng(0))
+    network = random_layers((width, 8, 12), np.random.default_rng(0))
     network.weights[-1] *= np.float32(1e-3)
     export(network, path, values)
     return path
+
+
+def random_layers(sizes: Sequence[int], random: np.random.Generator) -> Layers:
+    """Return layers with random weights, which take observations as they are."""
+    return Layers(
+        np.zeros(sizes[0], np.float32),
+        np.ones(sizes[0], np.float32),
+        [random.standard_normal(shape).astype(np.float32) for shape in pairwise(sizes)],
+        [np.zeros(size, np.float32) for size in sizes[1:]],
+    )
+
+
+def joined(values: object) -> str:
+    """Return a list as exporters write it: by commas, numbers with three decimals."""
+    if isinstance(values, str):
+        return values
+    if isinstance(values, (int, float)):
+        return f'{values:.3f}'
+    return ','.join(joined(value) for value in values)  # type: ignore[attr-defined]

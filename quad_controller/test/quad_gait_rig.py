@@ -21,6 +21,8 @@ UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
 ROBOT = quadruped(urdf())
 ARM_ROBOT = quadruped(urdf(Build(arm=True)))
 FOLDED = tuple([0.1, 1.3, -0.9] * 4)
+LYING = tuple([0.0, 1.48, -1.1] * 4)
+STANDING = tuple([0.0, 1.0, -0.3] * 4)
 
 
 def tilted(angle: float) -> ImuSample:

@@ -19,10 +19,9 @@ import numpy as np
 import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper, TensorProto
-from policy_export import joined
 import yaml
 
-from quad_gait_policies import STAND
+from quad_gait_policies import joined, STAND
 from quad_gait_rig import ROBOT
 
 Floats = npt.NDArray[np.float32]

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import onnx
-from policy_export import joined
 import pytest
 
 from quad_controller import find_policy
@@ -19,7 +18,7 @@ from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.contract.model import PolicyContract
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy_check.main import run
-from quad_gait_policies import metadata, write_policy
+from quad_gait_policies import joined, metadata, write_policy
 from quad_gait_rig import ROBOT
 
 SHIPPED = str(find_policy('trot_imitation'))

@@ -15,7 +15,6 @@ from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped
-from policy_export import joined
 from processes import RunningProcess
 import pytest
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -29,7 +28,7 @@ from node_runner import LATCHED, ParameterError
 from quad_controller.exceptions import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
-from quad_gait_policies import metadata, write_policy
+from quad_gait_policies import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import SetMode
 

@@ -21,6 +21,7 @@ from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_hardware.estimation import ImuMounting
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
+from quad_sim import ServoModel as ServoModels
 from quad_sim import ServoParameters, Terrain
 from quad_sim.physics import PhysicsBackend, Robot
 
@@ -53,6 +54,28 @@ def test_trot_goes_as_commanded(velocity: Velocity) -> None:
     assert travel.y == pytest.approx(velocity.y, abs=0.02)
     assert travel.yaw == pytest.approx(velocity.yaw, abs=max(0.02 * abs(velocity.yaw), 0.01))
     assert travel.tilt < LEVEL
+
+
+def test_short_silences_of_joint_states_do_not_let_a_soft_robot_creep_down() -> None:
+    """It gives way to its weight each time by as much as before, and no more."""
+    silent = [False]
+    rig = PhysicsRig(
+        Robot(robot_urdf(), ServoModels.VENDOR_RL),
+        sense=lambda state: replace(state, joints=None) if silent[0] else state,
+    )
+    rig.mode('walk')
+    rig.run(0.5, Velocity(0.1))
+    silent[0] = True
+    rig.run(1.0)
+    assert rig.faulted
+    heights = []
+    for _ in range(8):
+        silent[0] = False
+        rig.step(Velocity())
+        silent[0] = True
+        rig.run(0.3)
+        heights.append(rig.robot.base_pose.position[2])
+    assert min(heights) > heights[0] - 0.003
 
 
 def test_a_minute_of_trot() -> None:

@@ -20,9 +20,27 @@ from quad_controller.states.controller import Controller
 from quad_controller.states.faults import Fault
 from quad_controller.states.modes import MODES, State
 from quad_controller.states.parameters import StateParameters
-from quad_description import DescriptionError, ImuSample, JointSample, raised_feet, RobotState
+from quad_description import (
+    DescriptionError,
+    ImuSample,
+    JointSample,
+    raised_feet,
+    RobotState,
+    Targets,
+)
 from quad_description.rotations import Vector
-from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+from quad_gait_rig import (
+    ARM_ROBOT,
+    FOLDED,
+    LYING,
+    PERIOD,
+    Rig,
+    ROBOT,
+    STANDING,
+    StillPolicy,
+    tilted,
+    UPRIGHT,
+)
 
 pytestmark = pytest.mark.slow
 
@@ -198,6 +216,72 @@ def test_velocities_and_poses_that_are_no_numbers_are_refused(value: float) -> N
     rig.run(0.5)
     assert rig.controller.status.velocity.at_rest
     assert rig.controller.status.refused == 2
+
+
+@pytest.mark.parametrize(('mode', 'place'), [('relax', STANDING), ('walk', LYING)])
+def test_joints_that_moved_unseen_are_held_where_they_are_found(mode: str, place: Targets) -> None:
+    """A robot that started anew lies: what was held before would make it rise unasked."""
+    rig = Rig()
+    rig.step()
+    if mode == 'walk':
+        rig.ask('walk')
+        rig.until(State.WALK)
+        rig.run(1.0, Velocity(x=0.1))
+    rig.joints = False
+    rig.run(0.3)
+    held = rig.positions
+    rig.run(2.0)
+    assert rig.positions == held
+    rig.joints, rig.positions = True, place
+    rig.run(1.0)
+    assert rig.positions == place
+    rig.controller.clear_fault()
+    rig.ask('lie' if mode == 'relax' else 'stand')
+    rig.run(5.0)
+    assert rig.positions != place
+
+
+def relaxed_after_silence(off: float) -> tuple[Rig, Targets]:
+    """Return a rig whose joints are known again, so far off in [rad], and where they were held."""
+    rig = Rig()
+    rig.step()
+    held = rig.positions
+    rig.joints = False
+    rig.run(1.0)
+    rig.joints, rig.positions = True, tuple(position + off for position in held)
+    return rig, held
+
+
+def test_joints_that_sag_unseen_stay_held_where_they_were() -> None:
+    """Under its weight a leg is a little off its target; that is no other robot."""
+    rig, held = relaxed_after_silence(-0.2)
+    assert rig.step() == pytest.approx(held)
+
+
+def test_a_robot_that_lay_is_not_folded_again_when_it_is_found_standing() -> None:
+    """The mode is as it was; what moves the robot is the next one that is asked for."""
+    rig = Rig()
+    rig.step()
+    rig.ask('stand')
+    rig.until(State.STAND)
+    rig.run(1.0)
+    stands = rig.positions
+    rig.ask('lie')
+    rig.until(State.LIE)
+    rig.run(3.0)
+    rig.joints = False
+    rig.run(1.0)
+    rig.joints, rig.positions = True, stands
+    rig.run(1.0)
+    assert rig.positions == stands
+
+
+def test_one_wrong_sample_after_a_silence_is_not_held() -> None:
+    """Two have to agree; the targets are where they were soon after."""
+    rig, held = relaxed_after_silence(1.0)
+    assert rig.step() is None
+    rig.positions = held
+    assert rig.step() == pytest.approx(held)
 
 
 def test_silent_joints_hold_then_fault_and_need_clearing() -> None:
@@ -737,7 +821,8 @@ def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object
     controller = rig.controller
     rig.run(0.1)
     positions = previous = rig.positions
-    begins_anew = False
+    begins_anew, lost, unseen = False, False, 0.0
+    seen: Targets | None = None
     for moment in script:
         policy.targets = moment['policy']  # type: ignore[assignment]
         if moment['mode'] is not None:
@@ -755,14 +840,21 @@ def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object
             }[str(moment['joints'])]  # fmt: skip
             joints = JointSample(measured, (0.0,) * 12) if measured is not None else None
             measurement = RobotState(joints, moment['imu'], moment['battery'])  # type: ignore[arg-type]
+            holds = controller.status.state in {State.RELAX, State.FAULT, State.LIE}
             targets = controller.step(measurement, dt).targets
+            unseen += dt
+            lost = lost or unseen > StateParameters().hold_age
             if targets is None:
-                assert begins_anew or dt > 0.5
-                begins_anew = True
+                assert begins_anew or dt > 0.5 or (lost and holds)
+                begins_anew |= dt > 0.5 and not controller._unseen.is_pending
+                seen = measured
                 continue
-            if begins_anew:  # after a pause of its own, where the joints are
+            found = lost and holds and targets == measured == seen
+            if begins_anew or found:  # after a pause of its own or of theirs, where joints are
                 assert measured is not None
                 previous, begins_anew = measured, False
+            unseen *= measured in {None, (math.nan,) * 12}
+            seen, lost = measured, lost and not found
             for target, before, limits in zip(targets, previous, ROBOT.limits, strict=True):
                 assert limits.lower <= target <= limits.upper
                 assert abs(target - before) <= limits.velocity * min(dt, 1.5 * PERIOD) + 1e-9

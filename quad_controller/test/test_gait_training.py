@@ -4,12 +4,22 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+import io
 import math
+import os
 from pathlib import Path
+import subprocess
+import sys
 
+from comparison import best, Figures, Ground, table, Walker
+from contract_env import practice_env, TaughtEnv, values_for
 from gait_teacher import GaitTeacher
+import numpy as np
+from policy_export import export
+from progress import Progress
 import pytest
-from train_imitation import Trainer
+from trained_contract import contract_of, metadata_of, PERIOD
 
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -20,10 +30,17 @@ from quad_controller.policy.contract.declared import read_declared
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.policy.network import OnnxNetwork
+from quad_controller.policy.options import PolicyOptions
+from quad_controller.policy.runner import PolicyRunner
+from quad_controller.states.controller import Controller
+from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
+from quad_gait_policies import FakeNetwork, random_layers
+from quad_sim.env import NO_RANDOMIZATION, WalkingEnv
 
 pytestmark = pytest.mark.slow
+TRAINING = Path(__file__).parents[1] / 'training'
 
 
 class Lesson:
@@ -52,6 +69,28 @@ class Lesson:
         return PolicyStep(self._teacher.targets(velocity, phase, imu.roll_pitch_yaw[:2]), '')
 
 
+def test_walking_as_commanded_is_worth_more() -> None:
+    """The gait walks; standing still, or walking otherwise, gets less."""
+
+    def worth(commanded: tuple[float, float, float], walked: Velocity) -> float:
+        env = WalkingEnv()
+        env.reset(seed=1, options={'command': commanded})
+        controller = Controller(MODEL, GaitParameters(), StateParameters())
+        total = 0.0
+        for _ in range(400):
+            controller.set_mode('walk')
+            controller.set_velocity(walked)
+            targets = controller.step(env.state, env.period).targets
+            off = np.zeros(12) if targets is None else np.array(targets) - env.stand
+            total += float(env.step(off.astype(np.float32))[1])
+        return total
+
+    right = worth((0.2, 0.0, 0.0), Velocity(0.2))
+    assert right > worth((0.2, 0.0, 0.0), Velocity()) + 2.0
+    assert right > worth((0.2, 0.0, 0.0), Velocity(-0.2)) + 2.0
+    assert worth((0.0, 0.0, 0.0), Velocity()) > worth((0.0, 0.0, 0.0), Velocity(0.2)) + 2.0
+
+
 @pytest.mark.parametrize('velocity', [Velocity(0.2), Velocity(0.1, 0.05), Velocity(yaw=0.6)])
 def test_the_teacher_walks(velocity: Velocity) -> None:
     """In physics, as fast as commanded, and upright: or its imitation would not."""
@@ -65,23 +104,148 @@ def test_the_teacher_walks(velocity: Velocity) -> None:
     assert not rig.faulted
 
 
-def test_a_short_training_gives_a_policy_of_the_right_form(tmp_path: Path) -> None:
-    """One round learns something, and what is written fits the robot in all that it says."""
-    trainer = Trainer(seed=0)
-    assert trainer.collect(1, share=1.0) == pytest.approx(6.0)
-    first = trainer.fit(1)
-    assert trainer.fit(20) < 0.7 * first
-    trainer.collect(1, share=0.0)
-    trainer.export(tmp_path / 'short.onnx')
-    network = OnnxNetwork(tmp_path / 'short.onnx')
+def test_what_is_trained_is_what_runs() -> None:
+    """Observations and targets of the environment are those of the controller."""
+    env = practice_env(NO_RANDOMIZATION)
+    seen, _ = env.reset(seed=1, options={'command': (0.2, 0.0, 0.3)})
+    runner = PolicyRunner(
+        'run', FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
+    )
+    phase = math.atan2(seen[9], seen[10]) % math.tau / math.tau
+    runner.reset(tuple(env.walking.stand.tolist()))
+    runner.advance(phase * 0.28)
+    random = np.random.default_rng(2)
+    for _ in range(20):
+        action = random.normal(0.0, 0.3, 12).astype(np.float32)
+        assert seen == pytest.approx(runner.observe(env.inputs)[0], abs=1e-5)
+        targets = runner.act(action, PERIOD)
+        before = env.walking.robot.joint_targets
+        seen, *_ = env.step(action)
+        slow = np.abs(np.array(targets) - before) < 0.19  # others the limiter of speeds cuts
+        sent = env.walking.robot.joint_targets
+        assert slow.any()
+        assert sent[slow] == pytest.approx(np.array(targets)[slow], abs=1e-6)
+        runner.advance(PERIOD)
+
+
+def test_the_teacher_beside_the_robot_walks_it() -> None:
+    """Its answers, as actions of the contract, go as commanded and do not fall."""
+    practice = practice_env(NO_RANDOMIZATION)
+    env, robot = TaughtEnv(practice), practice.walking.robot
+    seen, _ = env.reset(seed=1, options={'command': (0.2, 0.0, 0.0)})
+    for _ in range(200):
+        seen, _, fallen, _, _ = env.step(seen[-12:])
+        assert not fallen
+    assert robot.base_pose.position[0] == pytest.approx(0.2 * 4.0, abs=0.1)
+
+
+def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
+    """What is written fits the robot in all that it says, and nothing is left open."""
+    values = values_for(MODEL, 'a test')
+    path = tmp_path / 'random.onnx'
+    export(random_layers((47, 8, 12), np.random.default_rng(0)), path, metadata_of(values))
+    network = OnnxNetwork(path)
     document = read_metadata(network.metadata)
     contract = build_contract(document)
+    assert contract == contract_of(values)
+    assert contract.kind == 'a test'
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    declared = read_declared(network.metadata)
     for row in check_contract(
         network, contract, MODEL, stand,
-        document=document, declared=declared, hold_missing=False, period=0.02,
+        document=document, declared=read_declared(network.metadata), hold_missing=False,
+        period=PERIOD,
     ):  # fmt: skip
         assert row.verdict.value == 'ok', row
-    phase = next(term for term in contract.terms if term.name == 'phase')
-    assert math.isclose(phase.phase_period, 0.28)
+
+
+def test_figures_distinguish_a_walker_that_falls() -> None:
+    """On the same way with the same pushes."""
+    pushed = Ground('pushed', push=0.5)
+    walked = Walker(None, pushed, seed=1).figures([Velocity(0.2)], 6.0)
+    assert walked.falls == 0.0
+    assert walked.off < 0.05
+    toppled = Walker(None, Ground('hit', push=4.0), seed=1).figures([Velocity(0.2)], 6.0)
+    assert toppled.falls > 0.0
+    assert math.isfinite(toppled.falls)
+    text = table({'gait': {'pushed': walked, 'hit': toppled}})
+    assert f'{toppled.falls:.1f}' in text
+
+
+def test_the_better_one_falls_less_often_and_then_is_less_off() -> None:
+    """A fall in a minute, or a quarter of them, more or less is chance."""
+    near, far = Figures(0.01, 0.1, 7.5), Figures(0.03, 0.0, 6.0)
+    clumsy = Figures(0.0, 0.0, 12.0)
+    compared = {'clumsy': {'a': clumsy}, 'far': {'a': far}, 'near': {'a': near}}
+    assert best(compared) == 'near'
+    assert best({name: compared[name] for name in ('clumsy', 'far')}) == 'far'
+
+
+def test_progress_is_seen_in_a_log_and_in_a_terminal() -> None:
+    """Lines in a log are few; in a terminal one line is written over, and texts stay."""
+    times = [0.0]
+    for terminal in (False, True):
+        stream = Stream(terminal)
+        progress = Progress(2.0, lambda: times[0], stream)
+        for _ in range(60):
+            times[0] += 1.0
+            progress.figures('falls 3')
+        progress.say('done')
+        assert progress.share == pytest.approx(0.5)
+        lines = stream.getvalue().split('\n')
+        assert lines[-2:] == ['done', '']
+        assert 'falls 3' in lines[0]
+        if terminal:
+            assert lines[0].count('\r') == 60
+        else:
+            assert 3 <= len(lines) - 2 <= 6
+            assert '=' in lines[-3]
+
+
+class Stream(io.StringIO):
+    """A terminal, or a file."""
+
+    def __init__(self, terminal: bool) -> None:
+        super().__init__()
+        self._terminal = terminal
+
+    def isatty(self) -> bool:
+        """Say which."""
+        return self._terminal
+
+
+@pytest.mark.skipif(
+    find_spec('skrl') is None, reason='`make train` installs what a training needs'
+)
+def test_a_short_training_ends_with_a_policy_that_is_checked(tmp_path: Path) -> None:
+    """The command trains, writes both policies, curves and figures, and says what it found."""
+    command = [
+        *(sys.executable, str(TRAINING / 'train.py'), '--minutes', '0.6', '--environments', '16'),
+        *('--way', '3', '--rounds', '4', '--output', str(tmp_path)),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'falls' in done.stdout
+    assert 'accepted' in done.stdout
+    for name in ('imitation', 'practice', 'walk'):
+        contract = build_contract(read_metadata(OnnxNetwork(tmp_path / f'{name}.onnx').metadata))
+        assert contract == contract_of(values_for(MODEL, contract.kind))
+        assert 'imitation' in contract.kind
+    assert list((tmp_path / 'curves').glob('events.out.tfevents.*'))
+    figures = (tmp_path / 'figures.txt').read_text()
+    assert {'gait', 'imitation', 'practice'} <= {line.split()[0] for line in figures.splitlines()}
+
+
+def test_without_the_library_it_is_said_what_installs_it(tmp_path: Path) -> None:
+    """Not a traceback."""
+    (tmp_path / 'skrl.py').write_text("raise ImportError('no skrl')\n")
+    (tmp_path / 'optax.py').write_text("raise ImportError('no optax')\n")
+    (tmp_path / 'jax.py').write_text("raise ImportError('no jax')\n")
+    environment = dict(os.environ)
+    environment['PYTHONPATH'] = f'{tmp_path}:{environment.get("PYTHONPATH", "")}'
+    command = [sys.executable, str(TRAINING / 'train.py'), '--output', str(tmp_path / 'out')]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, check=False, env=environment
+    )
+    assert done.returncode == 1
+    assert 'make train' in done.stdout
+    assert not done.stderr

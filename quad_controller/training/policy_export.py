@@ -1,36 +1,56 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a network as an ONNX file, its normalisation inside and mjlab's metadata with it."""
+"""Writes layers as an ONNX file, with the normalisation of observations inside, and metadata."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import onnx
 from onnx import helper, numpy_helper, TensorProto
-from policy_mlp import Floats, Mlp
+
+Floats = npt.NDArray[np.float32]
 
 OPSET = 17
 IR_VERSION = 8  # what ONNX Runtime 1.14 reads, and everything newer
 
 
-def export(network: Mlp, path: Path, metadata: Mapping[str, str]) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class Layers:
+    """Fully connected layers with ELU between them; inputs are normalised.
+
+    Attributes:
+        mean: Subtracted from the inputs.
+        deviation: The inputs are divided by it.
+        weights: One matrix for each layer, inputs by outputs.
+        biases: One row for each layer.
+    """
+
+    mean: Floats
+    deviation: Floats
+    weights: Sequence[Floats]
+    biases: Sequence[Floats]
+
+
+def export(layers: Layers, path: Path, metadata: Mapping[str, str]) -> None:
     """Write a network.
 
     Args:
-        network: What to write.
+        layers: What to write.
         path: Where to.
         metadata: Keys and texts for the file.
     """
-    tensors: dict[str, Floats] = {'mean': network.mean, 'deviation': network.deviation}
+    tensors: dict[str, Floats] = {'mean': layers.mean, 'deviation': layers.deviation}
     nodes = [
         helper.make_node('Sub', ['obs', 'mean'], ['centred']),
         helper.make_node('Div', ['centred', 'deviation'], ['value0']),
     ]
-    last = len(network.weights) - 1
-    for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+    last = len(layers.weights) - 1
+    for layer, (weight, bias) in enumerate(zip(layers.weights, layers.biases, strict=True)):
         tensors[f'weight{layer}'], tensors[f'bias{layer}'] = weight, bias
         out = 'actions' if layer == last else f'sum{layer}'
         inputs = [f'value{layer}', f'weight{layer}', f'bias{layer}']
@@ -40,12 +60,8 @@ def export(network: Mlp, path: Path, metadata: Mapping[str, str]) -> None:
     graph = helper.make_graph(
         nodes,
         'policy',
-        [helper.make_tensor_value_info('obs', TensorProto.FLOAT, [1, len(network.mean)])],
-        [
-            helper.make_tensor_value_info(
-                'actions', TensorProto.FLOAT, [1, len(network.biases[-1])]
-            )
-        ],
+        [helper.make_tensor_value_info('obs', TensorProto.FLOAT, [1, len(layers.mean)])],
+        [helper.make_tensor_value_info('actions', TensorProto.FLOAT, [1, len(layers.biases[-1])])],
         [numpy_helper.from_array(np.asarray(value), name) for name, value in tensors.items()],
     )
     model = helper.make_model(
@@ -57,12 +73,3 @@ def export(network: Mlp, path: Path, metadata: Mapping[str, str]) -> None:
     helper.set_model_props(model, dict(metadata))
     onnx.checker.check_model(model)
     onnx.save(model, str(path))
-
-
-def joined(values: object) -> str:
-    """Return a list as the exporters write it: by commas, numbers with three decimals."""
-    if isinstance(values, str):
-        return values
-    if isinstance(values, (int, float)):
-        return f'{values:.3f}'
-    return ','.join(joined(value) for value in values)  # type: ignore[attr-defined]

@@ -151,7 +151,7 @@ class PolicyRunner:
 
     def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
         """Advance by some [s]; a slower policy is asked in one of several steps."""
-        self._builder.advance(dt)
+        self.advance(dt)
         if missing := self.missing(inputs):
             return PolicyStep(None, missing)
         if self._waits > 0 and self._wanted is not None:
@@ -166,13 +166,26 @@ class PolicyRunner:
             return PolicyStep(None, f'the network failed: {error}')
         if not np.isfinite(action).all():
             return PolicyStep(None, 'the action is not finite')
+        return PolicyStep(self.act(action, dt))
+
+    def advance(self, dt: float) -> None:
+        """Let the clock of the phase go on by some [s]."""
+        self._builder.advance(dt)
+
+    def act(self, action: Floats, dt: float) -> Targets:
+        """Return the protected targets of all joints that an action means; it is the last one now.
+
+        Args:
+            action: What the network answers, finite.
+            dt: Time since the step before in [s].
+        """
         if self._clip is not None:
             action = np.clip(action, *self._clip)
         self._previous[:] = action
         self._waits = self._decimation - 1
         target = self._offset + self._scale * action
         self._wanted = np.minimum(np.maximum(target, self._lower), self._upper)
-        return PolicyStep(self._targets(self._wanted, dt))
+        return self._targets(self._wanted, dt)
 
     def _command(self, velocity: Velocity) -> Velocity:
         """Return a velocity within what the policy was trained for."""

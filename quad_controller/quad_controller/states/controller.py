@@ -34,6 +34,7 @@ from .parameters import StateParameters
 from .shadow import Shadow
 from .status import Event, EventKind, Output, Status
 from .tracking import TrackingMonitor
+from .unseen import UnseenJoints
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -105,6 +106,7 @@ class Controller:
         self._tracking = TrackingMonitor(robot.names)
         self._latch = FaultLatch()
         self._notices = Notices()
+        self._unseen = UnseenJoints(states.hold_band)
         self._unreachable = 0
         self._tolerated: frozenset[Fault] = frozenset()  # present when the way down was requested
 
@@ -220,6 +222,8 @@ class Controller:
         self._latch_faults(last, events)
         self._advance_state(last, events)
         self._report_conditions(events)
+        if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
+            return Output(None, None, self._machine.title, self._health.complete, tuple(events))
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = self._move(situation, dt_motion, last, events)
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
@@ -236,7 +240,21 @@ class Controller:
         """Return what was sent last; where the joints are, at the start and after a pause."""
         if dt > STREAM_TIMEOUT and self._limiter.last:
             events += self._wake(dt, self._limiter.last)
+            self._unseen.lose()
+        if self._moved_unseen():
+            self._limiter.reset()
         return self._limiter.last or self._start()
+
+    def _moved_unseen(self) -> bool:
+        """Whether joints that are held were moved by something else while nobody knew it."""
+        joints, last = self._health.joints, self._limiter.last
+        if joints is None or self._health.held:
+            self._unseen.lose()
+            return False
+        if last is None or not self._machine.holds:
+            self._unseen.see()
+            return False
+        return self._unseen.moved(joints, last)
 
     def _advance_state(self, last: Targets, events: list[Event]) -> None:
         """Change the state when it is time."""

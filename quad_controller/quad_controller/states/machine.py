@@ -109,6 +109,12 @@ class StateMachine:
         return self.motion.settled and self.motion.finished
 
     @property
+    def holds(self) -> bool:
+        """Whether all joints stay: relaxed, in a fault that holds, or lying."""
+        lies = isinstance(self.motion, Blend) and self.motion.finished
+        return lies or isinstance(self.motion, Hold)
+
+    @property
     def reachable(self) -> bool:
         """Whether the gait's last step was within the legs' reach."""
         return self.motion is not self._walk or self._walk.reachable

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The networks that learn: what acts, and what judges; models of skrl on JAX."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flax import linen
+import gymnasium
+import jax
+import jax.numpy as jnp
+import numpy as np
+from policy_export import Floats, Layers
+from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
+
+HIDDEN = (128, 128)
+FIRST_LOG_DEVIATION = -1.7  # of actions that are tried: 0.18, or 0.05 rad
+
+
+class Actor(GaussianMixin, Model):  # type: ignore[misc]
+    """Answers observations with the mean of the actions to try."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        **keywords: Any,  # noqa: ANN401
+    ) -> None:
+        """Make it for some spaces; the keywords are Flax's, which copies it."""
+        Model.__init__(
+            self, observation_space=observation_space, action_space=action_space, **keywords
+        )
+        GaussianMixin.__init__(self, min_log_std=-4.0, max_log_std=0.0, role='policy')
+
+    @linen.compact  # type: ignore[untyped-decorator]
+    def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
+        """Return the mean actions, and the logarithm of the deviation."""
+        mean = _layers(inputs['observations'], self.num_actions, last=0.1)
+        deviation = self.param(
+            'log_std', linen.initializers.constant(FIRST_LOG_DEVIATION), (self.num_actions,)
+        )
+        return mean, {'log_std': deviation}
+
+
+class Judge(DeterministicMixin, Model):  # type: ignore[misc]
+    """Says what is still to be got from a state on."""
+
+    def __init__(
+        self,
+        observation_space: gymnasium.Space[Any],
+        action_space: gymnasium.Space[Any],
+        **keywords: Any,  # noqa: ANN401
+    ) -> None:
+        """Make it for some spaces; the keywords are Flax's, which copies it."""
+        Model.__init__(
+            self, observation_space=observation_space, action_space=action_space, **keywords
+        )
+        DeterministicMixin.__init__(self, role='value')
+
+    @linen.compact  # type: ignore[untyped-decorator]
+    def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
+        """Return one number for each state."""
+        return _layers(inputs['observations'], 1, last=1.0), {}
+
+
+def _layers(values: jax.Array, outputs: int, last: float) -> jax.Array:
+    for size in HIDDEN:
+        values = linen.elu(linen.Dense(size)(values))
+    scale = linen.initializers.variance_scaling(last, 'fan_in', 'truncated_normal')
+    return linen.Dense(outputs, kernel_init=scale)(values)
+
+
+class Normaliser:
+    """Subtracts a mean and divides by a deviation that stay as they are: skrl's preprocessor.
+
+    Attributes:
+        mean: Of the observations.
+        deviation: Of the observations.
+    """
+
+    def __init__(self, mean: Floats, deviation: Floats) -> None:
+        """Take both."""
+        self.mean, self.deviation = mean, deviation
+
+    @classmethod
+    def of(cls, observations: Floats) -> Normaliser:
+        """Return that of some rows; what hardly ever changes is not blown up."""
+        deviation = np.maximum(observations.std(axis=0), 0.05).astype(np.float32)
+        return cls(observations.mean(axis=0).astype(np.float32), deviation)
+
+    def __call__(self, values: Any, *, train: bool = False, inverse: bool = False) -> Any:  # noqa: ANN401
+        """Return normalised observations."""
+        return None if values is None else (values - self.mean) / self.deviation
+
+
+def answer(actor: Actor, params: Any, observations: jax.Array) -> jax.Array:  # noqa: ANN401
+    """Return the mean actions for normalised observations."""
+    mean, _ = actor.apply(params, {'observations': observations}, 'policy')
+    return jnp.asarray(mean)
+
+
+def layers_of(actor: Actor, normaliser: Normaliser) -> Layers:
+    """Return what an actor has learned, without the trainer."""
+    params = jax.device_get(actor.state_dict.params)['params']
+    dense = [params[f'Dense_{place}'] for place in range(len(HIDDEN) + 1)]
+    return Layers(
+        normaliser.mean,
+        normaliser.deviation,
+        [np.asarray(each['kernel'], np.float32) for each in dense],
+        [np.asarray(each['bias'], np.float32) for each in dense],
+    )

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The rest of the time: practice by PPO, with robots and ground that differ more and more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from networks import Actor, Judge, Normaliser
+import numpy as np
+from skrl.agents.jax.ppo import PPO, PPO_CFG
+from skrl.envs.wrappers.jax import wrap_env
+from skrl.memories.jax import RandomMemory
+from skrl.resources.preprocessors.jax import RunningStandardScaler
+from skrl.resources.schedulers.jax import KLAdaptiveLR
+
+from quad_sim.env import ProcessVectorEnv, Randomization
+
+ROLLOUT = 32  # steps of each environment between two updates
+JUDGE_ALONE = 20  # updates at the beginning that change the judge only
+FIRST_SHARE, FULL_AT = 0.3, 0.5  # of the randomization; of the time at which it is whole
+SHARE_STEP = 0.1  # the randomization grows by
+RATE = 2e-4
+STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock ends it
+
+
+@dataclass(frozen=True, slots=True)
+class Practised:
+    """What an update came of.
+
+    Attributes:
+        updates: How many there were.
+        steps: Of all environments so far.
+        reward: Mean reward of a second.
+        falls: In a minute of an environment.
+        share: Of the randomization.
+        terms: What each term of the reward was worth in a second, of the episodes that ended.
+    """
+
+    updates: int
+    steps: int
+    reward: float
+    falls: float
+    share: float
+    terms: Mapping[str, float]
+
+
+class Practice:
+    """Goes on with a policy that walks already."""
+
+    def __init__(
+        self,
+        actor: Actor,
+        normaliser: Normaliser,
+        envs: ProcessVectorEnv,
+        randomization: Randomization,
+        *,
+        period: float,
+        curves: Path,
+        seed: int,
+    ) -> None:
+        """Prepare it.
+
+        Args:
+            actor: What practises.
+            normaliser: Of its observations.
+            envs: Where.
+            randomization: What differs in the end.
+            period: Of a step in [s].
+            curves: Folder for the files that TensorBoard reads.
+            seed: Of the environments.
+        """
+        self._envs, self._wrapped = envs, wrap_env(envs, wrapper='gymnasium', verbose=False)
+        self._randomization, self._period, self._actor = randomization, period, actor
+        observations, actions = envs.single_observation_space, envs.single_action_space
+        judge = Judge(observations, actions)
+        judge.init_state_dict(role='value')
+        self._agent = PPO(
+            models={'policy': actor, 'value': judge},
+            memory=RandomMemory(memory_size=ROLLOUT, num_envs=envs.num_envs),
+            observation_space=observations,
+            action_space=actions,
+            cfg=_settings(normaliser, curves),
+        )
+        self._agent.init()
+        self._agent.enable_training_mode(True)
+        self._updates, self._step, self._share = 0, 0, -1.0
+        self._envs.reset(seed=seed)
+        self._observed, _ = self._wrapped.reset()
+
+    def until(self, progress: Callable[[], float]) -> Iterator[Practised]:
+        """Practise until progress is 1; yield what came of each update.
+
+        Args:
+            progress: Share of the time that has passed.
+        """
+        while (passed := progress()) < 1.0:
+            self._vary(passed)
+            before = self._actor.state_dict
+            walked = self._rollout()
+            self._updates += 1
+            if self._updates <= JUDGE_ALONE:
+                # a judge that knows nothing yet would spoil what has been learned
+                self._actor.state_dict = before
+            yield walked
+
+    def close(self) -> None:
+        """Write the curves out."""
+        self._agent.writer.close()
+
+    def _vary(self, passed: float) -> None:
+        share = min(FIRST_SHARE + (1.0 - FIRST_SHARE) * passed / FULL_AT, 1.0)
+        share = min(round(share / SHARE_STEP) * SHARE_STEP, 1.0)
+        if share != self._share:
+            self._share = share
+            self._envs.call('vary', self._randomization.scaled(share))
+
+    def _rollout(self) -> Practised:
+        agent, envs = self._agent, self._wrapped
+        rewards, falls = 0.0, 0
+        ended: list[Mapping[str, float]] = []
+        for _ in range(ROLLOUT):
+            step = {'timestep': self._step, 'timesteps': STEPS_UNKNOWN}
+            agent.pre_interaction(**step)
+            actions, _ = agent.act(self._observed, None, **step)
+            seen, reward, fallen, over, infos = envs.step(actions)
+            agent.record_transition(
+                observations=self._observed,
+                states=None,
+                actions=actions,
+                rewards=reward,
+                next_observations=seen,
+                next_states=None,
+                terminated=fallen,
+                truncated=over,
+                infos=infos,
+                **step,
+            )
+            self._observed = seen
+            rewards += float(reward.mean())
+            falls += int(fallen.sum())
+            ended += _terms(infos)
+            self._step += 1
+            agent.post_interaction(**step)
+        time = ROLLOUT * self._period
+        practised = Practised(
+            updates=self._updates,
+            steps=self._step * self._envs.num_envs,
+            reward=rewards / time,
+            falls=60.0 * falls / (time * self._envs.num_envs),
+            share=self._share,
+            terms={
+                name: float(np.mean([terms[name] for terms in ended]))
+                for name in (ended[0] if ended else ())
+            },
+        )
+        self._track(practised)
+        return practised
+
+    def _track(self, practised: Practised) -> None:
+        """Have it in the curves with what skrl tracks."""
+        track = self._agent.track_data
+        track('Walking / Reward of a second', practised.reward)
+        track('Walking / Falls in a minute', practised.falls)
+        track('Walking / Share of the randomization', practised.share)
+        for name, worth in practised.terms.items():
+            track(f'Reward of an episode / {name}', worth)
+
+
+def _terms(infos: Mapping[str, Any]) -> list[Mapping[str, float]]:
+    """Return the sums of the reward's terms of the episodes that ended."""
+    terms, there = infos.get('final_info', {}).get('reward_terms', {}), '_reward_terms'
+    if not terms:
+        return []
+    ended = np.flatnonzero(infos['final_info'][there])
+    names = [name for name in terms if not name.startswith('_')]
+    return [{name: float(terms[name][index]) for name in names} for index in ended]
+
+
+def _settings(normaliser: Normaliser, curves: Path) -> PPO_CFG:
+    return PPO_CFG(
+        rollouts=ROLLOUT,
+        learning_epochs=5,
+        mini_batches=4,
+        discount_factor=0.99,
+        gae_lambda=0.95,
+        learning_rate=(RATE, 1e-3),
+        learning_rate_scheduler=(KLAdaptiveLR, None),
+        learning_rate_scheduler_kwargs=({'kl_threshold': 0.016, 'max_lr': 1e-3}, {}),
+        grad_norm_clip=1.0,
+        value_loss_scale=1.0,
+        observation_preprocessor=Normaliser,
+        observation_preprocessor_kwargs={
+            'mean': normaliser.mean,
+            'deviation': normaliser.deviation,
+        },
+        value_preprocessor=RunningStandardScaler,
+        value_preprocessor_kwargs={'size': 1},
+        time_limit_bootstrap=True,
+        experiment={
+            'directory': str(curves.parent),
+            'experiment_name': curves.name,
+            'write_interval': ROLLOUT,
+            'checkpoint_interval': 0,
+        },
+    )
