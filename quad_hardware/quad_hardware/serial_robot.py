@@ -146,6 +146,11 @@ class SerialRobot:
         self._commander.counters.received += 1
         self._commander.refuse(error)
 
+    @property
+    def is_commanded(self) -> bool:
+        """Whether joint commands come."""
+        return self._commander.is_commanded(time.monotonic())
+
     def miss_commands(self) -> str:
         """Begin to lay the robot down when the end of its commands is a hazard.
 

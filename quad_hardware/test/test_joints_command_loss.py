@@ -231,6 +231,19 @@ def test_what_breaks_off_is_sent_down_through_the_same_limits() -> None:
     assert not line.commander.counters.loss
 
 
+def test_timers_that_are_late_behind_a_command_change_nothing() -> None:
+    """An executor may call them for an expiry of before: the stream goes on, and may break off."""
+    line = Line()
+    now = line.walk(2.0)
+    last = now - PERIOD
+    assert line.commander.is_commanded(last + 0.9 * line.commander.timeout)
+    assert line.commander.go_down(STAND, now) is None
+    assert line.commander.hazard
+    now = last + line.commander.timeout
+    assert not line.commander.is_commanded(now)
+    assert 'lies down' in line.commander.miss(STAND, 0.0, now)
+
+
 @given(
     st.lists(st.sampled_from(['same', 'away', 'near', 'stall', 'short']), min_size=1, max_size=30)
 )

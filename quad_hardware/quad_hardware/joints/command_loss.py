@@ -95,9 +95,13 @@ class CommandLoss:
         """Whether the robot is on its way down."""
         return self._descent is not None
 
+    def is_commanded(self, now: float) -> bool:
+        """Whether the last command is no longer ago than a pause."""
+        return now - self._last_at < self.timeout
+
     def commanded(self, targets: Sequence[float], now: float) -> None:
         """Take note of targets that were sent [rad]; whoever commands ends the way down."""
-        if now - self._last_at > self.timeout and not (self.goes_down or self.hazard):
+        if not self.is_commanded(now) and not (self.goes_down or self.hazard):
             self._began_at = now  # a pause with a foot in the air is part of a stream
         self._descent = None
         self._last_at, self._last = now, targets[: len(self._legs)]

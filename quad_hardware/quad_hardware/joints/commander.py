@@ -92,6 +92,10 @@ class JointCommander:
         """Whether the robot is on its way down, because commands broke off."""
         return self._loss.goes_down
 
+    def is_commanded(self, now: float) -> bool:
+        """Whether commands come."""
+        return self._loss.is_commanded(now)
+
     def lose(self) -> None:
         """Begin anew with the next command, for the robot was lost; any thread may call it."""
         self._commanded.reset()
@@ -152,9 +156,9 @@ class JointCommander:
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
         """Send the next targets on the way down; None for nothing, at its end too."""
         positions = self._loss.step(now)
-        command = None
-        if positions is not None:
-            command = self._send(self._descent, positions, place, now)
+        if positions is None:
+            return None
+        command = self._send(self._descent, positions, place, now)
         if command is None:
             self._loss.forget()
         return command

@@ -174,6 +174,8 @@ class HardwareNode(Node):
 
     def _miss_commands(self) -> None:
         """Bring the robot down when the end of its commands is a hazard, or log why not."""
+        if self._robot.is_commanded:
+            return  # a command came while the timer's event waited for the executor
         self._silence.cancel()
         if loss := self._robot.miss_commands():
             self.get_logger().error(loss)
