@@ -56,6 +56,7 @@ class Kinematics:
         frames: Number of each link's frame in ``native``, by link.
         others: Where the joints beside the group stand in [rad], by joint; without those that
             follow others.
+        mimics: How joints of the robot follow others, by joint.
     """
 
     def __init__(self, tree: KinematicTree, group: Sequence[str]) -> None:
@@ -74,7 +75,7 @@ class Kinematics:
         mimics = {joint.name: joint.mimic for joint in tree.joints if joint.mimic is not None}
         moving = {*group, *(name for name, mimic in mimics.items() if mimic.source in group)}
         standing = [joint.name for joint in tree.movable() if joint.name not in moving]
-        self._mimics: Mapping[str, Mimic] = mimics
+        self.mimics: Mapping[str, Mimic] = mimics
         self._locked = [
             number for number in range(1, full.njoints) if full.names[number] not in moving
         ]
@@ -170,7 +171,7 @@ class Kinematics:
         self.others = others
         for name, place in others.items():
             places[full.idx_qs[full.getJointId(name)]] = place
-        for name, mimic in self._mimics.items():
+        for name, mimic in self.mimics.items():
             if mimic.source in others:
                 place = mimic.multiplier * others[mimic.source] + mimic.offset
                 places[full.idx_qs[full.getJointId(name)]] = place

@@ -128,6 +128,13 @@ def test_where_an_arm_starts_from_is_free(name: str) -> None:
     assert np.linalg.svd(model.jacobian(ready(name)))[1][-1] > 0.1
 
 
+@pytest.mark.parametrize('name', ROBOTS)
+def test_named_poses_are_free(name: str) -> None:
+    """Who asks for one gets there."""
+    model = robot(name)
+    assert all(model.clearance(pose) > 0.0 for pose in model.poses.values())
+
+
 def test_continuous_joints_have_no_end() -> None:
     """A continuous joint's position is a plain angle, of any number of turns."""
     model = chain('cyyzyz')

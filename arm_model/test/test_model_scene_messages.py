@@ -135,6 +135,25 @@ def test_an_object_is_moved_extended_and_removed() -> None:
         apply_collision_object(gone, thing(operation=CollisionObject.MOVE), AT)
 
 
+def test_the_pose_of_the_only_shape_is_that_of_the_object() -> None:
+    """As in MoveIt, where the object's own is left out: MOVE, frames and clients count on it."""
+    alone = thing(place=(0.0, 0.0, 0.0))
+    alone.primitive_poses = [Pose(position=Point(x=0.5, y=0.1, z=0.3))]
+    scene = apply_collision_object(MODEL.scene, alone, AT)
+    (shape,) = scene.objects['box'].shapes
+    assert scene.objects['box'].pose.position.tolist() == [0.5, 0.1, 0.3]
+    assert shape.pose.position.tolist() == [0.0, 0.0, 0.0]
+    moved = apply_collision_object(
+        scene, thing(place=(0.5, -0.1, 0.3), operation=CollisionObject.MOVE), AT
+    )
+    assert moved.objects['box'].pose.position.tolist() == [0.5, -0.1, 0.3]
+    assert moved.objects['box'].shapes == scene.objects['box'].shapes
+    alone.pose.position.x = 1.0
+    both = apply_collision_object(MODEL.scene, alone, AT).objects['box']
+    assert both.pose.position.tolist() == [1.0, 0.0, 0.0]
+    assert both.shapes[0].pose.position.tolist() == [0.5, 0.1, 0.3]
+
+
 def place_of(scene: Scene, name: str, positions: Array) -> Array:
     """Return where an object is."""
     return scene.pose(name, positions).position

@@ -43,8 +43,12 @@ def speed_limited(path: Path, link: LinkKinematics, most: float) -> tuple[Path, 
     factor = MARGIN * _greatest_speed(path, link) / most if most else 0.0
     if factor <= MARGIN:
         return path, ()
-    note = f'slowed to {1.0 / factor:.0%}: link {link.link} may move at {most:g} m/s'
-    return slower(path, factor), (note,)
+    limited = slower(path, factor)
+    note = (
+        f'takes {limited.duration:.3f} s instead of {path.duration:.3f} s, for link'
+        f' {link.link} may move at {most:g} m/s'
+    )
+    return limited, (note,)
 
 
 def slower(path: Path, factor: float) -> Path:

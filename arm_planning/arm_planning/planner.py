@@ -316,11 +316,7 @@ class Planner:
     def _refuse(self, request: MotionRequest) -> None:
         """Raise what is wrong with a request before anything is computed."""
         if request.planner_id not in ('', *FREE_MOTION, *PLANNER_IDS):
-            known = ', '.join((*FREE_MOTION, *PLANNER_IDS))
-            raise PlanningError(
-                PlanningCode.FAILURE,
-                f'unknown planner_id {request.planner_id!r}; choose one of {known}',
-            )
+            raise unknown_planner(request.planner_id, FREE_MOTION)
         if not request.goals:
             raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'the request has no goal')
         for name in ('velocity_scaling', 'acceleration_scaling'):
@@ -364,16 +360,31 @@ def _heeding(constraints: ConstraintCheck | None, goals: list[Array]) -> list[Ar
     return found
 
 
+def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningError:
+    """Return the refusal of a planner that there is not.
+
+    Args:
+        planner_id: The planner by a request's name.
+        planner_ids: Names of the planners of free motion.
+    """
+    known = ', '.join((*planner_ids, *PLANNER_IDS))
+    return PlanningError(
+        PlanningCode.FAILURE, f'unknown planner_id {planner_id!r}; choose one of {known}'
+    )
+
+
 def _require(
     violation: Violation | None, what: str, codes: tuple[PlanningCode, PlanningCode]
 ) -> None:
     """Raise what is wrong with a start or a goal: a limit, or a contact."""
     if violation is not None:
         code = codes[violation.contact is not None]
-        raise PlanningError(code, f'{what}: {violation.reason}')
+        remedy = _START_REMEDY if code is PlanningCode.START_STATE_IN_COLLISION else ''
+        raise PlanningError(code, f'{what}: {violation.reason}{remedy}')
 
 
 _START_CODES = (PlanningCode.START_STATE_INVALID, PlanningCode.START_STATE_IN_COLLISION)
+_START_REMEDY = '; jog the arm clear of it, or change the scene: remove, attach or allow it'
 _GOAL_CODES = (PlanningCode.GOAL_STATE_INVALID, PlanningCode.GOAL_IN_COLLISION)
 _NOT_EXACTLY = (
     *_GOAL_CODES,

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether an arm may be somewhere, or follow a path: limits of position, and contact.
 
-A path is halved again and again. In the middle of each part the pairs are measured that are not
-yet known to stay apart there: their shapes could move by their distance within that part, by the
-scene's distance rate bounds. Each must have :data:`MARGIN` left where it is measured. So nothing
-touches between two looks either, and pairs that are far apart are measured a few times.
+In the middle of a part of a path the pairs are measured that are not yet known to stay apart in
+it. By the scene's distance rate bounds a distance also proves how far on either side of the middle
+nothing touches; the rest is two parts, measured again. Each pair must have :data:`MARGIN` left
+where it is measured. So nothing touches between two places that were measured either, and pairs
+that are far apart are measured a few times.
 
 Where start or goal are nearer to contact than that, the pair may be as near on the way as it is
-there, and the looks are denser; a contact of less than :data:`MIN_MARGIN` can then remain.
+there, and it is measured more densely; a contact of less than :data:`MIN_MARGIN` can then remain.
 """
 
 from __future__ import annotations
@@ -20,13 +21,12 @@ from itertools import pairwise
 import math
 
 import numpy as np
-import pinocchio as pin
 
 from arm_model import Array, Clearances, Contact, JointLimits, PlanningScene
 from arm_trajectory import Path
 
 MARGIN = 1e-3
-"""Distance that every pair keeps on a path in [m]."""
+"""Distance that every pair keeps in [m] where a path is measured."""
 
 MIN_MARGIN = 1e-4
 """The same where start or goal are nearer to contact in [m]."""
@@ -73,10 +73,6 @@ class ValidityCheck:
         """
         self._limits = limits
         self._clearances = Clearances(scene)
-        self._kinematics, self._geometry = scene.kinematics, scene.geometry
-        self._native, self._data = scene.kinematics.native, scene.kinematics.native.createData()
-        self._results = scene.geometry.createData()
-        self._found = list(self._results.distanceResults)  # they refer to it
 
     @property
     def scene(self) -> PlanningScene:
@@ -119,10 +115,11 @@ class ValidityCheck:
             left = self._doubtful(place, pairs, required, motions, half)
             if left is None:
                 return place
-            if left:
-                half *= 0.5
-                parts.append((middle - half, half, left))
-                parts.append((middle + half, half, left))
+            if left:  # what lies nearer to the middle is proved
+                proved = min(distance / motions[pair] for pair, distance in left.items())
+                rest = 0.5 * (half - max(proved, 0.0))
+                parts.append((middle - half + rest, rest, list(left)))
+                parts.append((middle + half - rest, rest, list(left)))
         return None
 
     def waypoints(self, places: Array) -> Violation | None:
@@ -179,16 +176,18 @@ class ValidityCheck:
             turns = np.diff(_interpolated(turned, places), axis=1).max(axis=1)
             motions = (turns @ rates.T).tolist()
             rows = zip(when.tolist(), path.positions(when), pairs, motions, looks, strict=True)
-            halves: list[tuple[float, float]] = []
+            rest: list[tuple[float, float]] = []
             doubtful: list[Sequence[int]] = []
             for when_there, row, here, moved, (first, middle, last) in rows:
                 left = self._doubtful(row, here, required, moved, 1.0)
                 if left is None:
                     return float(when_there)
-                if left:
-                    halves += [(first, middle), (middle, last)]
-                    doubtful += [left, left]
-            parts, pairs = np.array(halves), doubtful
+                # no pair comes nearer by more than what lies between
+                proved = max(min(left.values(), default=math.inf), 0.0)
+                if proved < middle - first:
+                    rest += [(first, middle - proved), (middle + proved, last)]
+                    doubtful += [list(left), list(left)]
+            parts, pairs = np.array(rest), doubtful
         return None
 
     def _doubtful(
@@ -198,8 +197,8 @@ class ValidityCheck:
         required: Sequence[float],
         motions: Sequence[float],
         share: float,
-    ) -> list[int] | None:
-        """Return the pairs that may come near within a part; None where one is too near.
+    ) -> dict[int, float] | None:
+        """Return the pairs that may come near within a part, and their distances there in [m].
 
         Args:
             place: The middle of the part in [rad] (n).
@@ -207,23 +206,18 @@ class ValidityCheck:
             required: Distance of each pair in [m] (k).
             motions: How far the shapes of each move at most on some way in [m] (k).
             share: Of that way, from the middle to an end of the part.
+
+        Returns:
+            The pairs; None where one is too near already.
         """
-        geometry, results, found = self._geometry, self._results, self._found
-        expanded = self._kinematics.expanded(place)
-        pin.updateGeometryPlacements(self._native, self._data, geometry, results, expanded)
-        if len(pairs) == len(found):  # all at once, which is quicker than one by one
-            pin.computeDistances(geometry, results)
-        else:
-            for pair in pairs:
-                pin.computeDistance(geometry, results, pair)
-        left = []
+        left, found = {}, self._clearances.measure(place, pairs)
         for pair in pairs:
             distance = found[pair].min_distance
             if distance < required[pair]:
                 return None
             moved = share * motions[pair]
             if moved > distance and moved > MIN_MARGIN:
-                left.append(pair)
+                left[pair] = distance
         return left
 
     def _beyond(self, lower: Array, upper: Array, time: float) -> Violation | None:

@@ -3,7 +3,7 @@
 """The best length of each generated problem, as a long run finds it, for bench_planning.py.
 
 Run: ``python arm_planning/bench/long_run.py`` in the sourced workspace, after the problems were
-changed; it takes half an hour and writes ``best_lengths.json``. Where it finds no way, the number
+changed; it takes some minutes and writes ``best_lengths.json``. Where it finds no way, the number
 is null, and the problem does not count: nobody knows whether it can be solved.
 """
 

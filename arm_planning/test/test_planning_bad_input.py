@@ -12,6 +12,7 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs.msg import Quaternion
 from isolation import reserve
 from move_group_rig import (
     action_goal,
@@ -90,6 +91,11 @@ def set_nan_position(goal: Any) -> None:
 def set_nan_turn(goal: Any) -> None:
     """Ask for no orientation."""
     goal.orientation_constraints[0].orientation.x = NAN
+
+
+def set_zero_turn(goal: Any) -> None:
+    """Leave the orientation at zeros, as a message of C does."""
+    goal.orientation_constraints[0].orientation = Quaternion(w=0.0)
 
 
 def set_link(goal: Any) -> None:
@@ -172,6 +178,7 @@ def bad_goals() -> Iterator[Refusal]:
     yield 'unknown frame', changed(POSE, set_frame), CODE.FRAME_TRANSFORM_FAILURE, "'moon'"
     yield 'nan position', changed(POSE, set_nan_position), bad_goal, 'nan.*finite'
     yield 'nan orientation', changed(POSE, set_nan_turn), bad_goal, 'orientation.*nan'
+    yield 'zero orientation', changed(POSE, set_zero_turn), bad_goal, 'all zeros; give'
     yield 'negative region', changed(POSE, set_flat_region), bad_goal, '-0.1'
     yield 'nan joint', changed(JOINT, set_nan_joint), bad_goal, 'panda_joint3.*nan'
     yield 'unknown joint', changed(JOINT, set_joint), bad_goal, "'knee'"

@@ -341,3 +341,6 @@ def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(PlanningError, match=words) as caught:
             monitor.received([joint])
         assert caught.value.code is PlanningCode.ROBOT_STATE_STALE
+        assert 'start state' not in str(caught.value)
+    with pytest.raises(PlanningError, match=f"no joint 'foo'; joints: {joint}"):
+        monitor.received(['foo'])

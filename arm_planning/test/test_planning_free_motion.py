@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise
+from itertools import count, pairwise
 import os
 
 from model_robots import ready, robot, ROBOTS
@@ -22,7 +23,10 @@ from arm_planning import (
     PlanningCode,
     PlanningError,
     PoseGoal,
+    ValidityCheck,
 )
+from arm_planning.free.free_motion import FreeMotion
+from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow
 
@@ -100,6 +104,58 @@ def test_an_obstacle_is_gone_around() -> None:
     assert deepest_overlap(alone.path, scene) < 0.0
     assert deepest_overlap(around.path, scene) > -OVERLAP_TOLERANCE
     assert around.path.duration > alone.path.duration
+
+
+def around_a_pillar(
+    seed: int, expired: Callable[[], bool] = lambda: False, *, turned: float | None = None
+) -> Path:
+    """Plan from one side of a pillar to the other, or to the same with a turned hand."""
+    model = robot('panda')
+    start, goal = ready('panda').copy(), ready('panda').copy()
+    start[0], goal[0] = -0.8, 0.8
+    goals = [goal]
+    if turned is not None:
+        goals.append(goal - turned * np.eye(7)[6])
+    scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
+    check = ValidityCheck(model.limits, scene)
+    return FreeMotion(model.limits, check, np.random.default_rng(seed)).plan(start, goals, expired)
+
+
+def length(path: Path) -> float:
+    """Return the length of a path in [rad]."""
+    places = path.positions(np.linspace(0.0, path.duration, 500))
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+
+
+def test_most_plans_take_the_shorter_side() -> None:
+    """A search that went around the pillar on the longer side is not kept without another one."""
+    lengths = [length(around_a_pillar(seed)) for seed in range(20)]
+    assert np.percentile(lengths, 80) < 1.3 * min(lengths)
+
+
+def test_a_far_goal_is_a_detour() -> None:
+    """Of two goals behind the pillar, the one that is far away is not the end of the search."""
+    lengths = [length(around_a_pillar(seed, turned=2.0)) for seed in range(20)]
+    assert np.percentile(lengths, 80) < 1.45 * min(lengths)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_more_time_never_loses_a_plan(seed: int) -> None:
+    """A search that runs out of time leaves what was found before."""
+
+    def found(looks: int) -> bool:
+        left = iter(range(looks))
+        with suppress(PlanningError):
+            around_a_pillar(seed, lambda: next(left, None) is None)
+            return True
+        return False
+
+    asked = count()
+    around_a_pillar(seed, lambda: next(asked) < 0)
+    all_of_it = next(asked)
+    results = [found(looks) for looks in range(0, all_of_it + 1, max(all_of_it // 25, 1))]
+    assert not results[0]
+    assert results == sorted(results)
 
 
 def test_the_same_seed_gives_the_same_plan() -> None:

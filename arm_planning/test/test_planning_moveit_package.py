@@ -23,6 +23,7 @@ from move_group_rig import (
     pose_goal,
     READY,
 )
+from moveit_msgs.action import ExecuteTrajectory
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPlannerParams, GetPositionFK, QueryPlannerInterfaces
 from processes import executable, RunningProcess
@@ -30,9 +31,13 @@ import pytest
 
 from arm_model.ros import seconds
 from arm_planning import ConfigError
+from arm_planning.moveit_config.known import MANAGER, misspelt
 from arm_planning.moveit_config.package import read_package
-from arm_planning.moveit_config.settings import read_settings
+from arm_planning.moveit_config.settings import of_nothing, read_settings
 
+FIXED = 'panda_joint8'
+FINGERS = ['panda_finger_joint1', 'panda_finger_joint2']
+MOVERS = ['panda_arm_controller', 'panda_hand_controller']
 MOVED = [0.4, *READY[1:]]
 
 
@@ -181,7 +186,9 @@ def test_planners_of_the_package_plan(panda: MoveGroupRig) -> None:
         assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
     answer = panda.plan(motion_request(joint_goal(MOVED), planner_id='Dijkstra'))
     assert answer.error_code.val != MoveItErrorCodes.SUCCESS
-    assert 'Dijkstra' in answer.error_code.message
+    assert re.search(
+        "'Dijkstra'; choose one of RRT.*, TRRTkConfigDefault, PTP", answer.error_code.message
+    )
 
 
 def test_planners_of_the_package_are_listed_as_moveit_lists_them(panda: MoveGroupRig) -> None:
@@ -242,6 +249,27 @@ def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
     _status, result = panda.move(action_goal(motion_request(goal, 'hand')))
     assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
     assert panda.followed[-1].command.position == pytest.approx(0.03)
+    # MoveGroupInterface names joints that follow others, too
+    panda.settle()
+    both = joint_goal([0.01, 0.01], FINGERS)
+    _status, result = panda.move(action_goal(motion_request(both, 'hand')))
+    assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
+    assert panda.followed[-1].command.position == pytest.approx(0.01)
+    trajectory = result.planned_trajectory.joint_trajectory
+    trajectory.joint_names = FINGERS
+    back = [[*point.positions] * 2 for point in reversed(trajectory.points)]
+    for point, positions in zip(trajectory.points, back, strict=True):
+        point.positions, point.velocities, point.accelerations = positions, [], []
+    execute = ExecuteTrajectory.Goal(trajectory=result.planned_trajectory)
+    panda.followed.clear()
+    panda.settle()
+    _status, result = panda.run(ExecuteTrajectory, 'execute_trajectory', execute)
+    assert result.error_code.val == MoveItErrorCodes.SUCCESS, result.error_code
+    assert panda.followed[-1].command.position == pytest.approx(0.03)
+    apart = joint_goal([0.01, 0.03], FINGERS)
+    _status, result = panda.move(action_goal(motion_request(apart, 'hand')))
+    assert result.error_code.val == MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
+    assert 'panda_finger_joint1 contradict' in result.error_code.message
     server.destroy()
 
 
@@ -252,15 +280,74 @@ def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:
     assert not any('cartesian' in line or 'unknown' in line for line in notes)
 
 
+@pytest.mark.parametrize(
+    ('name', 'right', 'wrong'),
+    [
+        ('moveit_controllers', 'joints', 'jionts'),
+        ('moveit_controllers', 'allowed_start_tolerance', 'allowed_start_tolerence'),
+        ('kinematics', 'kinematics_solver_timeout', 'kinematics_solver_timout'),
+        ('ompl_planning', 'default_planner_config', 'default_planer_config'),
+    ],
+)
+def test_keys_that_are_misspelt_are_named(
+    tmp_path: Path, name: str, right: str, wrong: str
+) -> None:
+    """Where others are passed over; with file and line."""
+    folder = moveit_package('panda', tmp_path)
+    assert not misspelt([*read_package(folder).parameters], {})
+    path = folder / 'config' / f'{name}.yaml'
+    path.write_text(path.read_text().replace(f'{right}:', f'{wrong}:', 1))
+    package = read_package(folder)
+    (line,) = misspelt([*package.parameters], package.places)
+    assert re.search(rf"{name}\.yaml:\d+: .*{wrong}: .*did you mean '{right}'", line), line
+
+
+@pytest.mark.parametrize(
+    ('name', 'above', 'text', 'kind'),
+    [
+        (
+            'moveit_controllers',
+            f'{MANAGER}:\n',
+            '  panda_arm_contoller: {type: x}\n',
+            'controller',
+        ),
+        (
+            'joint_limits',
+            'joint_limits:\n',
+            '  panda_joint8: {max_velocity: 1.0}\n',
+            'movable joint',
+        ),
+        ('kinematics', '', 'panda_amr: {kinematics_solver_timeout: 0.1}\n', 'group'),
+        ('ompl_planning', '', 'panda_amr: {projection_evaluator: joints(a)}\n', 'group'),
+    ],
+)
+def test_tables_of_what_the_robot_lacks_are_named(
+    tmp_path: Path, name: str, above: str, text: str, kind: str
+) -> None:
+    """With file and line, and what there is."""
+    folder = moveit_package('panda', tmp_path)
+    path = folder / 'config' / f'{name}.yaml'
+    robot = ['panda_arm', 'hand'], [*JOINTS, *FINGERS], MOVERS
+    nested = 'robot_description_kinematics.panda_arm.bio_ik.threads'
+    assert not of_nothing([*read_package(folder).parameters, nested], {}, *robot)
+    path.write_text(path.read_text().replace(above, above + text, 1))
+    package = read_package(folder)
+    (line,) = of_nothing([*package.parameters], package.places, *robot)
+    assert re.search(rf'{name}\.yaml:\d+: .*: without effect, there is no {kind} ', line), line
+
+
 def test_the_prbts_package_starts(isolation: Isolation, tmp_path: Path) -> None:
     """With the least that an assistant wrote; limits of the description count."""
     joints = [f'prbt_joint_{number}' for number in range(1, 7)]
     folder = moveit_package('prbt', tmp_path)
+    with (folder / 'config' / 'kinematics.yaml').open('a') as file:
+        file.write('\nmanipulatr:\n  kinematics_solver_timeout: 0.1\n')
     at = dict.fromkeys(joints, 0.0)
     with MoveGroupRig(isolation, '--moveit-config', str(folder), positions=at) as rig:
         goal = joint_goal([0.5] * 6, joints)
         request = motion_request(goal, 'manipulator', planner_id='SBLkConfigDefault')
         assert duration(rig.plan(request)) > 0.3
+        assert any("no group 'manipulatr'" in line for line in rig.process.lines)
 
 
 def test_parameters_of_moveits_launch_files_do_the_same(

@@ -9,12 +9,21 @@ import numpy as np
 from planning_scenes import with_box, with_random_boxes
 import pytest
 
-from arm_model import Clearances, RobotState
+from arm_model import (
+    Clearances,
+    CollisionObject,
+    frozen,
+    ORIGIN,
+    Pose,
+    RobotModel,
+    RobotState,
+    Sphere,
+)
 from arm_planning import ValidityCheck
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
 THIN = 0.002
-"""Thickness of a sheet in [m], which coarse looks would pass through."""
+"""Thickness of a sheet in [m], which coarse sampling would pass through."""
 
 NEAR = 0.0005
 """Distance of an arm that nearly touches in [m]."""
@@ -62,8 +71,35 @@ def test_a_state_is_valid_where_no_pair_overlaps(seed: int) -> None:
         assert (check.state(state) is not None) == touching
 
 
+BALL = '<collision><geometry><sphere radius="0.001"/></geometry></collision>'
+CART = (
+    f'<robot name="cart"><link name="base"/><link name="cart">{BALL}</link>'
+    '<joint name="x" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>'
+    '<limit lower="-2" upper="2" velocity="1" effort="1"/></joint></robot>'
+)
+"""A ball on a rail: its distance rate bound is exact, a straight line has no reserve."""
+
+
+@pytest.mark.parametrize('at', np.linspace(-0.95, 0.95, 77).tolist())
+def test_a_pin_beside_the_rail_is_not_passed(at: float) -> None:
+    """It overlaps by half a millimetre, wherever it stands; a second pin is near elsewhere."""
+    group = '<group name="arm"><chain base_link="base" tip_link="cart"/></group>'
+    limits = {'x': {'max_acceleration': 2.0, 'max_jerk': 20.0}}
+    model = RobotModel(CART, f'<robot name="cart">{group}</robot>', limits)
+    scene = model.scene
+    for name, place in (('pin', (at, 0.0, 0.0015)), ('other', (-at, 0.02, 0.0))):
+        pose = Pose(ORIGIN.rotation, frozen(place))
+        scene = scene.with_object(CollisionObject(name, Sphere(0.001), pose=pose))
+    check = ValidityCheck(model.limits, scene)
+    begin = np.array([-1.0])
+    goal = TrajectoryGoal(model.joints, [GoalPoint(4.0, [1.0])])
+    path = build_path(goal, model.limits, RobotState.at_rest(begin), GoalRules()).path
+    assert check.waypoints(np.array((begin, [1.0]))) is not None
+    assert check.path(path) is not None
+
+
 def test_a_thin_sheet_is_not_passed_through() -> None:
-    """However thin it is: there is no place between two looks."""
+    """However thin it is: there is no place between two measurements."""
     model = robot('panda')
     begin, end = ready('panda').copy(), ready('panda').copy()
     begin[0], end[0] = -0.8, 0.8

@@ -313,7 +313,11 @@ class _Draft:
             self.objects[each] = body.object.at(place)
 
     def _new(self, message: ObjectMessage) -> CollisionObject:
-        return CollisionObject(message.id, *_shapes(message), pose=self._pose(message))
+        """Return a new object; its pose is that of its only shape, where it has none (MoveIt)."""
+        pose, shapes = self._pose(message), list(_shapes(message))
+        if len(shapes) == 1 and _is_unset(message.pose):
+            pose, shapes = combined(pose, shapes[0].pose), [PlacedShape(shapes[0].shape)]
+        return CollisionObject(message.id, *shapes, pose=pose)
 
     def _moved(self, message: ObjectMessage) -> CollisionObject:
         before = self._known(message.id)
@@ -448,6 +452,12 @@ def _plane(message: PlaneMessage, _name: str) -> Shape:
     a, b, c, d = (float(each) for each in message.coef)
     length = float(np.linalg.norm((a, b, c)))
     return Plane((a, b, c), -d / length if length else 0.0)
+
+
+def _is_unset(pose: Any) -> bool:  # noqa: ANN401  # message classes have no type
+    """Whether a pose is the identity, or was left at zeros."""
+    x, y, z, w = xyzw(pose.orientation)
+    return not any((*xyz(pose.position), x, y, z)) and w in {0.0, 1.0}
 
 
 def _pose(message: Any, name: str) -> Pose:  # noqa: ANN401  # message classes have no type

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array
+from ..arrays import Array, Native
 from .planning_scene import PlanningScene
 
 
@@ -79,7 +79,7 @@ class Clearances:
         self._kinematics = scene.kinematics
         self._data = scene.kinematics.native.createData()
         self._results = scene.geometry.createData()
-        self._found = self._results.distanceResults
+        self._found = list(self._results.distanceResults)  # they refer to it
         self._distances: Array = np.full(len(scene.pairs), -np.inf)
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
@@ -114,19 +114,34 @@ class Clearances:
         (doubtful,) = (bounds < within).nonzero()
         if not doubtful.size:
             return bounds
-        scene, results = self._scene, self._results
-        native = self._kinematics.native
-        pin.forwardKinematics(native, self._data, self._kinematics.expanded(positions))
-        pin.updateGeometryPlacements(native, self._data, scene.geometry, results)
-        if doubtful.size == bounds.size:  # all at once, which is quicker than one by one
-            pin.computeDistances(scene.geometry, results)
-            bounds[:] = [result.min_distance for result in self._found]
-        else:
-            for pair in doubtful.tolist():
-                bounds[pair] = pin.computeDistance(scene.geometry, results, pair).min_distance
+        pairs = doubtful.tolist()
+        found = self.measure(positions, pairs)
+        bounds[doubtful] = [found[pair].min_distance for pair in pairs]
         self._distances[doubtful] = bounds[doubtful]
         self._places[doubtful] = positions
         return bounds
+
+    def measure(self, positions: Array, pairs: Sequence[int]) -> Sequence[Native]:
+        """Measure some pairs, regardless of what is known of them.
+
+        Args:
+            positions: Joint positions in [rad].
+            pairs: Numbers of the pairs.
+
+        Returns:
+            The results of coal for all pairs, by their numbers. Only those of the pairs asked for
+            are current; the next measurement overwrites them.
+        """
+        native, geometry, results = self._kinematics.native, self._scene.geometry, self._results
+        expanded = self._kinematics.expanded(positions)
+        pin.updateGeometryPlacements(native, self._data, geometry, results, expanded)
+        found = self._found
+        if len(pairs) == len(found):  # all at once, which is quicker than one by one
+            pin.computeDistances(geometry, results)
+        else:
+            for pair in pairs:
+                pin.computeDistance(geometry, results, pair)
+        return found
 
     def provably_clear(self, positions: Array, within: float) -> int:
         """Count the leading rows at which nothing is as near, as far as is known unmeasured.

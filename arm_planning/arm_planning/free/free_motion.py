@@ -13,15 +13,24 @@ from arm_trajectory import Path
 
 from ..constraints import ConstraintCheck
 from ..exceptions import PlanningCode, PlanningError
-from ..validity import ValidityCheck, Violation
+from ..validity import ValidityCheck
 from .constrained_check import ConstrainedCheck
 from .motion_check import MotionCheck
 from .rrt_connect import rrt_connect
-from .shortcut import shortened
+from .shortcut import lengths_along, shortened
 from .timing import timed_path
 
 MAX_TURN = 3.0 * np.pi
 """Where a joint without end is sampled, to either side of the start, in [rad]."""
+
+MAX_DETOUR_RATIO = 1.25
+"""Length of a path, over that of the straight motion to the nearest goal, above which another one
+is searched for: shortcuts keep the side of an obstacle on which the search went around it. A
+straight motion to a goal ends the search in any case."""
+
+MAX_SEARCHES = 3
+"""Searches at most, of which the shortest path counts. Constraints make a search so slow
+that the first path counts."""
 
 
 class FreeMotion:
@@ -58,16 +67,28 @@ class FreeMotion:
         """
         motions = MotionCheck(self._check, (start, *goals), self._constraints)
         check = ConstrainedCheck(self._check, self._constraints)
-        near: Violation | None = None
-        while not expired():
+        goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
+        direct = float(np.linalg.norm(goals[0] - start))
+        searches = MAX_SEARCHES if self._constraints is None else 1
+        found: Path | None = None
+        shortest, tried, near = np.inf, 0, None
+        while not expired() and not (found is not None and tried >= searches):
+            tried += 1
             places = rrt_connect(start, goals, self._sampler(start), motions, expired)
             if places is None:
                 break
             places = shortened(places, self._draw, motions, expired)
-            path = timed_path(places, self._limits, check)
-            if path is not None:
-                return path
-            near = check.waypoints(places)
+            length = float(lengths_along(places)[-1])
+            if length < shortest:
+                path = timed_path(places, self._limits, check)
+                if path is None:
+                    near = check.waypoints(places)
+                    continue
+                found, shortest = path, length
+            if len(places) == 2 or length <= MAX_DETOUR_RATIO * direct:
+                break
+        if found is not None:
+            return found
         hint = '' if near is None else f'; the last one was refused: {near.reason}'
         raise PlanningError(
             PlanningCode.TIMED_OUT,

@@ -50,6 +50,9 @@ RANDOM_SEED = 0
 ORTHOGONAL_TOLERANCE = 1e-6
 """How far a rotation matrix may be from one."""
 
+AT_PLACE = 1e-3
+"""A link that comes as near in [m] is not out of reach: what is missed is its orientation."""
+
 TURN = 2.0 * math.pi
 """A whole turn in [rad]."""
 
@@ -209,9 +212,14 @@ class IkSolver:
             return f'{self._at_limits(unlimited.positions - turns)} ({starts} starts)'
         way = min(float(np.linalg.norm(each.error[:3])) for each in (best, unlimited))
         turn = float(np.linalg.norm(best.error[3:]))
+        reason = (
+            f'the pose is out of reach by {way:.3f} m; move it towards the base'
+            if way > AT_PLACE
+            else 'no joints turn it so; turn the pose, or move it away from a singular place'
+        )
         return (
-            f'link {self.link.link} comes as near as {1e3 * way:.1f} mm and {turn:.3f} rad in'
-            f' {starts} starts: the pose is out of reach by {way:.3f} m, or singular'
+            f'it comes as near as {1e3 * way:.1f} mm and {turn:.3f} rad in'
+            f' {starts} starts: {reason}'
         )
 
     def _refused(self, reason: str) -> PlanningError:

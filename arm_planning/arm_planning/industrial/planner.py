@@ -175,7 +175,11 @@ class IndustrialPlanner:
     def _full(
         self, request: MotionRequest, start: Array, goal: Goal, scene: PlanningScene | None
     ) -> tuple[FullSpeedPath, LinkKinematics]:
-        """Return the path at full speed to a goal, and the link that it moves."""
+        """Return the path at full speed to a goal, and the link that it moves.
+
+        Raises:
+            PlanningError: The goal is out of reach, or the way there cannot be followed.
+        """
         factors = request.velocity_scaling, request.acceleration_scaling
         check_scaling(*factors)
         joints = scaled(self._model.limits, *factors)
@@ -189,15 +193,20 @@ class IndustrialPlanner:
                 f'no planner {request.planner_id!r}; choose one of {", ".join(PLANNER_IDS)}',
             )
         curve = self._curve(request, start, goal, solver.link)
-        full = curve_path(
-            solver.link,
-            curve,
-            start,
-            joints,
-            self._limits,
-            factors=factors,
-            name=request.planner_id,
-        )
+        try:
+            full = curve_path(
+                solver.link,
+                curve,
+                start,
+                joints,
+                self._limits,
+                factors=factors,
+                name=request.planner_id,
+            )
+        except PlanningError:
+            if isinstance(goal, PoseGoal):  # on the way out of reach an arm looks singular
+                solver.solve(goal.pose, start)
+            raise
         if isinstance(goal, JointGoal):
             full = self._ends_at(full, goal, request.planner_id)
         return full, solver.link

@@ -89,9 +89,8 @@ def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ..
     if scaled.duration < NEGLIGIBLE_SLOWDOWN * path.duration:
         return scaled, full.notes
     note = (
-        f'takes {scaled.duration:.2f} s instead of {path.duration:.2f} s: slowed to'
-        f' {1.0 / max(demand.time_factor, 1.0):.0%} where {limits.names[demand.joint]} meets its'
-        f' limit of {QUANTITIES[demand.quantity]}'
+        f'takes {scaled.duration:.2f} s instead of {path.duration:.2f} s, where'
+        f' {limits.names[demand.joint]} meets its limit of {QUANTITIES[demand.quantity]}'
     )
     return scaled, (*full.notes, note)
 

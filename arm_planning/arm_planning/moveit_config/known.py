@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+import difflib
 import math
 import re
 
@@ -108,7 +109,14 @@ KNOWN: Sequence[Known] = (
     text('robot_description'),
     text('robot_description_semantic'),
     number(f'{KINEMATICS}.*.kinematics_solver_timeout', 0.0),
-    *ignored(OWN_IK, f'{KINEMATICS}.**'),
+    *ignored(
+        OWN_IK,
+        *(
+            f'{KINEMATICS}.*.kinematics_solver{part}'
+            for part in ('', '_search_resolution', '_attempts')
+        ),
+        f'{KINEMATICS}.**',
+    ),
     factor('robot_description_planning.default_velocity_scaling_factor'),
     factor('robot_description_planning.default_acceleration_scaling_factor'),
     *(
@@ -172,6 +180,9 @@ KNOWN: Sequence[Known] = (
 )
 """All of them; the first that matches counts."""
 
+ALIKE = 0.8
+"""How much a key that is misspelt resembles the right one, of 1."""
+
 CLOSED = (f'{LIMITS}.', f'{CARTESIAN}.')
 """Tables whose keys are all known: another one is misspelt."""
 
@@ -202,16 +213,34 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
             if name.startswith(CLOSED):
                 table, _, key = name.rpartition('.')
                 raise ConfigError(
-                    f'{at(name, places)}: {table} has no {key!r}; it has {_keys(table)}'
+                    f'{at(name, places)}: {table} has no {key!r}; it has {", ".join(_keys(table))}'
                 )
         elif not found.fits(value):
             raise ConfigError(f'{at(name, places)} is {value!r}; it must be {found.needed}')
 
 
-def _keys(table: str) -> str:
+def _keys(table: str) -> list[str]:
     """Return the keys that are known in a table."""
     keys = [each.pattern.rpartition('.') for each in KNOWN if not each.reason]
-    return ', '.join(key for above, _, key in keys if above and Known(above).matches(table))
+    return [key for above, _, key in keys if above and Known(above).matches(table)]
+
+
+def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
+    """Return a line for each parameter without effect that resembles one that has some.
+
+    Args:
+        names: Parameters that were given.
+        places: Where they come from, of those that come from a file.
+    """
+    lines = []
+    for name in names:
+        found, (table, _, key) = known_of(name), name.rpartition('.')
+        if found is not None and found.reason and found.pattern.endswith('**'):
+            close = difflib.get_close_matches(key, _keys(table), 1, ALIKE)
+            lines += [
+                f'{at(name, places)}: without effect; did you mean {each!r}?' for each in close
+            ]
+    return lines
 
 
 def without_effect(names: Sequence[str], sensors: Sequence[str] = ()) -> list[str]:

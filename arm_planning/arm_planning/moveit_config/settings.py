@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..exceptions import ConfigError
-from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, without_effect
+from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, MANAGER, without_effect
 from .planner_configs import PlannerConfigs
 from .yaml_file import Place
 
@@ -81,6 +81,43 @@ def read_settings(
         sensors=sensors,
         notes=without_effect(list(values), sensors),
     )
+
+
+def of_nothing(
+    names: Sequence[str],
+    places: Mapping[str, Place],
+    groups: Sequence[str],
+    joints: Sequence[str],
+    controllers: Sequence[str],
+) -> list[str]:
+    """Return a line for each table of a group, joint or controller that there is not.
+
+    MoveIt reads none of them, and does not say so.
+
+    Args:
+        names: Parameters that were given.
+        places: Where they come from, of those that come from a file.
+        groups: Names of the groups of the robot.
+        joints: Names of its joints.
+        controllers: Names of the controllers that follow trajectories.
+    """
+    lines = []
+    for above, kind, known in (
+        (KINEMATICS, 'group', groups),
+        ('ompl', 'group', groups),
+        (LIMITS, 'movable joint', joints),
+        (MANAGER, 'controller', controllers),
+    ):
+        for name, entries in _tables(dict.fromkeys(names), above).items():
+            if name.partition('.')[0] in {*known, 'planner_configs'}:
+                continue
+            first = f'{above}.{name}.{next(iter(entries))}'
+            place = f'{places[first]}: ' if first in places else ''
+            lines.append(
+                f'{place}{above}.{name}: without effect, there is no {kind} {name!r};'
+                f' {kind}s: {", ".join(known)}'
+            )
+    return lines
 
 
 def _below(values: Mapping[str, object], table: str) -> dict[str, object]:

@@ -23,7 +23,9 @@ from node_runner import (
     spin,
 )
 
+from ..moveit_config.known import misspelt
 from ..moveit_config.package import MoveItPackage, read_package
+from ..moveit_config.settings import of_nothing
 from ..ros.background import Background
 from ..ros.execute_action import ExecuteAction
 from ..ros.execution import TrajectoryExecution
@@ -74,7 +76,11 @@ parameters, each before what the package says:
 
 
 class MoveGroup(Node):
-    """Serves clients of MoveIt."""
+    """Serves clients of MoveIt.
+
+    Attributes:
+        groups: Names of the groups that it plans for.
+    """
 
     @destroyed_when_refused
     def __init__(self, package: MoveItPackage | None = None) -> None:
@@ -90,9 +96,17 @@ class MoveGroup(Node):
         given = declare_parameters(self, package)
         description, settings = given.description, given.settings
         robot = _robot(description)
+        self.groups = robot.names
         limits = declare_execution_limits(self)
         controllers = declare_controllers(self, robot, given.places)
         declare_others(self, given.names)
+        for line in (
+            *misspelt(given.names, given.places),
+            *of_nothing(
+                given.names, given.places, robot.names, robot.all_joints, list(controllers)
+            ),
+        ):
+            self.get_logger().warning(line)
         semantic = self.create_publisher(String, 'robot_description_semantic', LATCHED)
         semantic.publish(String(data=description.srdf))
         monitor = SceneMonitor(self, robot)
@@ -100,7 +114,8 @@ class MoveGroup(Node):
         queried = _robot(description)
         StateServices(self, monitor, self._queries, queried)
         KinematicServices(self, monitor, self._queries, queried, settings)
-        execution = TrajectoryExecution(self, controllers, monitor.received, limits)
+        followers = robot.kinematics.mimics
+        execution = TrajectoryExecution(self, controllers, monitor.received, limits, followers)
         self._watch = Background(self, 'watch')
         PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)
@@ -150,6 +165,7 @@ def _serve(stop: threading.Event) -> None:
     node = MoveGroup(package)
     try:
         notify_ready()
+        node.get_logger().info(f'ready: motions of {", ".join(node.groups)} can be planned')
         spin([node], stop)
     finally:
         node.close()

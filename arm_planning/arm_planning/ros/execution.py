@@ -7,7 +7,7 @@ Limits and codes are those of MoveIt's trajectory_execution_manager.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 import math
 import time
@@ -100,6 +100,7 @@ class TrajectoryExecution:
         controllers: Mapping[str, Controller],
         received: Callable[[Sequence[str]], Mapping[str, float]],
         limits: ExecutionLimits,
+        followers: Collection[str] = (),
     ) -> None:
         """Know the controllers; their actions may come later.
 
@@ -109,7 +110,9 @@ class TrajectoryExecution:
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
             limits: When an execution is refused or ended.
+            followers: Joints that follow others, which no controller takes.
         """
+        self._followers = frozenset(followers)
         self._node, self._controllers, self._received = node, controllers, received
         self._limits = limits
         self._clients = {
@@ -181,6 +184,9 @@ class TrajectoryExecution:
                 'Cannot execute trajectory since allow_trajectory_execution was set to false',
             )
         check_trajectory(trajectory)
+        leading = [name for name in trajectory.joint_names if name not in self._followers]
+        if 0 < len(leading) < len(trajectory.joint_names):
+            trajectory = part_of(trajectory, leading)
         execution = Execution(trajectory, done)
         for other in self._running:
             if shared := other.joints & execution.joints:

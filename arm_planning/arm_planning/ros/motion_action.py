@@ -218,10 +218,12 @@ class MotionAction:
         """Go on with a goal later, unless it is canceled."""
 
         def go_on() -> None:
+            if goal.delay is not timer:
+                return  # an executor calls a timer for each expiry until it was destroyed
             self._end_delay(goal)
             plan(goal)
 
-        goal.delay = self._node.create_timer(delay, go_on)
+        timer = goal.delay = self._node.create_timer(delay, go_on)
 
     def _end_delay(self, goal: _Goal) -> None:
         if goal.delay is not None:

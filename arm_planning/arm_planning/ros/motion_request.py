@@ -28,7 +28,7 @@ from arm_model.ros import primitive_shape, xyz, xyzw
 from ..exceptions import PlanningCode, PlanningError
 from ..industrial.planner import PLANNER_IDS
 from ..moveit_config.settings import MoveItSettings, PIPELINES
-from ..planner import DEFAULT_PLANNER, FREE_MOTION
+from ..planner import DEFAULT_PLANNER, FREE_MOTION, unknown_planner
 from ..requests import (
     CircPoint,
     CircPointKind,
@@ -49,6 +49,9 @@ ANY_ORIENTATION = (math.pi, math.pi, math.pi)
 """Tolerance of a goal that names a position only in [rad]."""
 
 OMPL, PILZ = PIPELINES
+
+ROUNDING = 1e-9
+"""By how much joint constraints may miss each other for rounding in [rad] or [m]."""
 
 BAD_GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS
 
@@ -124,8 +127,12 @@ class RequestReader:
         if (message.pipeline_id or self._settings.default_pipeline) == PILZ:
             return message.planner_id or self._settings.default_industrial
         name = planners.name(message.planner_id, message.group_name)
-        is_of_others = name not in {*FREE_MOTION, *PLANNER_IDS} and planners.search(name)
-        return DEFAULT_PLANNER if is_of_others else name
+        if name in {'', *FREE_MOTION, *PLANNER_IDS}:
+            return name
+        if not planners.search(name):
+            listed = planners.groups.get(message.group_name) or FREE_MOTION
+            raise unknown_planner(name, listed)
+        return DEFAULT_PLANNER
 
     def goal(self, message: Any) -> Goal:  # noqa: ANN401
         """Return a moveit_msgs/Constraints as a goal.
@@ -198,7 +205,7 @@ class RequestReader:
 
     def _joint_goal(self, messages: Sequence[Any]) -> JointGoal:
         ranges = self._joint_ranges(messages)
-        wanted = {each.joint_name: each.position for each in messages}
+        wanted = {name: position for name, position, _, _ in map(self._leading, messages)}
         positions, tolerance = np.array(self.start), np.zeros(len(self.start))
         for place, name in enumerate(self._model.joints):
             if name in ranges:
@@ -210,23 +217,36 @@ class RequestReader:
     def _joint_ranges(self, messages: Sequence[Any]) -> dict[str, tuple[float, float]]:
         ranges: dict[str, tuple[float, float]] = {}
         for each in messages:
-            name = each.joint_name
+            name, position, below, above = self._leading(each)
             if name not in self._model.joints:
                 known = ', '.join(self._model.joints)
                 raise _bad_goal(f'no joint {name!r} in {self._model.group}; joints: {known}')
             numbers = (each.position, each.tolerance_above, each.tolerance_below)
             if not all(map(math.isfinite, numbers)) or min(numbers[1:]) < 0.0:
                 raise _bad_goal(
-                    f'joint constraint of {name}: position and tolerances are {numbers}; they must'
-                    ' be finite, the tolerances not negative'
+                    f'joint constraint of {each.joint_name}: position and tolerances are'
+                    f' {numbers}; they must be finite, the tolerances not negative'
                 )
             before = ranges.get(name, (-math.inf, math.inf))
-            lower = max(before[0], each.position - each.tolerance_below)
-            upper = min(before[1], each.position + each.tolerance_above)
-            if lower > upper:
+            lower = max(before[0], position - below)
+            upper = min(before[1], position + above)
+            if lower > upper + ROUNDING:
                 raise _bad_goal(f'joint constraints of {name} contradict each other')
-            ranges[name] = (lower, upper)
+            ranges[name] = (lower, max(lower, upper))
         return ranges
+
+    def _leading(self, message: Any) -> tuple[str, float, float, float]:  # noqa: ANN401
+        """Return joint, position and tolerances of a constraint, of the joint that is followed."""
+        name, position = message.joint_name, message.position
+        below, above = message.tolerance_below, message.tolerance_above
+        mimic = self._model.kinematics.mimics.get(name)
+        if mimic is None or mimic.source not in self._model.joints or not mimic.multiplier:
+            return name, position, below, above
+        if mimic.multiplier < 0.0:
+            below, above = above, below
+        scale = abs(mimic.multiplier)
+        position = (position - mimic.offset) / mimic.multiplier
+        return mimic.source, position, below / scale, above / scale
 
     def _pose_goal(self, positions: Sequence[Any], turns: Sequence[Any]) -> PoseGoal:
         names = {each.link_name for each in (*positions, *turns)}
@@ -309,7 +329,13 @@ class RequestReader:
         )
         if not (np.isfinite(tolerance).all() and (tolerance >= 0.0).all()):
             raise _bad_goal(f'{what}: its tolerances are {tolerance.tolist()}')
-        pose = placement(np.zeros(3), xyzw(message.orientation), what, BAD_GOAL)
+        quaternion = xyzw(message.orientation)
+        if not any(quaternion) and tolerance.min() < math.pi:
+            raise _bad_goal(
+                f'{what}: its orientation is all zeros; give a quaternion of length 1, w = 1 for'
+                ' no turn'
+            )
+        pose = placement(np.zeros(3), quaternion, what, BAD_GOAL)
         frame = self._snapshot.frame(message.header.frame_id, self._positions)
         rotation = frame.rotation @ pose.rotation
         if message.parameterization not in set(Parameterization):

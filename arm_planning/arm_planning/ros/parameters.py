@@ -67,6 +67,11 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
         places = {name: place for name, place in package.places.items() if name not in given}
         give_defaults(node, package.parameters)
         given = {**package.parameters, **given}
+    if not given.get('robot_description'):
+        raise ConfigError(
+            'no robot_description: start move_group with --moveit-config DIR, have `ros2 run'
+            ' arm_bringup bringup ROBOT --plan` start it, or give the parameter in a params file'
+        )
     settings = read_settings(given, places)
     limits = settings.joint_limits
     if limits is None and package is not None:

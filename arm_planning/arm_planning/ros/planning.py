@@ -156,7 +156,7 @@ class PlanningThread:
             PlanningError: The sequence is refused.
         """
         if not items:
-            return lambda: PlannedMotion(StateMessage(), [], 0.0)
+            return lambda: PlannedMotion(StateMessage(), [], 0.0, ['no items: nothing moves'])
         runs = group_runs(items)
         snapshot, positions = self._monitor.start(items[0].req.start_state, runs[0].group)
         for number, run in enumerate(runs[1:], 1):

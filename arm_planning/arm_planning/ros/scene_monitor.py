@@ -100,8 +100,14 @@ class SceneMonitor:
             joints: Their names.
 
         Raises:
-            PlanningError: One was never received, or is too old.
+            PlanningError: The robot lacks one, or it was never received, or is too old.
         """
+        for joint in joints:
+            if joint not in self.robot.all_joints:
+                known = ', '.join(self.robot.all_joints)
+                raise PlanningError(
+                    PlanningCode.CONTROL_FAILED, f'no joint {joint!r}; joints: {known}'
+                )
         self._check_received(joints)
         return {joint: self._places[joint] for joint in joints}
 
@@ -148,18 +154,24 @@ class SceneMonitor:
         message.attached_collision_objects = attached_messages(self.snapshot)
         return message
 
-    def _check_received(self, joints: Sequence[str], given: Sequence[str] = ()) -> None:
-        """Refuse joints that were never received or are too old, and are not given."""
+    def _check_received(self, joints: Sequence[str], given: Sequence[str] | None = None) -> None:
+        """Refuse joints that were never received or are too old, and are not given.
+
+        Args:
+            joints: Their names.
+            given: Those of a start state; None where there can be none.
+        """
         now = time.monotonic()
+        other = '' if given is None else ', or give the start state'
         for joint in joints:
             age = now - self._arrivals.get(joint, -math.inf)
-            if joint not in given and age > STATE_TIMEOUT:
+            if joint not in (given or ()) and age > STATE_TIMEOUT:
                 topic = self._node.resolve_topic_name('joint_states')
                 since = f'{age:.1f} s old' if math.isfinite(age) else 'not received yet'
                 raise PlanningError(
                     PlanningCode.ROBOT_STATE_STALE,
-                    f'joint {joint}: its position on {topic} is {since}; start what publishes it,'
-                    ' or give the start state',
+                    f'joint {joint}: its position on {topic} is {since}; start what publishes it'
+                    f'{other}',
                 )
 
     def _clear_octomap(self, _request: Empty.Request, response: Empty.Response) -> Empty.Response:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import math
 
 import daqp
 import numpy as np
@@ -43,7 +44,7 @@ class Program:
         above = np.concatenate((self.upper, np.full(len(self.least), FREE)))
         below = np.concatenate((self.lower, self.least))
         values, _, flag, info = daqp.solve(self.hessian, self.gradient, self.rows, above, below)
-        if flag != OPTIMAL or not np.isfinite(values).all():
+        if flag != OPTIMAL or not math.isfinite(values.sum()):
             return None
         within = np.minimum(np.maximum(values, self.lower), self.upper)
         return Solution(within, np.array(info['lam']))

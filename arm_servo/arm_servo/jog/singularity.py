@@ -105,6 +105,8 @@ def directions(jacobian: Array, command: Array, correction: Array, fastest: Arra
         fastest: Greatest joint speeds (n) in [rad/s].
     """
     tool, values, joints = np.linalg.svd(jacobian, full_matrices=False)
+    if values[-1] >= REGULAR_SINGULAR_VALUE:
+        return Directions(tool, joints, values, np.zeros_like(values), np.ones_like(values))
     allowed = 1.0 / np.max(np.abs(joints) / fastest, axis=1)
     asked = np.abs(command @ tool) / SPEED_FACTOR + np.abs(correction @ tool) / HOLD_SPEED_FACTOR
     knee = np.maximum(asked / allowed, MIN_SINGULAR_VALUE)

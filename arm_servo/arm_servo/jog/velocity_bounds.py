@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arm_model import Array, frozen, JointLimits, Proximity, RobotModel, RobotState
-from arm_trajectory import brakeable_velocity
+from arm_model import Array, frozen, Proximity, RobotModel, RobotState
+from arm_trajectory import brakeable
 
 from ..report import Cause, Limiter
 
@@ -107,13 +107,14 @@ class VelocityBounds:
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
         ways = np.array((state.position - self._lower, self._upper - state.position))
         below, above = ways
-        left = ways - self._lead(state)
+        left = np.maximum(ways - self._lead(state), 0.0)
+        share = self._in_step(state)
+        speed = brakeable(left, limits.acceleration * share, limits.jerk * share)
         # the last of the way is not run through in a cycle
-        brakeable = np.minimum(
-            brakeable_velocity(left, self._in_step(state)),
-            np.maximum(left, 0.0) / (MIN_APPROACH_CYCLES * period),
+        speed = np.minimum(
+            np.minimum(speed, limits.velocity), left / (MIN_APPROACH_CYCLES * period)
         )
-        slowest, fastest = brakeable * SIGNS
+        slowest, fastest = speed * SIGNS
         lower = np.minimum(np.maximum(slowest, state.velocity - self._change), fastest)
         upper = np.maximum(np.minimum(fastest, state.velocity + self._change), slowest)
         rows = np.array([pair.gradient for pair in near]).reshape(len(near), len(limits))
@@ -125,20 +126,16 @@ class VelocityBounds:
         least = np.minimum(allowed, best)
         return Bounds(below, above, slowest, fastest, lower, upper, near, rows, least)
 
-    def _in_step(self, state: RobotState) -> JointLimits:
-        """Return limits with which all joints brake in step: the tool keeps its direction."""
-        limits, speeds = self._limits, np.abs(state.velocity)
-        longest = float(np.max(speeds / limits.acceleration))
-        part = speeds / (longest * limits.acceleration) if longest > 0.0 else np.ones(len(speeds))
-        share = self._share * np.maximum(part, MIN_DECELERATION_FACTOR)
-        return JointLimits(
-            limits.names,
-            limits.lower,
-            limits.upper,
-            limits.velocity,
-            limits.acceleration * share,
-            limits.jerk * share,
-        )
+    def _in_step(self, state: RobotState) -> Array:
+        """Return the shares of acceleration and jerk with which all joints brake in step.
+
+        The tool keeps its direction then.
+        """
+        times = np.abs(state.velocity) / self._limits.acceleration
+        longest = float(times.max())
+        part = times / longest if longest > 0.0 else np.ones_like(times)
+        share: Array = self._share * np.maximum(part, MIN_DECELERATION_FACTOR)
+        return share
 
     def _lead(self, state: RobotState) -> Array:
         """Return the way down and up that goes by while an acceleration is taken back (2, n)."""
@@ -174,11 +171,11 @@ class VelocityBounds:
         """Name the limit behind a bound."""
         name = self._limits.names[joint]
         if rising:
-            bound, brakeable, way = bounds.upper, bounds.fastest, bounds.above
+            bound, fastest, way = bounds.upper, bounds.fastest, bounds.above
         else:
-            bound, brakeable, way = -bounds.lower, -bounds.slowest, bounds.below
-        if bound[joint] < brakeable[joint] - ACTIVE_FORCE:
+            bound, fastest, way = -bounds.lower, -bounds.slowest, bounds.below
+        if bound[joint] < fastest[joint] - ACTIVE_FORCE:
             return Limiter(Cause.JOINT_ACCELERATION, name, float(bound[joint]), share)
-        if brakeable[joint] >= self._limits.velocity[joint]:
+        if fastest[joint] >= self._limits.velocity[joint]:
             return Limiter(Cause.JOINT_VELOCITY, name, float(bound[joint]), share)
         return Limiter(Cause.JOINT_POSITION, name, float(way[joint]), share)
