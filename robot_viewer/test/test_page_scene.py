@@ -13,7 +13,7 @@ import trimesh
 from urdf_reader import read_urdf, Transform
 from viser import ViserServer
 
-from robot_viewer.page.robot_scene import RobotScene, start_position, travel
+from robot_viewer.page.robot_scene import Ground, RobotScene, start_position, travel
 
 URDF = """
 <robot name="small">
@@ -73,6 +73,16 @@ def test_joints_move_what_hangs_on_them(server: ViserServer, tmp_path: Path) -> 
     assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
     scene.place_base(Transform((1.0, 2.0, 3.0)))
     assert scene._base.position.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_robot_that_walks_away_stays_in_view(server: ViserServer) -> None:
+    """The ground passes below it instead, by less than a section."""
+    ground, turned = Ground(server.scene), (0.0, 0.0, 0.6, 0.8)
+    assert ground.pass_below(Transform((5.3, -2.2, 0.1), turned)) == Transform(
+        (0.0, 0.0, 0.1), turned
+    )
+    assert ground._grid.position.tolist() == pytest.approx([-0.3, -0.3, 0.0])
+    ground.pass_below(Transform((math.inf, 0.0, 0.1)))  # of /tf, too
 
 
 def test_what_cannot_be_shown_is_named_and_the_rest_is_there(server: ViserServer) -> None:

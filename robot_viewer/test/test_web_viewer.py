@@ -20,7 +20,9 @@ from std_srvs.srv import Trigger
 from urdf_robots import ARM
 
 from node_runner import make_executor
+from robot_viewer.nodes import listening
 from robot_viewer.nodes.web_viewer import WebViewer
+from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario
 
@@ -79,8 +81,17 @@ class Robot:
 
 
 @pytest.fixture
-def robot(isolation: Isolation) -> Iterator[Robot]:
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Have a page open, without a browser; what is last in the list counts."""
+    state = [True]
+    monkeypatch.setattr(RobotPage, 'watched', property(lambda _: state[-1]))
+    return state
+
+
+@pytest.fixture
+def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
     """Start the page beside a robot."""
+    assert opened
     rclpy.init(args=['--ros-args', '-p', 'port:=8500'], domain_id=isolation.domain_id)
     made = Robot()
     yield made
@@ -97,6 +108,29 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
     robot.viewer.call('/joint1/enable')
     robot.spin_until(lambda: len(robot.calls) == 3, 'enable')
     assert robot.calls[-1] == 'joint1/enable'
+
+
+def test_who_does_not_look_takes_no_messages(
+    robot: Robot, opened: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each costs time; STOP and what the robot offers are there all the same."""
+    topics = ('joint_states', '/tf', 'diagnostics')
+
+    def listeners() -> list[int]:
+        return [robot.node.count_subscribers(topic) for topic in topics]
+
+    robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions')
+    monkeypatch.setattr(listening, 'LINGER', 0.1)
+    opened.append(False)
+    robot.spin_until(lambda: listeners() == [1, 0, 0], 'their end')
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    robot.viewer.stop()
+    robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
+    robot.viewer._listening.add(JointState, 'more', lambda _: None, 1)
+    assert not robot.node.count_subscribers('more')
+    opened.append(True)
+    robot.spin_until(lambda: listeners() == [2, 1, 1], 'subscriptions again')
+    robot.spin_until(lambda: robot.node.count_subscribers('more') == 1, 'the new one')
 
 
 def test_each_heartbeat_is_one_command(robot: Robot) -> None:

@@ -27,6 +27,14 @@ REFUSED = 1
 
 HELP_OPTIONS = frozenset({'-h', '--help'})
 
+PLAIN_HELP = """\
+usage: {name} --ros-args -p PARAMETER:=VALUE --params-file FILE
+
+The README of its package has its parameters; `ros2 param list /{name}` and
+`ros2 param describe /{name} PARAMETER` show them while it runs.
+"""
+"""What ``--help`` prints of a program that has no other help."""
+
 Body = Callable[[threading.Event], int | None]
 
 
@@ -51,13 +59,13 @@ def run_program(
         *errors: What else is logged as one line.
         args: Command line; None for the process's own.
         patient: As in :func:`.stop_on_signals`.
-        help_text: Printed for ``--help``, which starts nothing.
+        help_text: Printed for ``--help``, which starts nothing; None for :data:`PLAIN_HELP`.
 
     Returns:
         Exit code: that of the body, or 1 when it raised one of the errors.
     """
-    if help_text is not None and HELP_OPTIONS.intersection(sys.argv[1:] if args is None else args):
-        sys.stdout.write(help_text)
+    if HELP_OPTIONS.intersection(sys.argv[1:] if args is None else args):
+        sys.stdout.write(help_text or PLAIN_HELP.format(name=name))
         return 0
     stop = stop_on_signals(patient=patient)
     try:

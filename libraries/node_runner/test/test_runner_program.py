@@ -56,6 +56,16 @@ def ignores(process: subprocess.Popen[str], number: signal.Signals) -> bool:
     return bool(mask >> (number - 1) & 1)
 
 
+@pytest.mark.parametrize('option', ['-h', '--help'])
+def test_help_starts_nothing(isolation: Isolation, option: str) -> None:
+    """Also of a program that has no help of its own."""
+    with running(isolation, option) as process:
+        output, errors = process.communicate(timeout=TIMEOUT)
+    assert (process.returncode, errors) == (0, '')
+    assert output.startswith('usage: careful --ros-args')
+    assert 'ready' not in output
+
+
 @pytest.mark.scenario
 @pytest.mark.parametrize(
     ('first', 'ignored'),

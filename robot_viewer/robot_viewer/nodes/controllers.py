@@ -18,6 +18,7 @@ from rclpy.qos import qos_profile_sensor_data, QoSProfile
 
 from ..page.aim import History, motion_time
 from ..robots import of_robot
+from .listening import Listening
 
 STATE_TYPE = 'control_msgs/msg/JointTrajectoryControllerState'
 STATE = '/controller_state'
@@ -84,16 +85,22 @@ class Controllers:
         history: What their joints did.
     """
 
-    def __init__(self, node: Node, report: Report) -> None:
+    def __init__(self, node: Node, listening: Listening, report: Report) -> None:
         """Find none yet.
 
         Args:
             node: The node of the page.
+            listening: Subscribes to their states while somebody looks.
             report: Reports to people what became of a motion.
         """
-        self._node, self._report = node, report
+        self._node, self._listening, self._report = node, listening, report
         self.found: dict[str, Controller] = {}
         self.history = History()
+
+    @property
+    def busy(self) -> bool:
+        """Whether joints are on their way, or about to be."""
+        return any(each.busy or each.wanted for each in self.found.values())
 
     def look(self, description: str) -> None:
         """Find the controllers that there are.
@@ -117,7 +124,7 @@ class Controllers:
         publisher = self._node.create_publisher(command, f'{name}{COMMAND}', QoSProfile(depth=2))
         controller = Controller(publisher)
         take = partial(self._take, controller)
-        self._node.create_subscription(state, f'{name}{STATE}', take, qos_profile_sensor_data)
+        self._listening.add(state, f'{name}{STATE}', take, qos_profile_sensor_data)
         return controller
 
     def _take(self, controller: Controller, message: Any) -> None:  # noqa: ANN401

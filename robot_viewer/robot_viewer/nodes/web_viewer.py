@@ -40,7 +40,10 @@ from node_runner import (
 from ..page.robot_page import RobotPage, Status, Twist, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot
+from .body import Body
 from .controllers import Controllers
+from .listening import Listening
+from .motion_planning import MotionPlanning
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -104,19 +107,22 @@ class WebViewer(Node):
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
+        self._listening = Listening(self)
         self._controllers = Controllers(
-            self, lambda text, failed: self.page.say(text, failed=failed)
+            self, self._listening, lambda text, failed: self.page.say(text, failed=failed)
         )
         self._base = self._shown_base = Transform()
         self._jogs: Publisher | None = None
         self._walks: Publisher | None = None
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
+        self._body = Body(self, self.page, self._listening, self._positions)
+        self._planning = MotionPlanning(self, self.page, self._positions, self._order)
         self.create_subscription(String, 'robot_description', self._describe, LATCHED)
         sensor = qos_profile_sensor_data
-        self.create_subscription(JointState, 'joint_states', self._take_joints, sensor)
-        self.create_subscription(TFMessage, '/tf', self._take_transforms, sensor)
-        self.create_subscription(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
+        self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
+        self._listening.add(TFMessage, '/tf', self._take_transforms, sensor)
+        self._listening.add(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
         self.create_subscription(String, 'controller_node/state', self._take_state, LATCHED)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
@@ -135,7 +141,10 @@ class WebViewer(Node):
             return
         self._root, self._drawn = tree.root, {}
         self._velocities = greatest_velocities(tree)
-        for note in self.page.show_robot(tree):
+        notes = self.page.show_robot(tree)
+        self._planning.describe(tree)
+        self._body.describe(tree)
+        for note in notes:
             self.get_logger().warning(f'not shown: {note}')
 
     def _take_joints(self, message: JointState) -> None:
@@ -164,10 +173,16 @@ class WebViewer(Node):
         while self._orders:
             self._orders.popleft()()
         self._controllers.advance(self._velocities)
-        if self.page.watched:
+        watched = self.page.watched
+        looked_at = watched or self._controllers.busy
+        if self._listening.update(time.monotonic(), looked_at=looked_at):
+            self._received_at = None  # what is known is old
+        if watched:
             self._draw()
 
     def _draw(self) -> None:
+        self._planning.draw()
+        self._body.draw()
         moved = {n: p for n, p in self._positions.items() if self._drawn.get(n) != p}
         if moved:
             self._drawn.update(moved)
@@ -185,6 +200,7 @@ class WebViewer(Node):
             self.page.show_statuses(list(self._statuses.values()))
         for name, controller in self._controllers.found.items():
             self.page.follow(name, busy=controller.busy, positions=controller.positions)
+        self._body.list()
         self.page.plot(self._controllers.history, time.monotonic())
 
     # -- what the robot offers
@@ -198,6 +214,8 @@ class WebViewer(Node):
             if controller.joints:
                 self.page.offer_targets(name, controller.joints)
         self._find_walking(services)
+        self._planning.look(services)
+        self._body.look()
         others = self.count_publishers('joint_states') - (self._joint_states is not None)
         self._own = not others and bool(self._root)
         if others and self._joint_states is not None:
@@ -279,6 +297,7 @@ class WebViewer(Node):
         self._controllers.stop()
         for drive in self._drives:
             self._call(f'{drive}/halt')
+        self._planning.stop()
         if self._state.removeprefix('to ') in STEPPING:
             self._request_mode('stand')
         if not self._drives and self._set_mode is None:

@@ -27,11 +27,14 @@ from viser import (
 )
 
 from .aim import History
+from .body_panel import BodyPanel
 from .deadman import Deadman, HEARTBEAT
 from .drive_table import drive_html
 from .gate import Gate
+from .motion_plan import PlanRequest
 from .overlay import Overlay
-from .robot_scene import RobotScene, start_position, travel
+from .plan_panel import PlanPanel
+from .robot_scene import Ground, RobotScene, start_position, travel
 from .target_panel import PlotPanel, TargetPanel
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
@@ -141,7 +144,7 @@ class RobotPage:
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._server.scene.set_up_direction('+z')
-        self._server.scene.add_grid('/ground', cell_size=0.1, section_size=0.5, width=4, height=4)
+        self._ground = Ground(self._server.scene)
         self._answer = gui.add_html(_line('no robot description yet', COLORS[3]))
         self._tabs: GuiTabGroupHandle = gui.add_tab_group()
         self._pages: dict[str, GuiTabHandle] = {}
@@ -156,6 +159,8 @@ class RobotPage:
         self._drive_state: GuiHtmlHandle | None = None
         self._targets: dict[str, TargetPanel] = {}
         self._plots: PlotPanel | None = None
+        self._plan: PlanPanel | None = None
+        self._body: BodyPanel | None = None
         self._tree: KinematicTree | None = None
 
     @property
@@ -170,6 +175,12 @@ class RobotPage:
 
     def show_robot(self, tree: KinematicTree) -> list[str]:
         """Show another robot; return what of it cannot be shown, in words."""
+        if self._plan is not None:
+            self._plan.remove()
+            self._plan = None
+        if self._body is not None:
+            self._body.remove()
+            self._body = None
         if self._scene is not None:
             self._scene.remove()
         self.offer_sliders(offered=False)
@@ -177,7 +188,7 @@ class RobotPage:
         slides = {joint.name for joint in tree.movable() if joint.kind is JointKind.PRISMATIC}
         self._units = {j.name: 'm' if j.name in slides else 'rad' for j in tree.movable()}
         self._scene = RobotScene(self._server.scene, tree)
-        far = 0.9 * self._scene.size + 0.3  # [m]
+        far = 0.65 * self._scene.size + 0.25  # [m]
         self._server.initial_camera.position = (far, -far, 0.9 * far)
         self._server.initial_camera.look_at = (0.0, 0.0, 0.3 * self._scene.size)
         for client in self._server.get_clients().values():
@@ -205,9 +216,9 @@ class RobotPage:
         self._joints.content = _table(rows) + (_line(old, COLORS[1]) if old else '')
 
     def show_base(self, pose: Transform) -> None:
-        """Show where the root link is in the world."""
+        """Show how the root link is in the world, and that it moves there."""
         if self._scene is not None:
-            self._scene.place_base(pose)
+            self._scene.place_base(self._ground.pass_below(pose))
 
     def show_statuses(self, statuses: Sequence[Status]) -> None:
         """Show how everything is, what is worst first."""
@@ -304,6 +315,32 @@ class RobotPage:
         if self._plots is not None:
             self._plots.show(history, now)
 
+    def offer_plan(
+        self, groups: Sequence[str], ask: Callable[[PlanRequest], None]
+    ) -> PlanPanel | None:
+        """Offer to plan motions, for the robot that is shown now.
+
+        Args:
+            groups: Names of the groups that can be planned for.
+            ask: Takes what people ask for, in any thread.
+
+        Returns:
+            Where to show what is planned; None as long as there is no robot.
+        """
+        if self._scene is None or self._tree is None:
+            return None
+        with self._tab('Plan'):
+            self._plan = PlanPanel(self._server, self._scene, self._tree, groups, ask)
+        return self._plan
+
+    def offer_body(self) -> BodyPanel | None:
+        """Offer what is known of the body of a walking robot; None as long as there is none."""
+        if self._scene is None or self._tree is None:
+            return None
+        with self._tab('Body'):
+            self._body = BodyPanel(self._server, self._scene.path_of(self._tree.root))
+        return self._body
+
     def offer_jog(self) -> None:
         """Offer to jog the tool as long as a button is held."""
         if not self._offer('Jog'):
@@ -332,6 +369,8 @@ class RobotPage:
         self._deadman.stop()  # or a button that is held would go on
         for panel in list(self._targets.values()):
             panel.lock()  # or a slider that is dragged
+        if self._body is not None:
+            self._body.lock()
         self._actions.stop()
 
     def say(self, text: str, *, failed: bool = False) -> None:

@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 import math
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -26,6 +28,49 @@ from ..state_publisher import joint_transform
 PLAIN = (0.7, 0.72, 0.75, 1.0)
 """Color of what the description gives none."""
 ROOT = '/robot'
+Tint: TypeAlias = tuple[float, float, float, float]
+"""Red, green, blue and opacity from 0 to 1."""
+SECTION = 0.5
+"""Between thick lines of the ground in [m]."""
+
+
+class Ground:
+    """A grid that passes below a robot that goes somewhere, so that it stays in view."""
+
+    def __init__(self, scene: SceneApi) -> None:
+        """Show it.
+
+        Args:
+            scene: Where to.
+        """
+        self._grid = scene.add_grid(
+            '/ground', cell_size=0.1, section_size=SECTION, width=4, height=4
+        )
+
+    def pass_below(self, pose: Transform) -> Transform:
+        """Move the ground; return where the root link is shown.
+
+        Args:
+            pose: Of the root link in the world.
+        """
+        x, y, z = pose.translation
+        self._grid.position = (-(x % SECTION), -(y % SECTION), 0.0)
+        return Transform((0.0, 0.0, z), pose.rotation)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a robot is shown.
+
+    Attributes:
+        path: Of its base in the scene.
+        links: Those that are seen; None for all.
+        tint: Color of all of it; None for those of the description.
+    """
+
+    path: str = ROOT
+    links: frozenset[str] | None = None
+    tint: Tint | None = None
 
 
 class RobotScene:
@@ -36,20 +81,32 @@ class RobotScene:
         size: How far its links reach from the root in [m].
     """
 
-    def __init__(self, scene: SceneApi, tree: KinematicTree, folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        scene: SceneApi,
+        tree: KinematicTree,
+        folder: Path | None = None,
+        look: Look | None = None,
+        meshes: dict[Path, trimesh.Trimesh] | None = None,
+    ) -> None:
         """Show the robot, each joint at zero or the limit next to it.
 
         Args:
             scene: Where to.
             tree: The robot.
             folder: That of the description, where names of mesh files are relative.
+            look: How; by default as it is described.
+            meshes: Those that were read before.
         """
+        look = look or Look()
         self.notes: list[str] = []
         self._scene, self._tree, self._folder = scene, tree, folder
+        self._links, self._tint = look.links or frozenset(tree.links), look.tint
+        self._meshes = {} if meshes is None else meshes
         self._movable = {joint.name: joint for joint in tree.movable()}
-        self._base = scene.add_frame(ROOT, show_axes=False)
+        self._base = scene.add_frame(look.path, show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
-        self._paths = {tree.root: f'{ROOT}/{tree.root}'}
+        self._paths = {tree.root: f'{look.path}/{tree.root}'}
         scene.add_frame(self._paths[tree.root], show_axes=False)
         self._add_joints()
         self._add_shapes()
@@ -71,15 +128,38 @@ class RobotScene:
             else:
                 continue
             if math.isfinite(position):
-                _put(self._frames[name], joint_transform(joint, position))
+                put(self._frames[name], joint_transform(joint, position))
 
     def place_base(self, pose: Transform) -> None:
         """Move the whole robot.
 
         Args:
-            pose: Of its root link in the world.
+            pose: Of its root link in the scene.
         """
-        _put(self._base, pose)
+        put(self._base, pose)
+
+    def ghost(self, links: frozenset[str], tint: Tint) -> RobotScene:
+        """Return the robot once more, on the same base, with joints of its own.
+
+        Args:
+            links: Those that are seen.
+            tint: Their color.
+        """
+        look = Look(f'{ROOT}/ghost', links, tint)
+        return RobotScene(self._scene, self._tree, self._folder, look, self._meshes)
+
+    def show(self, *, seen: bool) -> None:
+        """Let it be seen, or not."""
+        if self._base.visible is not seen:
+            self._base.visible = seen
+
+    def path_of(self, frame: str) -> str:
+        """Return the node of a frame; that of the world where it is no link.
+
+        Args:
+            frame: Its name.
+        """
+        return self._paths.get(frame, '')
 
     def remove(self) -> None:
         """Take the robot out of the scene."""
@@ -95,7 +175,7 @@ class RobotScene:
                     continue
                 path = self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
                 frame = self._frames[joint.name] = self._scene.add_frame(path, show_axes=False)
-                _put(frame, joint.origin)
+                put(frame, joint.origin)
             waiting = later
 
     def _reach(self, link: str) -> float:
@@ -109,6 +189,7 @@ class RobotScene:
         shown = {each.link for each in self._tree.visuals()}
         shapes = [*self._tree.visuals()]
         shapes += [each for each in self._tree.collisions() if each.link not in shown]
+        shapes = [each for each in shapes if each.link in self._links]
         for number, shape in enumerate(shapes):
             try:
                 self._add_shape(f'{self._paths[shape.link]}/shape{number}', shape)
@@ -117,7 +198,7 @@ class RobotScene:
         self.notes += [f'{", ".join(links)}: {reason}' for reason, links in missing.items()]
 
     def _add_shape(self, name: str, shape: UrdfShape) -> None:
-        color = shape.color or PLAIN
+        color = self._tint or shape.color or PLAIN
         rgb = (round(255 * color[0]), round(255 * color[1]), round(255 * color[2]))
         opacity = None if color[3] >= 1.0 else color[3]
         node: SceneNodeHandle
@@ -135,19 +216,21 @@ class RobotScene:
                 node = self._add_mesh(name, shape, rgb, opacity)
             case _:
                 raise MeshFileError(f'<{shape.shape}> is no box, cylinder, sphere or mesh')
-        _put(node, shape.origin)
+        put(node, shape.origin)
 
     def _add_mesh(
         self, name: str, shape: UrdfShape, rgb: tuple[int, int, int], opacity: float | None
     ) -> SceneNodeHandle:
         path = find_mesh(shape.attributes.get('filename', ''), self._folder)
-        mesh = trimesh.load(path, force='mesh')
+        mesh = self._meshes.get(path) or trimesh.load(path, force='mesh')
         scale = shape.lengths('scale') if 'scale' in shape.attributes else (1.0, 1.0, 1.0)
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             raise MeshFileError(f'{path}: no triangles')
+        self._meshes[path] = mesh
         (x, y, z) = scale
         whole = (x, y, z)
-        if shape.color is None and mesh.visual is not None and mesh.visual.defined:
+        plain = shape.color is not None or self._tint is not None
+        if not plain and mesh.visual is not None and mesh.visual.defined:
             return self._scene.add_mesh_trimesh(name, mesh, scale=whole)
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
         return self._scene.add_mesh_simple(
@@ -196,6 +279,12 @@ def start_position(joint: Joint) -> float:
     return min(max(0.0, lower), upper)
 
 
-def _put(node: SceneNodeHandle, pose: Transform) -> None:
+def put(node: SceneNodeHandle, pose: Transform) -> None:
+    """Move a node of a scene.
+
+    Args:
+        node: Which.
+        pose: In its parent.
+    """
     x, y, z, w = pose.rotation
     node.position, node.wxyz = pose.translation, (w, x, y, z)

@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Where the links of a robot are, of the positions of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from urdf_reader import Joint, KinematicTree, multiply, rotate, Transform
+
+from .state_publisher import joint_transform
+
+
+def compose(parent: Transform, child: Transform) -> Transform:
+    """Return the pose of what is in a frame that is in another one.
+
+    Args:
+        parent: Pose of the frame.
+        child: Pose in that frame.
+    """
+    x, y, z = rotate(parent.rotation, child.translation)
+    a, b, c = parent.translation
+    return Transform((a + x, b + y, c + z), multiply(parent.rotation, child.rotation))
+
+
+def joint_position(joint: Joint, positions: Mapping[str, float]) -> float:
+    """Return the position of a joint in [rad] or [m], also of one that follows another; else 0.
+
+    Args:
+        joint: The joint.
+        positions: In [rad] or [m] by name.
+    """
+    if joint.mimic is None:
+        return positions.get(joint.name, 0.0)
+    return joint.mimic.multiplier * positions.get(joint.mimic.source, 0.0) + joint.mimic.offset
+
+
+def link_pose(tree: KinematicTree, link: str, positions: Mapping[str, float]) -> Transform:
+    """Return the pose of a link in the root link.
+
+    Args:
+        tree: The robot.
+        link: Name of the link.
+        positions: Of joints in [rad] or [m]; those that are missing stand at zero.
+
+    Raises:
+        DescriptionError: There is no such link.
+    """
+    pose = Transform()
+    for joint in tree.chain(tree.root, link):
+        pose = compose(pose, joint_transform(joint, joint_position(joint, positions)))
+    return pose
+
+
+def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
+    """Return the links that joints move.
+
+    Args:
+        tree: The robot.
+        joints: Their names; those that follow one of them move along.
+    """
+    moved: set[str] = set()
+    found = True
+    while found:
+        found = False
+        for joint in tree.joints:
+            own = joint.name in joints or (
+                joint.mimic is not None and joint.mimic.source in joints
+            )
+            if joint.child not in moved and (own or joint.parent in moved):
+                moved.add(joint.child)
+                found = True
+    return frozenset(moved)

@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Subscriptions that are there only while somebody looks: each message costs time in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+LINGER = 5.0
+"""How long it goes on after the last look in [s]: a page that is loaded anew needs it at once."""
+
+
+class Listening:
+    """Subscribes to topics as long as somebody looks."""
+
+    def __init__(self, node: Node) -> None:
+        """Listen to nothing.
+
+        Args:
+            node: The node whose subscriptions they are.
+        """
+        self._node = node
+        self._makers: list[Callable[[], Subscription]] = []
+        self._made: list[Subscription] = []
+        self._last_look: float | None = None
+
+    def add(
+        self,
+        kind: Any,  # noqa: ANN401  # message types have no type
+        topic: str,
+        take: Callable[[Any], None],
+        qos: QoSProfile | int,
+    ) -> None:
+        """Have messages of a topic taken while somebody looks.
+
+        Args:
+            kind: Type of the messages.
+            topic: Its name.
+            take: Takes each of them.
+            qos: Of the subscription.
+        """
+        maker = partial(self._node.create_subscription, kind, topic, take, qos)
+        self._makers.append(maker)
+        if self._made:
+            self._made.append(maker())
+
+    def update(self, now: float, *, looked_at: bool) -> bool:
+        """Begin or end; return whether it has just begun.
+
+        Args:
+            now: Steady time in [s].
+            looked_at: Somebody looks, or waits for something.
+        """
+        if looked_at:
+            self._last_look = now
+            begins = not self._made
+            if begins:
+                self._made = [maker() for maker in self._makers]
+            return begins
+        if self._made and self._last_look is not None and now - self._last_look > LINGER:
+            for subscription in self._made:
+                self._node.destroy_subscription(subscription)
+            self._made = []
+        return False

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The body of a walking robot on a page: its pose, its attitude, and what its feet span."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from urdf_reader import Vector
+from viser import (
+    GuiEvent,
+    GuiHtmlHandle,
+    GuiSliderHandle,
+    IcosphereHandle,
+    LineSegmentsHandle,
+    ViserServer,
+)
+
+from .target_panel import UNLOCK
+
+RANGES: Mapping[str, float] = {'Roll [rad]': 0.35, 'Pitch [rad]': 0.3, 'Height [m]': 0.03}
+"""Of the sliders to either side; the controller has limits of its own."""
+DOWN_COLOR, UP_COLOR, LINE_COLOR = (47, 158, 68), (134, 142, 150), (25, 113, 194)
+FOOT_RADIUS = 0.012
+"""Of the mark of a foot in [m]."""
+LINE_WIDTH = 3.0
+"""In [px]."""
+
+Pose: TypeAlias = tuple[float, float, float]
+"""Roll and pitch in [rad], height in [m], relative to the normal pose."""
+
+
+class BodyPanel:
+    """Sliders of the body's pose, a horizon, and marks at the feet."""
+
+    def __init__(self, server: ViserServer, path: str) -> None:
+        """Add it to the tab that is open.
+
+        Args:
+            server: Of the page.
+            path: Node of the root link.
+        """
+        self._server, self._path = server, path
+        gui = server.gui
+        self._folder = gui.add_folder(None)
+        with self._folder:
+            self._html: GuiHtmlHandle = gui.add_html('')
+            self._unlock = gui.add_button(UNLOCK, color='orange', visible=False)
+        self._unlock.on_click(lambda _: self._set_locked(locked=False))
+        self._sliders: list[GuiSliderHandle[float]] = []
+        self._feet: dict[str, IcosphereHandle] = {}
+        self._line: LineSegmentsHandle | None = None
+
+    def offer_pose(self, send: Callable[[Pose], None]) -> None:
+        """Let people move the body.
+
+        Args:
+            send: Takes the pose, in any thread.
+        """
+        if self._sliders:
+            return
+
+        def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
+            if event.client_id is not None and not self._unlock.visible:
+                roll, pitch, height = (slider.value for slider in self._sliders)
+                send((roll, pitch, height))
+
+        def level() -> None:
+            if self._unlock.visible:
+                return
+            for slider in self._sliders:
+                slider.value = 0.0  # type: ignore[misc]  # it has a setter
+            send((0.0, 0.0, 0.0))
+
+        gui = self._server.gui
+        with self._folder:
+            for label, most in RANGES.items():
+                slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
+                slider.on_update(moved)
+                self._sliders.append(slider)
+            gui.add_button('Level').on_click(lambda _: level())
+
+    def remove(self) -> None:
+        """Take all of it off the page."""
+        self._folder.remove()
+        for node in (*self._feet.values(), self._line):
+            if node is not None:
+                node.remove()
+
+    def lock(self) -> None:
+        """Send nothing until somebody unlocks the sliders: one may be dragged, or be late."""
+        if self._sliders:
+            self._set_locked(locked=True)
+
+    def show(self, html: str) -> None:
+        """Show attitude and battery.
+
+        Args:
+            html: Of them.
+        """
+        if self._html.content != html:
+            self._html.content = html
+
+    def show_feet(self, places: Mapping[str, Vector], down: Sequence[str]) -> None:
+        """Mark the feet, and draw what those that stand span.
+
+        Args:
+            places: Of all feet in the root link in [m].
+            down: Those that stand, in their order round the robot.
+        """
+        for foot, place in places.items():
+            mark = self._feet.get(foot)
+            if mark is None:
+                mark = self._feet[foot] = self._server.scene.add_icosphere(
+                    f'{self._path}/contact_{foot}', FOOT_RADIUS, opacity=0.8
+                )
+            mark.position = place
+            color = DOWN_COLOR if foot in down else UP_COLOR
+            if tuple(mark.color) != color:
+                mark.color = color
+        corners = np.array([places[foot] for foot in down], float).reshape(-1, 3)
+        ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        if self._line is not None and len(self._line.points) == len(ends):
+            self._line.points = ends.astype(np.float32)
+            return
+        if self._line is not None:
+            self._line.remove()
+            self._line = None
+        if len(down) > 1:
+            self._line = self._server.scene.add_line_segments(
+                f'{self._path}/support',
+                ends,
+                LINE_COLOR,
+                thickness=LINE_WIDTH,
+                thickness_units='screen',
+            )
+
+    def _set_locked(self, *, locked: bool) -> None:
+        self._unlock.visible = locked

@@ -1,0 +1,295 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Planned motions on a page: goal, ghost, path, and the objects of the planning scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from functools import partial
+from html import escape
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from urdf_reader import KinematicTree, Transform, Vector
+from viser import (
+    GuiButtonHandle,
+    GuiDropdownHandle,
+    GuiEvent,
+    GuiHtmlHandle,
+    LineSegmentsHandle,
+    SceneNodeHandle,
+    TransformControlsEvent,
+    TransformControlsHandle,
+    ViserServer,
+)
+
+from ..link_poses import links_beyond
+from .motion_plan import (
+    AddBox,
+    ChooseGoal,
+    ChooseGroup,
+    ChooseObject,
+    DRAGGED,
+    DragGoal,
+    DragObject,
+    Execute,
+    NO_GOAL,
+    NO_OBJECT,
+    Plan,
+    PlanGroup,
+    PlanRequest,
+    RemoveObject,
+    SceneObject,
+    ShowAgain,
+)
+from .robot_scene import put, RobotScene, Tint
+from .scene_objects import SceneObjects
+
+GHOST_TINT: Tint = (0.91, 0.35, 0.05, 0.45)
+LINE_COLOR = (232, 89, 12)
+LINE_WIDTH = 3.0
+"""In [px]."""
+GOAL_SIZE, OBJECT_SIZE = 0.22, 0.2
+"""Of the arrows by which something is dragged in [m]."""
+BOX_SIZE = (0.2, 0.2, 0.2)
+"""Of a new box in [m]."""
+DONE, FAILED, PLAIN = '#2f9e44', '#e03131', '#868e96'
+
+
+class PlanPanel:
+    """Asks for what people do, and shows what it is given; it decides nothing."""
+
+    def __init__(
+        self,
+        server: ViserServer,
+        robot: RobotScene,
+        tree: KinematicTree,
+        groups: Sequence[str],
+        ask: Callable[[PlanRequest], None],
+    ) -> None:
+        """Add it to the tab that is open.
+
+        Args:
+            server: Of the page.
+            robot: In the scene.
+            tree: The same, as it is described.
+            groups: Names of the groups that can be planned for.
+            ask: Takes what people ask for, in any thread.
+        """
+        self._server, self._robot, self._tree, self._ask = server, robot, tree, ask
+        self._path = robot.path_of(tree.root)
+        self._ghost: RobotScene | None = None
+        self._links: frozenset[str] = frozenset()
+        self._line: LineSegmentsHandle | None = None
+        self._goal_gizmo: TransformControlsHandle | None = None
+        self._object_gizmo: TransformControlsHandle | None = None
+        self._objects = SceneObjects(server.scene, robot.path_of)
+        gui = server.gui
+        self._folder = gui.add_folder(None)
+        with self._folder:
+            self._group = self._dropdown('Group', groups, ChooseGroup)
+            self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), ChooseGoal)
+            self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
+            self._button('Plan', lambda: Plan(self._speed.value / 100.0))
+            self._execute = self._button('Execute', Execute)
+            self._again = self._button('Show again', ShowAgain)
+            self._outcome: GuiHtmlHandle = gui.add_html('')
+            self._object = self._dropdown('Object', (NO_OBJECT,), ChooseObject)
+            self._remove = self._button('Remove it', RemoveObject)
+            self._size = gui.add_vector3(
+                'Size [m]', BOX_SIZE, min=(0.01, 0.01, 0.01), max=(3.0, 3.0, 3.0), step=0.01
+            )
+            self._button('Add a box', self._box)
+        self.allow(execute=False)
+        self.choose_object(NO_OBJECT, None)
+
+    def remove(self) -> None:
+        """Take all of it off the page; what hangs on the robot goes with the robot."""
+        self._folder.remove()
+        self._objects.remove()
+        for node in (self._ghost, self._line, self._goal_gizmo, self._object_gizmo):
+            if node is not None:
+                node.remove()
+
+    # -- what is shown
+
+    def show_group(self, group: PlanGroup) -> None:
+        """Show which group is planned for, and its states.
+
+        Args:
+            group: The group.
+        """
+        _choose(self._group, group.name)
+        self._goal.options = (NO_GOAL, DRAGGED, *group.states)
+        links = links_beyond(self._tree, frozenset(group.joints))
+        if links != self._links and self._ghost is not None:
+            self._ghost.remove()
+            self._ghost = None
+        self._links = links
+
+    def show_goal(self, name: str) -> None:
+        """Show which goal is chosen."""
+        _choose(self._goal, name)
+
+    def place_goal(self, pose: Transform | None) -> None:
+        """Let the goal be dragged from a pose.
+
+        Args:
+            pose: In the root link; None where there is no goal.
+        """
+        if pose is None:
+            if self._goal_gizmo is not None:
+                self._goal_gizmo.visible = False
+            return
+        if self._goal_gizmo is None:
+            self._goal_gizmo = self._gizmo(f'{self._path}/goal', GOAL_SIZE, self._goal_dragged)
+        put(self._goal_gizmo, pose)
+        self._goal_gizmo.visible = True
+
+    def show_ghost(self, positions: Mapping[str, float] | None) -> None:
+        """Show the robot where it is not.
+
+        Args:
+            positions: Of all joints in [rad] or [m]; None hides it.
+        """
+        if positions is None:
+            if self._ghost is not None:
+                self._ghost.show(seen=False)
+            return
+        if self._ghost is None:
+            self._ghost = self._robot.ghost(self._links, GHOST_TINT)
+        self._ghost.place(positions)
+        self._ghost.show(seen=True)
+
+    def show_line(self, points: Sequence[Vector]) -> None:
+        """Draw where the tip passes.
+
+        Args:
+            points: In the root link in [m]; none for no line.
+        """
+        if self._line is not None:
+            self._line.remove()
+            self._line = None
+        if len(points) > 1:
+            ends = np.array([[before, after] for before, after in pairwise(points)])
+            self._line = self._server.scene.add_line_segments(
+                f'{self._path}/line',
+                ends,
+                LINE_COLOR,
+                thickness=LINE_WIDTH,
+                thickness_units='screen',
+            )
+
+    def say(self, text: str, *, failed: bool | None = None) -> None:
+        """Show what became of the last request.
+
+        Args:
+            text: In words.
+            failed: Whether it failed; None for something that goes on.
+        """
+        if not text:
+            self._outcome.content = ''
+            return
+        color = PLAIN if failed is None else FAILED if failed else DONE
+        self._outcome.content = (
+            f'<div style="margin:0.3em 1em"><span style="color:{color}">&#9679;</span> '
+            f'{escape(text)}</div>'
+        )
+
+    def allow(self, *, execute: bool) -> None:
+        """Let the buttons be pressed that need a plan."""
+        for button in (self._execute, self._again):
+            button.disabled = not execute
+
+    def show_objects(self, objects: Sequence[SceneObject]) -> None:
+        """Show what is in the planning scene.
+
+        Args:
+            objects: All of it.
+        """
+        self._objects.show(objects)
+        free = (NO_OBJECT, *(each.name for each in objects if not each.attached))
+        if self._object.options != free:
+            self._object.options = free
+
+    def choose_object(self, name: str, thing: SceneObject | None) -> None:
+        """Show which object is chosen, and let it be dragged.
+
+        Args:
+            name: Of it.
+            thing: It, once it is in the planning scene.
+        """
+        if name in self._object.options:
+            _choose(self._object, name)
+        self._remove.disabled = thing is None
+        path = '' if thing is None else f'{self._robot.path_of(thing.frame)}/chosen'
+        if self._object_gizmo is not None and self._object_gizmo.name != path:
+            self._object_gizmo.remove()
+            self._object_gizmo = None
+        if thing is None:
+            return
+        if self._object_gizmo is None:
+            self._object_gizmo = self._gizmo(path, OBJECT_SIZE, self._object_dragged)
+        put(self._object_gizmo, thing.pose)
+
+    def move_object(self, name: str, pose: Transform) -> None:
+        """Show an object where it is dragged to.
+
+        Args:
+            name: Which.
+            pose: In its frame.
+        """
+        self._objects.move(name, pose)
+
+    # -- what people do, in threads of the page
+
+    async def _goal_dragged(self, event: TransformControlsEvent) -> None:
+        self._ask(DragGoal(_pose_of(event.target)))
+
+    async def _object_dragged(self, event: TransformControlsEvent) -> None:
+        if event.phase != 'start':
+            self._ask(DragObject(_pose_of(event.target), event.phase == 'end'))
+
+    def _box(self) -> PlanRequest:
+        x, y, z = self._size.value
+        return AddBox((x, y, z))
+
+    def _gizmo(
+        self,
+        path: str,
+        size: float,
+        dragged: Callable[[TransformControlsEvent], Coroutine[Any, Any, None]],
+    ) -> TransformControlsHandle:
+        gizmo = self._server.scene.add_transform_controls(path, size, disable_sliders=True)
+        gizmo.on_update(dragged)  # coroutines keep their order
+        return gizmo
+
+    def _dropdown(
+        self, label: str, options: Sequence[str], request: Callable[[str], PlanRequest]
+    ) -> GuiDropdownHandle[str]:
+        dropdown: GuiDropdownHandle[str] = self._server.gui.add_dropdown(label, tuple(options))
+        dropdown.on_update(partial(self._chosen, request))
+        return dropdown
+
+    def _chosen(
+        self, request: Callable[[str], PlanRequest], event: GuiEvent[GuiDropdownHandle[str]]
+    ) -> None:
+        if event.client_id is not None:  # or it was set here
+            self._ask(request(event.target.value))
+
+    def _button(self, label: str, request: Callable[[], PlanRequest]) -> GuiButtonHandle:
+        button = self._server.gui.add_button(label)
+        button.on_click(lambda _: self._ask(request()))
+        return button
+
+
+def _choose(dropdown: GuiDropdownHandle[str], option: str) -> None:
+    if dropdown.value != option:
+        dropdown.value = option  # type: ignore[misc]  # it has a setter
+
+
+def _pose_of(node: SceneNodeHandle) -> Transform:
+    w, x, y, z = map(float, node.wxyz)
+    (a, b, c) = map(float, node.position)
+    return Transform((a, b, c), (x, y, z, w))

@@ -1,0 +1,341 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Plans on the page over DDS, beside a move_group that answers when the test says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import time
+from typing import Any
+
+from builtin_interfaces.msg import Duration
+from isolation import Isolation
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup
+from moveit_msgs.msg import MoveItErrorCodes, PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionIK
+import pytest
+import rclpy
+from rclpy.action.server import CancelResponse
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from test_motion_plan import SRDF
+from test_web_viewer import LATCHED, TIMEOUT
+from trajectory_msgs.msg import JointTrajectoryPoint
+from urdf_reader import Transform
+from urdf_robots import ARM
+
+from node_runner import make_executor
+from node_runner.action_goals import serve_goals
+from robot_viewer.nodes.motion_planning import ANSWER_TIME
+from robot_viewer.nodes.planning_messages import box_message, changed
+from robot_viewer.nodes.web_viewer import WebViewer
+from robot_viewer.page.motion_plan import (
+    AddBox,
+    ChooseGoal,
+    ChooseObject,
+    DRAGGED,
+    DragGoal,
+    DragObject,
+    Execute,
+    NO_GOAL,
+    Plan,
+    PlanRequest,
+    RemoveObject,
+    SceneObject,
+)
+from robot_viewer.page.plan_panel import PlanPanel
+from robot_viewer.page.robot_page import RobotPage
+
+pytestmark = pytest.mark.scenario
+
+
+class Server:
+    """An action whose goals end when the test says so, or when they are canceled."""
+
+    def __init__(self, node: Node, action: Any, name: str) -> None:
+        """Offer it."""
+        self.action = action
+        self.goals: list[Any] = []
+        self.canceled: list[Any] = []
+        self._results: dict[bytes, tuple[Any, bool]] = {}
+        self._server = serve_goals(
+            node,
+            action,
+            name,
+            start=self.goals.append,
+            conclude=self._conclude,
+            cancel=self._cancel,
+        )
+
+    def answer(self, code: int, message: str = '', **others: object) -> None:
+        """End the last goal."""
+        self._end(self.goals[-1], code, message, **others)
+
+    def _end(self, goal: Any, code: int, message: str, **others: object) -> None:
+        error = MoveItErrorCodes(val=code, message=message)
+        result = self.action.Result(error_code=error, **others)
+        self._results[bytes(goal.goal_id.uuid)] = result, code == MoveItErrorCodes.SUCCESS
+        self._server.notify_execute(goal, None)
+
+    def _cancel(self, goal: Any) -> CancelResponse:
+        self.canceled.append(goal)
+        self._end(goal, MoveItErrorCodes.PREEMPTED, 'canceled')
+        return CancelResponse.ACCEPT
+
+    def _conclude(self, goal: Any) -> Any:
+        result, good = self._results.pop(bytes(goal.goal_id.uuid))
+        if good:
+            goal.succeed()
+        elif goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.abort()
+        return result
+
+
+class Planner:
+    """What the page takes for a move_group, and a robot."""
+
+    def __init__(self) -> None:
+        """Offer it, with the page beside it."""
+        node = self.node = Node('move_group')
+        self.objects: dict[str, SceneObject] = {}
+        self.asked: list[Any] = []
+        self.events: list[String] = []
+        self.ik_code = MoveItErrorCodes.SUCCESS
+        self.move = Server(node, MoveGroup, 'move_action')
+        self.execute = Server(node, ExecuteTrajectory, 'execute_trajectory')
+        node.create_service(GetPositionIK, 'compute_ik', self._solve)
+        node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
+        node.create_service(GetPlanningScene, 'get_planning_scene', self._whole)
+        node.create_subscription(String, 'trajectory_execution_event', self.events.append, 10)
+        self._scene = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
+        self._texts = [
+            node.create_publisher(String, name, LATCHED)
+            for name in ('robot_description', 'robot_description_semantic')
+        ]
+        for publisher, text in zip(self._texts, (ARM, SRDF), strict=True):
+            publisher.publish(String(data=text))
+        states = node.create_publisher(JointState, 'joint_states', 10)
+        state = JointState(name=['shoulder', 'lift', 'roll'], position=[0.1, 0.2, 0.3])
+        node.create_timer(0.05, lambda: states.publish(state))
+        self.viewer = WebViewer()
+        self._executor = make_executor()
+        self._executor.add_node(node)
+        self._executor.add_node(self.viewer)
+
+    @property
+    def panel(self) -> PlanPanel:
+        """That of the page."""
+        panel = self.viewer.page._plan
+        assert panel is not None
+        return panel
+
+    @property
+    def said(self) -> str:
+        """What the panel says."""
+        return self.panel._outcome.content
+
+    def ask(self, request: PlanRequest) -> None:
+        """Ask as a button of the page does."""
+        self.panel._ask(request)
+
+    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Serve both nodes until something is true."""
+        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
+        while not condition():
+            assert self.node.get_clock().now().nanoseconds < deadline, f'{what}: {self.said}'
+            self._executor.spin_once(0.05)
+
+    def plan(self) -> None:
+        """Have a motion to the state 'up' planned."""
+        count = len(self.move.goals)
+        self.ask(ChooseGoal('up'))
+        self.ask(Plan(0.5))
+        self.spin_until(lambda: len(self.move.goals) > count, 'a goal')
+        self.move.answer(MoveItErrorCodes.SUCCESS, planned_trajectory=_trajectory())
+        self.spin_until(lambda: 'takes 2.0 s' in self.said, 'a plan')
+
+    def _solve(self, request: Any, answer: Any) -> Any:
+        self.asked.append(request.ik_request)
+        answer.error_code = MoveItErrorCodes(val=self.ik_code, message='out of reach')
+        answer.solution.joint_state = JointState(name=['shoulder', 'lift'], position=[0.7, 0.8])
+        return answer
+
+    def _apply(self, request: Any, answer: Any) -> Any:
+        answer.success = 'refused' not in str(request.scene.name)
+        self.objects = changed(self.objects, request.scene)
+        self._scene.publish(request.scene)
+        return answer
+
+    def _whole(self, _: Any, answer: Any) -> Any:
+        for each in self.objects.values():
+            x, y, z = each.parts[0].size
+            scene = box_message(each.name, (x, y, z), each.pose, each.frame)
+            answer.scene.world.collision_objects += scene.world.collision_objects
+        return answer
+
+    def close(self) -> None:
+        """End both."""
+        self.viewer.page.close()
+        self.viewer.destroy_node()
+        self.node.destroy_node()
+
+
+def _trajectory() -> Any:
+    trajectory = MoveGroup.Result().planned_trajectory
+    joints = trajectory.joint_trajectory
+    joints.joint_names = ['shoulder', 'lift', 'roll']
+    for seconds, place in ((0, 0.1), (2, 0.5)):
+        point = JointTrajectoryPoint(positions=[place, 0.2, 0.3])
+        point.time_from_start = Duration(sec=seconds)
+        joints.points.append(point)
+    return trajectory
+
+
+@pytest.fixture
+def planner(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Planner]:
+    """Start the page beside a move_group, as if it were open, and wait for the panel."""
+    monkeypatch.setattr(RobotPage, 'watched', True)
+    rclpy.init(args=['--ros-args', '-p', 'port:=8600'], domain_id=isolation.domain_id)
+    made = Planner()
+    made.spin_until(lambda: made.viewer.page._plan is not None, 'the panel')
+    made.spin_until(lambda: made.node.count_subscribers('joint_states') > 0, 'the page')
+    made.spin_until(lambda: len(made.viewer._positions) > 2, 'joint states')
+    yield made
+    made.close()
+    rclpy.shutdown()
+
+
+def test_what_is_planned_is_executed_once(planner: Planner) -> None:
+    """The goal is the state of the SRDF; nothing is executed before somebody says so."""
+    planner.plan()
+    goal = planner.move.goals[-1].request
+    assert goal.planning_options.plan_only
+    assert goal.request.group_name == 'whole'
+    assert goal.request.max_velocity_scaling_factor == 0.5
+    (constraints,) = goal.request.goal_constraints
+    wanted = {each.joint_name: each.position for each in constraints.joint_constraints}
+    assert wanted == {'shoulder': 0.5, 'lift': 0.2, 'roll': 0.3}
+    assert not planner.execute.goals
+    planner.ask(Execute())
+    planner.ask(Execute())
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
+    assert planner.execute.goals[-1].request.trajectory == _trajectory()
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: 'still executing' in planner.said, 'a refusal')
+    planner.execute.answer(MoveItErrorCodes.SUCCESS)
+    planner.spin_until(lambda: 'executed' in planner.said, 'the end')
+    planner.ask(Execute())
+    planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
+    assert len(planner.execute.goals) == len(planner.move.goals) == 1
+
+
+def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
+    """The end of an execution takes its own goal away, and no other."""
+    planner.plan()
+    planner.ask(Execute())
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
+    planner.ask(ChooseGoal(DRAGGED))
+    planner.spin_until(lambda: planner.panel._goal.value == DRAGGED, 'another goal')
+    planner.execute.answer(MoveItErrorCodes.SUCCESS)
+    planner.spin_until(lambda: 'executed' in planner.said, 'the end')
+    assert planner.panel._goal.value == DRAGGED
+    planner.plan()
+    planner.ask(Execute())
+    planner.spin_until(lambda: len(planner.execute.goals) == 2, 'an execution')
+    planner.execute.answer(MoveItErrorCodes.SUCCESS)
+    planner.spin_until(lambda: planner.panel._goal.value == NO_GOAL, 'no goal')
+
+
+def test_a_refusal_is_shown_in_its_words(planner: Planner) -> None:
+    """And nothing can be executed."""
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: 'choose a goal' in planner.said, 'a refusal')
+    planner.ask(ChooseGoal('up'))
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: bool(planner.move.goals), 'a goal')
+    planner.move.answer(MoveItErrorCodes.GOAL_IN_COLLISION, 'wheel touches <box>')
+    words = 'GOAL_IN_COLLISION: wheel touches &lt;box&gt;'
+    planner.spin_until(lambda: words in planner.said, 'the words')
+    planner.ask(Execute())
+    planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
+    assert not planner.execute.goals
+
+
+def test_stop_cancels_and_forgets(planner: Planner) -> None:
+    """An execution, at once or before it was accepted; a plan; one that is being made."""
+    planner.plan()
+    planner.ask(Execute())
+    planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
+    planner.viewer.stop()
+    planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
+    planner.spin_until(lambda: [each.data for each in planner.events] == ['stop'], 'the event')
+    planner.spin_until(lambda: 'PREEMPTED: canceled' in planner.said, 'the end')
+    planner.plan()
+    planner.ask(Execute())
+    planner.viewer.stop()  # in the same turn
+    planner.spin_until(lambda: len(planner.execute.canceled) == 2, 'a cancel')
+    planner.plan()
+    planner.viewer.stop()
+    planner.ask(Execute())  # it came late
+    planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
+    planner.ask(ChooseGoal('up'))
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: len(planner.move.goals) == 4, 'a goal')
+    planner.viewer.stop()
+    planner.spin_until(lambda: bool(planner.move.canceled), 'a cancel')
+    planner.spin_until(lambda: not planner.viewer._orders, 'the end')
+    assert planner.panel._execute.disabled
+    assert len(planner.execute.goals) == 2
+
+
+def test_a_goal_is_dragged(planner: Planner) -> None:
+    """Joints with which the tip is there are the goal; without any, the pose is."""
+    planner.ask(ChooseGoal(DRAGGED))
+    for x in (0.3, 0.4, 0.5):
+        planner.ask(DragGoal(Transform((x, 0.0, 0.5))))
+    planner.spin_until(lambda: len(planner.asked) >= 2, 'inverse kinematics')
+    assert len(planner.asked) == 2, 'those in between are left out'
+    last = planner.asked[-1]
+    assert (last.ik_link_name, last.pose_stamped.header.frame_id) == ('wheel', 'base')
+    assert last.pose_stamped.pose.position.x == 0.5
+    planning = planner.viewer._planning
+    planner.spin_until(lambda: planning._pose is None, 'a solution')
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: len(planner.move.goals) == 1, 'a goal')
+    (joints,) = planner.move.goals[-1].request.request.goal_constraints
+    places = {each.joint_name: each.position for each in joints.joint_constraints}
+    assert places == {'shoulder': 0.7, 'lift': 0.8}
+    planning._asked = time.monotonic() - ANSWER_TIME  # its answer was lost
+    planner.ik_code = MoveItErrorCodes.NO_IK_SOLUTION
+    planner.ask(DragGoal(Transform((9.0, 0.0, 0.5))))
+    planner.spin_until(lambda: 'NO_IK_SOLUTION: out of reach' in planner.said, 'the words')
+    planner.ask(Plan(1.0))
+    planner.spin_until(lambda: len(planner.move.goals) == 2, 'a goal')
+    (pose,) = planner.move.goals[-1].request.request.goal_constraints
+    assert not pose.joint_constraints
+    (place,) = pose.position_constraints
+    assert place.constraint_region.primitive_poses[0].position.x == 9.0
+    assert pose.orientation_constraints[0].link_name == 'wheel'
+
+
+def test_boxes_come_move_and_go(planner: Planner) -> None:
+    """As move_group has them; one that was added can be dragged at once."""
+    planner.ask(AddBox((0.1, 0.2, 0.4)))
+    planner.spin_until(lambda: 'box1' in planner.objects, 'a box')
+    assert planner.objects['box1'].pose.translation[2] == pytest.approx(0.2), 'on the ground'
+    planner.spin_until(lambda: planner.panel._object.value == 'box1', 'the choice')
+    assert planner.panel._object_gizmo is not None
+    planner.ask(DragObject(Transform((1.0, 0.0, 0.0)), is_last=False))
+    planner.ask(DragObject(Transform((2.0, 0.0, 0.0)), is_last=True))
+    planner.spin_until(lambda: 'is moved' in planner.said, 'a move')
+    assert planner.objects['box1'].pose.translation[0] == 2.0
+    planner.ask(AddBox((0.1, 0.2, 0.4)))
+    planner.spin_until(lambda: planner.panel._object.value == 'box2', 'the choice')
+    planner.ask(ChooseObject('box1'))
+    planner.ask(RemoveObject())
+    planner.spin_until(lambda: set(planner.objects) == {'box2'}, 'the end of it')
+    planner.spin_until(lambda: planner.panel._object.options == ('none', 'box2'), 'the list')
+    assert planner.panel._object_gizmo is None

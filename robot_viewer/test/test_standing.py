@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a walking robot stands: pure, and by its topics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import math
+
+from geometry_msgs.msg import Pose, Quaternion
+from hypothesis import given
+from hypothesis import strategies as st
+from isolation import Isolation
+import pytest
+import rclpy
+from rclpy.node import Node
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import String
+from test_web_viewer import LATCHED, TIMEOUT
+from urdf_reader import from_rpy, read_urdf
+
+from node_runner import make_executor
+from robot_viewer.nodes.web_viewer import WebViewer
+from robot_viewer.page.body_panel import BodyPanel
+from robot_viewer.page.robot_page import RobotPage
+from robot_viewer.page.standing import (
+    battery_text,
+    feet_of,
+    feet_places,
+    horizon_html,
+    roll_pitch,
+    standing,
+)
+
+LEVEL = (0.0, 0.0, 0.0, 1.0)
+LEGS = {'fl': (0.1, 0.1), 'fr': (0.1, -0.1), 'rl': (-0.1, 0.1), 'rr': (-0.1, -0.1)}
+URDF = f"""<robot name="dog"><link name="body"/>{
+    ''.join(
+        f'<link name="{name}_foot"/><joint name="{name}" type="prismatic">'
+        f'<parent link="body"/><child link="{name}_foot"/><origin xyz="{x} {y} -0.1"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        for name, (x, y) in LEGS.items()
+    )
+}</robot>"""
+TREE = read_urdf(URDF)
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0))
+def test_roll_and_pitch_do_not_depend_on_the_heading(
+    roll: float, pitch: float, yaw: float
+) -> None:
+    """They are those of the quaternion."""
+    assert roll_pitch(from_rpy(roll, pitch, yaw)) == pytest.approx((roll, pitch), abs=1e-6)
+
+
+def test_the_lowest_feet_stand() -> None:
+    """All of them level; one that is lifted does not; on a slope the attitude counts."""
+    feet = feet_of(TREE)
+    assert len(feet) == 4
+    places = feet_places(TREE, feet, {})
+    assert standing(places, LEVEL) == ('rr_foot', 'fr_foot', 'fl_foot', 'rl_foot'), 'all round'
+    lifted = feet_places(TREE, feet, {'fl': 0.02})
+    assert 'fl_foot' not in standing(lifted, LEVEL)
+    nose_down = from_rpy(0.0, 0.2, 0.0)
+    assert standing(places, nose_down) == ('fr_foot', 'fl_foot')
+    reached = {'fl': 0.2 * math.tan(0.2), 'fr': 0.2 * math.tan(0.2)}
+    assert len(standing(feet_places(TREE, feet, reached), nose_down)) == 4
+    assert standing({}, LEVEL) == ()
+
+
+def test_a_robot_without_feet_has_none() -> None:
+    """An arm, or what has two of them."""
+    assert feet_of(read_urdf('<robot name="r"><link name="a_foot"/></robot>')) == ()
+
+
+def test_what_is_not_measured_is_not_shown() -> None:
+    """Numbers and horizon without an attitude, and a battery without a voltage."""
+    assert 'roll' not in horizon_html(None, '50 %')
+    assert battery_text(0.5, math.nan) == '50 %'
+    assert battery_text(math.nan, 7.4) == '7.4 V'
+    assert 'battery' not in horizon_html(LEVEL, battery_text(math.nan, 0.0))
+    shown = horizon_html(from_rpy(0.1, -0.2, 1.0), '')
+    assert 'roll +5.7°, pitch -11.5°' in shown
+    assert 'rotate(-5.7) translate(0 11.5)' in shown
+
+
+@pytest.fixture
+def dog(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Dog]:
+    """Start a page beside it, as if it were open."""
+    monkeypatch.setattr(RobotPage, 'watched', True)
+    rclpy.init(args=['--ros-args', '-p', 'port:=8700'], domain_id=isolation.domain_id)
+    made = Dog()
+    yield made
+    made.viewer.page.close()
+    made.viewer.destroy_node()
+    made.node.destroy_node()
+    rclpy.shutdown()
+
+
+class Dog:
+    """What the page takes for a quadruped."""
+
+    def __init__(self) -> None:
+        """Publish its description, and take poses of the body."""
+        node = self.node = Node('dog')
+        self.poses: list[Pose] = []
+        self.lift = 0.0
+        node.create_subscription(Pose, 'body_pose', self.poses.append, 10)
+        self._text = node.create_publisher(String, 'robot_description', LATCHED)
+        self._states = node.create_publisher(JointState, 'joint_states', 10)
+        self._imu = node.create_publisher(Imu, 'imu', 10)
+        self._battery = node.create_publisher(BatteryState, 'battery_state', 10)
+        node.create_timer(0.05, self._publish)
+        self.viewer = WebViewer()
+        self._executor = make_executor()
+        self._executor.add_node(node)
+        self._executor.add_node(self.viewer)
+        self._text.publish(String(data=URDF))
+
+    @property
+    def panel(self) -> BodyPanel:
+        """That of the page."""
+        panel = self.viewer.page._body
+        assert panel is not None
+        return panel
+
+    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
+        """Serve both nodes until something is true."""
+        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
+        while not condition():
+            assert self.node.get_clock().now().nanoseconds < deadline, what
+            self._executor.spin_once(0.05)
+
+    def _publish(self) -> None:
+        positions = [self.lift, 0.0, 0.0, 0.0]
+        self._states.publish(JointState(name=list(LEGS), position=positions))
+        x, y, z, w = from_rpy(0.1, 0.0, 0.0)
+        self._imu.publish(Imu(orientation=Quaternion(x=x, y=y, z=z, w=w)))
+        self._battery.publish(BatteryState(percentage=0.75, voltage=7.4))
+
+
+def test_the_page_shows_how_it_stands(dog: Dog) -> None:
+    """Attitude, battery and feet; its sliders move the body until STOP."""
+    dog.spin_until(lambda: dog.viewer.page._body is not None, 'the panel')
+    dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
+    dog.spin_until(lambda: 'battery 75 %, 7.4 V' in dog.panel._html.content, 'the battery')
+    dog.spin_until(lambda: len(dog.panel._feet) == 4, 'feet')
+    dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')
+    publisher = dog.viewer._body._poses
+    assert publisher is not None
+    dog.spin_until(lambda: publisher.get_subscription_count() > 0, 'a subscription')
+    dog.viewer._body.send((0.1, 0.2, -0.01))
+    dog.spin_until(lambda: bool(dog.poses), 'a pose')
+    turn, place = dog.poses[0].orientation, dog.poses[0].position
+    assert roll_pitch((turn.x, turn.y, turn.z, turn.w)) == pytest.approx((0.1, 0.2))
+    assert (place.x, place.y, place.z) == (0.0, 0.0, -0.01)
+    assert not dog.panel._unlock.visible
+    dog.viewer.page._stop()
+    assert dog.panel._unlock.visible
