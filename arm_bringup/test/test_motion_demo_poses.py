@@ -14,7 +14,12 @@ from arm_bringup.demos.motion.poses import (
     free_end,
     free_way,
     is_free,
+    MAX_RUN_UP,
+    SIDE,
+    SIDES,
+    SPEED,
     square_fits,
+    square_speed,
 )
 from arm_bringup.description import expand_xacro
 from arm_model import load_limits, RobotModel, start_pose
@@ -40,6 +45,34 @@ def test_our_arms_start_where_their_files_say(name: str) -> None:
     arm = model(name)
     assert square_fits(arm, start_pose(arm))
     assert choose_start(arm).tolist() == start_pose(arm).tolist()
+
+
+def test_a_slow_arm_reaches_the_speed_of_its_square_early() -> None:
+    """With the default acceleration of 1 rad/s2, as without any in MoveIt's file."""
+    quick = model('panda')
+    assert square_speed(quick, start_pose(quick)) == SPEED
+    table = load_limits(ROBOTS / 'panda' / 'limits.yaml')
+    slow = {
+        name: {key: limit[key] for key in ('has_velocity_limits', 'max_velocity')}
+        for name, limit in table.items()
+    }
+    arm = RobotModel(
+        expand_xacro(ROBOTS / 'panda' / 'panda.urdf.xacro'),
+        (ROBOTS / 'panda' / 'panda.srdf').read_text(),
+        slow,
+    )
+    start = start_pose(arm)
+    speed = square_speed(arm, start)
+    assert 0.05 < speed < SPEED
+    jacobian, limits = arm.jacobian(start), arm.limits
+    shares = []
+    for side in SIDES:
+        twist = np.array([*side, 0.0, 0.0, 0.0]) * speed
+        joints = np.abs(np.linalg.lstsq(jacobian * limits.velocity, twist, rcond=1e-3)[0])
+        run_up = limits.velocity * joints / limits.acceleration + limits.acceleration / limits.jerk
+        shares.append(run_up.max() / (SIDE / speed))
+    assert max(shares) <= MAX_RUN_UP + 1e-9
+    assert max(shares) > 0.5 * MAX_RUN_UP
 
 
 def test_at_the_border_of_its_reach_an_arm_starts_elsewhere() -> None:

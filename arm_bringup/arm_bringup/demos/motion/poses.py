@@ -18,9 +18,11 @@ from arm_trajectory import PathCheck
 from .goals import beside
 
 SPEED = 0.1
-"""Speed of the squares in [m/s]."""
-SIDE = 0.8
-"""Time of a side of a square in [s]."""
+"""Greatest speed of the squares in [m/s]."""
+SIDE = 0.08
+"""Length of a side of a square in [m]."""
+MAX_RUN_UP = 0.3
+"""Greatest part of a side on which the joints may accelerate."""
 SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
 """Directions of the sides of a square."""
 STEPS = 8
@@ -70,6 +72,26 @@ def square_fits(model: RobotModel, start: Array) -> bool:
     return all(_fits(model, start, frame) for frame in (model.base, model.tip))
 
 
+def square_speed(model: RobotModel, start: Array) -> float:
+    """Return a speed for the squares that is reached early on each side in [m/s].
+
+    A joint that moves r for each metre reaches its speed in r v/a + a/j.
+
+    Args:
+        model: The arm.
+        start: Joint positions in [rad].
+    """
+    limits = model.limits
+    scaled = np.linalg.pinv(model.jacobian(start) * limits.velocity, rcond=1e-3)[:, :3]
+    axes = np.hstack(
+        [model.pose(start, frame).rotation[:, :2] for frame in (model.base, model.tip)]
+    )
+    rates = limits.velocity * np.abs(scaled @ axes).max(axis=1)
+    build_up, length = limits.acceleration / limits.jerk, MAX_RUN_UP * SIDE
+    root = np.sqrt(build_up**2 + 4.0 * length * rates / limits.acceleration)
+    return min(SPEED, float(np.min(2.0 * length / (build_up + root))))
+
+
 def _fits(model: RobotModel, start: Array, frame: str) -> bool:
     limits, positions = model.limits, start.copy()
     least = min(CLEARANCE, model.clearance(start, CLEARANCE) - NEARER)
@@ -82,7 +104,7 @@ def _fits(model: RobotModel, start: Array, frame: str) -> bool:
             shares = np.linalg.lstsq(jacobian * limits.velocity, twist, rcond=1e-3)[0]
             speeds = limits.velocity * shares
             off = np.linalg.norm((jacobian @ speeds - twist)[:3])
-            positions = positions + speeds * SIDE / STEPS
+            positions = positions + speeds * (SIDE / SPEED) / STEPS
             inside = (positions >= limits.lower + margin) & (positions <= limits.upper - margin)
             slow = np.abs(shares) <= SPEED_SHARE
             if off > OFF_LINE * SPEED or not (inside & slow).all():

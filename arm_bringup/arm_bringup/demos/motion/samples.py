@@ -140,16 +140,16 @@ def away_from_line(points: Sequence[Array], begin: Array, direction: Array) -> f
 
 
 def tool_speed(samples: Sequence[Sample], period: float) -> float:
-    """Return the median speed of the commanded tool in the middle half of a motion in [m/s].
+    """Return the median speed of the commanded tool in the third quarter of a motion in [m/s].
 
     Args:
         samples: Of one motion at a constant speed, with its begin and its end.
         period: Period of the cycle in [s].
     """
-    middle = samples[len(samples) // 4 : -(len(samples) // 4) or None]
+    steady = samples[len(samples) // 2 : -(len(samples) // 4) or None]
     speeds = [
         float(np.linalg.norm(after.tool - before.tool)) / (cycles * period)
-        for before, after in pairwise(middle)
+        for before, after in pairwise(steady)
         if (cycles := cycles_between(before, after, period)) >= 1
     ]
     return float(np.median(speeds)) if speeds else 0.0

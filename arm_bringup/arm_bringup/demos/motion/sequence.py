@@ -18,7 +18,7 @@ from process_supervisor import CallError
 from ..client import ActionRun
 from .client import MotionClient
 from .goals import duration
-from .poses import free_end, free_way, SIDE, SIDES, SPEED, square_fits
+from .poses import free_end, free_way, SIDE, SIDES, square_fits, square_speed
 from .results import MotionResults, Square, WORST_PATH
 from .samples import away_from_line, peak_jerk, tool_speed, tracking_error
 
@@ -130,13 +130,14 @@ class MotionSequence:
         self.enter(f'a square in the {name}')
         speeds, commanded, measured, gap = [], 0.0, 0.0, 0.0
         missed = self.client.figures.bus.missed_pdos
+        speed = square_speed(self.model, self.start)
         self.client.limited.clear()
         for way in SIDES:
             begin = self.client.last
             axes = self.model.pose(begin.position, frame).rotation
             direction = axes @ np.array(way, dtype=float)
             first = len(self.client.samples)
-            gap = max(gap, self._jog(SPEED * np.array(way), frame, SIDE))
+            gap = max(gap, self._jog(speed * np.array(way), frame, SIDE / speed))
             moving = self.client.samples[first:]
             self._rest()
             side = self.client.samples[first:]
@@ -145,10 +146,10 @@ class MotionSequence:
             commanded = max(commanded, away_from_line(tools, begin.tool, direction))
             tools = [each.measured_tool for each in side]
             measured = max(measured, away_from_line(tools, begin.measured_tool, direction))
-        reached = min(speeds, key=lambda speed: -abs(speed - SPEED))
+        reached = max(speeds, key=lambda each: abs(each - speed))
         missed = self.client.figures.bus.missed_pdos - missed
         limited = (self.client.limited or [''])[-1]
-        square = Square(SPEED, reached, commanded, measured, missed, gap, limited)
+        square = Square(speed, reached, commanded, measured, missed, gap, limited)
         self.results.square(f'square, {name}', square)
 
     def singularity(self) -> None:
