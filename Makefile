@@ -12,6 +12,9 @@ ROBOT ?= panda
 # 1: demos without the page on which the robot is seen
 NO_VIEW ?=
 export NO_VIEW
+# of the training: what is learned, and for how long
+TASK ?= walk
+MINUTES ?= 30
 # what pytest gets besides: make test ARGS='-k sync -x'; one after another: ARGS=-n0
 ARGS ?=
 
@@ -20,7 +23,7 @@ IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 # some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
 
-.PHONY: help demo demo-arm demo-plan demo-quad test check build lint bench chaos soak setup pins clean distclean
+.PHONY: help demo demo-arm demo-plan demo-quad test check build lint docs bench train chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -31,8 +34,10 @@ help:
 	@echo 'make test       build everything and run all tests'
 	@echo 'make check      lint, types, and the tests that take no time: between two edits'
 	@echo 'make build      build every package; then: source env.sh'
-	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers'
+	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers, manual'
+	@echo 'make docs       build the manual as a site in build/site, to be read without a network'
 	@echo 'make bench      print the figures'
+	@echo 'make train      train a policy that walks, check it and compare it with the gait (MINUTES=30, SEED=1)'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
 	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'
 	@echo 'make setup      make the environment only'
@@ -70,9 +75,17 @@ build: system
 lint: system
 	@$(WORKSPACE) lint
 
+docs: system
+	@$(WORKSPACE) docs
+
 bench: system
 	@$(WORKSPACE) build --dev
 	@$(IN_ENVIRONMENT) tools/bench
+
+train: system
+	@$(WORKSPACE) build --with training quad_controller
+	@$(IN_ENVIRONMENT) nice python quad_controller/training/train.py --task $(TASK) --minutes $(MINUTES) \
+	  $(if $(SEED),--seed $(SEED))
 
 chaos: system
 	@$(WORKSPACE) build --dev

@@ -11,8 +11,10 @@ import io
 from pathlib import Path
 import shutil
 import signal
+import time
 from typing import TYPE_CHECKING
 
+import numpy as np
 import psutil
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 330  # [px] width of the controls at the right
+TOP = 170  # [px] height of STOP and of messages
 
 
 def lacking() -> str:
@@ -107,7 +110,9 @@ def colors_of_scene(png: bytes) -> int:
 
 def hold(page: Page, button: str) -> None:
     """Press a button of the panel with the mouse, and keep it pressed."""
-    box = page.get_by_role('button', name=button, exact=True).bounding_box()
+    found = page.get_by_role('button', name=button, exact=True)
+    found.scroll_into_view_if_needed()
+    box = found.bounding_box()
     assert box is not None
     page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
     page.mouse.down()
@@ -129,3 +134,45 @@ def slider_value(page: Page, slider: int) -> float:
     """Return what a slider of the open tab shows."""
     thumb = page.locator('[role=slider]:visible').nth(slider)
     return float(thumb.get_attribute('aria-valuenow') or 'nan')
+
+
+def choose(page: Page, dropdown: str, option: str) -> None:
+    """Choose an option of a dropdown of the open tab."""
+    page.get_by_label(dropdown, exact=True).click()
+    page.get_by_role('option', name=option, exact=True).click()
+
+
+def drag_arrow(page: Page, color: str, way: int) -> None:
+    """Drag what is red or green in the scene to the left by pixels, once it is drawn.
+
+    Args:
+        page: The page.
+        color: red or green; the leftmost place of that color is taken.
+        way: How far.
+    """
+    channel = ('red', 'green').index(color)
+    deadline = time.monotonic() + PAGE_TIMEOUT / 1000.0
+    before, place = None, _leftmost(page, channel)
+    while place is None or place != before:  # a canvas says nothing of what it draws
+        if time.monotonic() > deadline:
+            raise AssertionError(f'nothing {color} stands still in the scene')
+        before, place = place, _leftmost(page, channel)
+    x, y = place[0] + 4, place[1]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - way, y, steps=4)
+    page.mouse.up()
+
+
+def _leftmost(page: Page, channel: int) -> tuple[int, int] | None:
+    """Return the leftmost pixel of the scene in which one of red, green and blue stands out."""
+    from PIL import Image
+
+    image = Image.open(io.BytesIO(page.screenshot())).convert('RGB')
+    scene = np.asarray(image, dtype=int)[TOP:, : image.width - PANEL]
+    others = np.delete(scene, channel, axis=2).max(axis=2)
+    rows, columns = np.nonzero(scene[:, :, channel] > others + 60)
+    if not len(columns):
+        return None
+    first = int(columns.argmin())
+    return int(columns[first]), int(rows[first]) + TOP

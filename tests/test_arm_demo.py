@@ -8,6 +8,7 @@ import signal
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
+from manual_page import missing_in_run
 from processes import RunningProcess
 import psutil
 import pytest
@@ -44,6 +45,7 @@ def test_demo_of_motion(isolation: Isolation) -> None:
             assert demo.wait(150.0) == 0, demo.output
         for part in PARTS:
             assert any(line.startswith(f'{part} ') for line in demo.lines), demo.output
+        assert not missing_in_run('index.md', 'make demo-arm', demo.output), demo.output
         assert set(recorder.last_states().values()) == {'Switch on disabled'}
     assert not psutil.wait_procs(started, timeout=5.0)[1]
 

@@ -9,7 +9,7 @@ import re
 from typing import Any, TYPE_CHECKING
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
-from control_msgs.msg import JointJog
+from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers
 from moveit_msgs.action import ExecuteTrajectory
 from moveit_msgs.msg import RobotTrajectory
@@ -129,13 +129,21 @@ def test_both_arms_and_the_gripper_move_at_the_same_time(robot: Robot) -> None:
 
 def test_arms_that_move_towards_each_other_stop_and_may_part(robot: Robot) -> None:
     """The goal of one ends with the pair, as neither is where the other's was planned."""
+    name = '/right_controller/controller_state'
+    states = robot.client.listen(JointTrajectoryControllerState, name)
     runs = [robot.follow(arm, 4, MIDDLE[arm]) for arm in ARMS]
     ended = [each for each in robot.results(runs) if each.status == ABORTED]
     assert ended
     for each in ended:
         assert each.result.error_code == FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED
         assert re.search('left_.*right_|right_.*left_', each.result.error_string)
-    for arm in ('right', 'left'):
+    robot.client.spin_until(
+        lambda: bool(states) and not any(states[-1].reference.velocities), 60.0, 'rest'
+    )
+    turn = states[-1].reference.positions[0]
+    up = robot.follow('right', 4, [turn, 0.1])  # away, wherever either stands
+    assert robot.results([up])[0].status == SUCCEEDED, up.result()
+    for arm in ('left', 'right'):
         (back,) = robot.results([robot.follow(arm, 4)])
         assert back.status == SUCCEEDED, back.result
 

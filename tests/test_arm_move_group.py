@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from copy import deepcopy
+import re
+import shlex
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
@@ -39,6 +41,7 @@ from moving_arm import goal_to, MovingArm, READY, robot_parameters
 from planning_messages import panda
 from processes import executable
 import pytest
+from readme_folder import CHECKOUT
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 from simulated_arm import JOINTS
@@ -78,6 +81,8 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         arm.client.spin_until(lambda: bool(semantic), 10.0, 'robot_description_semantic')
         assert 'panda_arm' in semantic[0].data
         arm.follow()
+        _back_to_ready(arm)
+        _moves_by_the_command_of_the_readme(arm)
         _back_to_ready(arm)
         _shares_the_scene(arm)
         _answers_about_states(arm)
@@ -184,6 +189,20 @@ def _scene(arm: MovingArm) -> PlanningScene:
     return arm.client.call(GetPlanningScene, '/get_planning_scene', request).scene
 
 
+def _moves_by_the_command_of_the_readme(arm: MovingArm) -> None:
+    """As it is printed; joints that it leaves out stay."""
+    text = (CHECKOUT / 'arm_planning' / 'README.md').read_text()
+    blocks = re.findall(r'```bash\n(ros2 action send_goal .*?)```', text, re.DOTALL)
+    (command,) = map(shlex.split, blocks)
+    sent = arm.run(*command)
+    assert sent.wait(60.0) == 0, sent.output
+    assert 'Goal finished with status: SUCCEEDED' in sent.output
+    states = arm.client.listen(JointState, '/joint_states')
+    arm.client.spin_until(lambda: bool(states), 10.0, 'joint states')
+    places = dict(zip(states[-1].name, states[-1].position, strict=True))
+    assert [places[name] for name in JOINTS] == pytest.approx([0.8, *READY[1:]], abs=1e-2)
+
+
 def _shares_the_scene(arm: MovingArm) -> None:
     """PlanningSceneInterface: apply_planning_scene; pymoveit2: the topic collision_object."""
     monitored = arm.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
@@ -277,7 +296,7 @@ def _says_why_not(arm: MovingArm) -> None:
     leg.joint_trajectory.joint_names[0] = 'leg'
     for trajectory, code, words in (
         (elsewhere, MoveItErrorCodes.CONTROL_FAILED, 'panda_joint1'),
-        (leg, MoveItErrorCodes.ROBOT_STATE_STALE, 'leg'),
+        (leg, MoveItErrorCodes.CONTROL_FAILED, "no joint 'leg'; joints: panda_joint1"),
         (RobotTrajectory(), MoveItErrorCodes.INVALID_MOTION_PLAN, 'no points'),
     ):
         status, result = execute(arm, trajectory).wait()

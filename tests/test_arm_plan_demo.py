@@ -8,6 +8,7 @@ import re
 from typing import TYPE_CHECKING
 
 from bus_recorder import BusRecorder
+from manual_page import missing_in_run
 from processes import RunningProcess
 import psutil
 import pytest
@@ -31,6 +32,7 @@ def test_demo_of_planning(isolation: Isolation) -> None:
         assert set(recorder.last_states().values()) == {'Switch on disabled'}
     for part in PARTS:
         assert any(line.startswith(f'{part} ') for line in demo.lines), demo.output
+    assert not missing_in_run('index.md', 'make demo-plan', demo.output), demo.output
     refusal = r'^blocked goal +GOAL_IN_COLLISION: goal: \w+ touches pillar'
     assert re.search(refusal, demo.output, re.MULTILINE), demo.output
     nearest = re.search(r'^box in the way .* nearest (\d+) mm', demo.output, re.MULTILINE)

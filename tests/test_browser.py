@@ -2,26 +2,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of an arm in a real browser: seen, moved and stopped by mouse and keys.
 
-One browser and one arm for all: each test leaves the arm enabled and at rest.
+One browser and one arm for all: each test leaves the arm enabled and at rest. Those that plan come
+first: they begin and end in the state 'ready'; sliders and jogs lead anywhere.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 import re
 import time
 from typing import TYPE_CHECKING
 
 import browser as chromium
+from geometry_msgs.msg import Point, Pose
 from isolation import reserve
+from moveit_msgs.msg import CollisionObject, PlanningScene
+from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 from processes import executable, RunningProcess
 import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
 
 from arm_msgs.srv import InjectFault
+from robot_viewer.page.motion_plan import DRAGGED
 from robot_viewer.page.target_panel import UNLOCK
 
 if TYPE_CHECKING:
@@ -37,8 +43,12 @@ STARTING = 90.0  # [s]
 REACTION = 15.0  # [s] until a motion begins or ends on a busy machine; real ones are far shorter
 REST = 0.6  # [s] of joint states without motion
 MOVES = 0.01  # [rad/s]
-JOG, TARGETS, DRIVES = 'Jog', 'Targets', 'Drives'
-UP = '+ z'
+JOG, TARGETS, DRIVES, PLAN = 'Jog', 'Targets', 'Drives', 'Plan'
+TURN, TURN_BACK = '+ about z', '− about z'
+WRIST = 'panda_joint7'
+"""Turns the tool, which points downwards, about the z axis."""
+READY_TIP = (0.307, 0.0, 0.59)
+"""Where the tip is in the state 'ready' of the SRDF, in [m]."""
 JOINT1 = 1
 """Place of the joint's slider; the speed is above it."""
 
@@ -53,6 +63,8 @@ class Seen:
         page: It, opened once: drawing it without a graphics card costs time.
         client: A ROS node of the test.
         states: The last joint states with the time of their arrival.
+        wrist: Where that joint was in the beginning in [rad].
+        ready: Where all were, which is the state of the SRDF of that name.
     """
 
     browser: Browser
@@ -60,6 +72,12 @@ class Seen:
     page: Page
     client: RosClient
     states: deque[tuple[float, JointState]]
+    wrist: float = field(init=False)
+    ready: Sequence[float] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.wrist = self.position(WRIST)
+        self.ready = self.states[-1][1].position
 
     def show(self, tab: str) -> Page:
         """Show a tab of the page."""
@@ -71,11 +89,22 @@ class Seen:
         button = self.page.get_by_role('button', name=UNLOCK)
         if button.is_visible():
             button.click()
+            button.wait_for(state='hidden')  # the sliders below it move up
+
+    def jog(self, page: Page) -> None:
+        """Hold the button that leads back: at its limit the joint would not move."""
+        chromium.hold(page, TURN if self.position(WRIST) > self.wrist else TURN_BACK)
+        self.wait(self.moves, 'a jog')
 
     def position(self, joint: str = 'panda_joint1') -> float:
         """Return where a joint is in [rad]."""
         message = self.states[-1][1]
         return float(message.position[message.name.index(joint)])
+
+    def way(self) -> float:
+        """Return how far it is from the state 'ready' in [rad]."""
+        pairs = zip(self.states[-1][1].position, self.ready, strict=True)
+        return float(max(abs(position - ready) for position, ready in pairs))
 
     def moves(self) -> bool:
         """Whether it moves at the moment."""
@@ -107,7 +136,13 @@ class Seen:
 def seen() -> Iterator[Seen]:
     """Bring an arm up with its page, and start the browser."""
     with reserve() as isolation, RosClient(isolation.domain_id) as client:
-        command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--enable']
+        command = [
+            executable('arm_bringup', 'bringup'),
+            'panda',
+            '--simulate',
+            '--enable',
+            '--plan',
+        ]
         command += ['--can', isolation.bus, '--timeout', f'{STARTING:g}']
         with RunningProcess(command, isolation.env | {'NO_VIEW': ''}) as bringup:
             line = bringup.wait_for(r'the robot is seen at http://localhost:\d+$', STARTING)
@@ -123,6 +158,90 @@ def seen() -> Iterator[Seen]:
             with chromium.browser() as browser:
                 url = line.rpartition(' ')[2]
                 yield Seen(browser, url, chromium.open_page(browser, url), client, states)
+
+
+def press(page: Page, button: str) -> None:
+    """Press a button of the open tab."""
+    page.get_by_role('button', name=button, exact=True).click()
+
+
+def add_box(seen: Seen, place: tuple[float, float, float]) -> None:
+    """Have a small box in the scene of move_group, as any client does."""
+    scene = PlanningScene(is_diff=True)
+    scene.robot_state.is_diff = True
+    box = CollisionObject(id='pillar', operation=CollisionObject.ADD)
+    box.header.frame_id = 'panda_link0'
+    box.primitives.append(SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.1, 0.1]))
+    at = Point(**dict(zip('xyz', place, strict=True)))
+    box.primitive_poses.append(Pose(position=at))
+    scene.world.collision_objects.append(box)
+    request = ApplyPlanningScene.Request(scene=scene)
+    assert seen.client.call(ApplyPlanningScene, '/apply_planning_scene', request).success
+
+
+def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
+    """Both by the mouse in the scene: the tip goes elsewhere, and the box is where it is left."""
+    page = seen.show(PLAN)
+    chromium.choose(page, 'Goal', DRAGGED)
+    chromium.drag_arrow(page, 'green', 40)
+    press(page, 'Plan')
+    page.get_by_text('the motion takes').wait_for()
+    chromium.picture(page, 'plan-dragged')
+    press(page, 'Execute')
+    page.get_by_text('executed').wait_for()
+    seen.wait(lambda: seen.way() > 0.05, 'another place')
+    press(page, 'Add a box')
+    page.get_by_text('box1 is added').wait_for()
+    chromium.picture(page, 'box')
+    chromium.drag_arrow(page, 'red', 30)
+    page.get_by_text('box1 is moved').wait_for()
+    request = GetPlanningScene.Request()
+    request.components.components = request.components.WORLD_OBJECT_GEOMETRY
+    (box,) = seen.client.call(
+        GetPlanningScene, '/get_planning_scene', request
+    ).scene.world.collision_objects
+    assert box.pose != Pose(position=Point(x=0.6, z=0.1)), 'moved or turned'
+    press(page, 'Remove it')
+    page.get_by_text('box1 is removed').wait_for()
+
+
+def test_stop_ends_what_was_planned(seen: Seen) -> None:
+    """On its way; what was planned cannot be executed any more."""
+    page = seen.show(PLAN)
+    chromium.choose(page, 'Goal', 'ready')
+    chromium.drag(page, 0, 0.0)  # slowly: it is on its way for long
+    press(page, 'Plan')
+    page.get_by_text('the motion takes').wait_for()
+    press(page, 'Execute')
+    seen.wait(seen.moves, 'a motion')
+    page.locator('#robot-stop').click()
+    seen.wait_for_rest()
+    page.get_by_text(re.compile('PREEMPTED|CONTROL_FAILED')).wait_for()
+    assert page.get_by_role('button', name='Execute', exact=True).is_disabled()
+    chromium.picture(page, 'plan-stopped')
+    chromium.drag(page, 0, 0.5)
+    assert seen.way() > 0.05
+
+
+def test_a_goal_is_planned_shown_and_executed(seen: Seen) -> None:
+    """A state of the SRDF: blocked by a box first, in the words of move_group, then free."""
+    page = seen.show(PLAN)
+    add_box(seen, READY_TIP)
+    chromium.choose(page, 'Goal', 'ready')
+    press(page, 'Plan')
+    page.get_by_text(re.compile('GOAL_IN_COLLISION: .*pillar')).wait_for()
+    chromium.picture(page, 'plan-blocked')
+    assert page.get_by_role('button', name='Execute', exact=True).is_disabled()
+    chromium.choose(page, 'Object', 'pillar')
+    press(page, 'Remove it')
+    page.get_by_text('pillar is removed').wait_for()
+    press(page, 'Plan')
+    page.get_by_text('the motion takes').wait_for()
+    chromium.picture(page, 'plan')
+    assert not seen.moves()
+    press(page, 'Execute')
+    page.get_by_text('executed').wait_for()
+    seen.wait(lambda: seen.way() < 0.01, 'the goal')
 
 
 def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
@@ -146,16 +265,14 @@ def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
 def test_stop_of_any_page_ends_a_jog(seen: Seen) -> None:
     """Also while the button is still held: only a new press moves the arm again."""
     page, other = seen.show(JOG), chromium.open_page(seen.browser, seen.url)
-    chromium.hold(page, UP)
-    seen.wait(seen.moves, 'a jog')
+    seen.jog(page)
     other.locator('#robot-stop').click()
     seen.wait_for_rest()
     other.get_by_text('received').wait_for()
     other.close()
     page.mouse.up()
     seen.wait_for_rest()
-    chromium.hold(page, UP)
-    seen.wait(seen.moves, 'a jog again')
+    seen.jog(page)
     page.mouse.up()
     seen.wait_for_rest()
 
@@ -186,8 +303,7 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
 def test_who_does_not_look_moves_nothing(seen: Seen, way: str) -> None:
     """A browser that is stopped, and a window that loses the focus."""
     page = seen.show(JOG)
-    chromium.hold(page, UP)
-    seen.wait(seen.moves, 'a jog')
+    seen.jog(page)
     if way == 'asleep':
         with chromium.asleep():
             seen.wait_for_rest()
@@ -203,8 +319,7 @@ def test_a_page_that_is_killed_moves_nothing(seen: Seen) -> None:
     others = chromium.processes()
     page = chromium.open_page(chromium.launch(seen.browser.browser_type), seen.url)
     page.get_by_role('tab', name=JOG).click()
-    chromium.hold(page, UP)
-    seen.wait(seen.moves, 'a jog')
+    seen.jog(page)
     for process in chromium.processes():
         if process not in others:
             process.kill()

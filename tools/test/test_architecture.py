@@ -62,8 +62,8 @@ def test_every_name_is_where_the_page_says(step: str) -> None:
 
 
 def test_each_way_has_ten_steps() -> None:
-    """No more, no less, of each of five."""
-    assert len(STEPS) == 50
+    """No more, no less, of each of six."""
+    assert len(STEPS) == 60
 
 
 @pytest.mark.parametrize('row', WHERE)

@@ -32,11 +32,12 @@ DISTRIBUTIONS |= {'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
 ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
-ON_PYPI |= {'mcap', 'zstandard'}
+ON_PYPI |= {'gymnasium', 'mcap', 'zstandard'}
 ROSDEP = {**KEYS, 'numpy': 'python3-numpy'}
 """Keys of rosdep for them."""
 OF_TESTS = {
     'canopen': 'canopen-pip',
+    'gymnasium': 'python3-gymnasium-pip',
     'hypothesis': 'python3-hypothesis',
     'mcap_ros2': 'mcap-ros2-support',
     'onnx': 'python3-onnx-pip',
@@ -53,7 +54,8 @@ OPTIONAL = {
     'arm_bringup': {
         *('arm_model', 'arm_planning', 'arm_servo', 'arm_trajectory', 'python3-numpy'),
         *('control_msgs', 'moveit_msgs', 'pinocchio', 'shape_msgs'),
-    }
+    },
+    'quad_sim': {'python3-gymnasium-pip'},
 }
 """Packages that are used where they are built, and that colcon need not build for this one."""
 FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}

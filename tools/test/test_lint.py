@@ -27,7 +27,7 @@ done
 echo "seen by $1"
 """
 
-QUIET = ('lint-imports', 'vulture', 'codespell', 'hadolint', 'check-jsonschema')
+QUIET = ('lint-imports', 'vulture', 'codespell', 'hadolint', 'check-jsonschema', 'mkdocs')
 
 
 def install(root: Path, script: str) -> Layout:

@@ -10,8 +10,13 @@ import shutil
 from fake_programs import FakeRunner
 import pytest
 
-from workspace.environment import choose_python, Environment
-from workspace.errors import ForeignFolderError, NetworkError, StepFailedError
+from workspace.environment import choose_python, DOCS, Environment
+from workspace.errors import (
+    ForeignFolderError,
+    NetworkError,
+    StepFailedError,
+    UnknownPackageError,
+)
 from workspace.interpreter import Interpreter, probe
 from workspace.layout import Layout
 from workspace.plan import carry_out, plan, Target
@@ -158,6 +163,19 @@ def test_a_package_brings_what_it_imports(
     assert titles(environment, Target(packages=('arm_msgs',))) == []
 
 
+def test_the_manual_brings_its_tools_and_nothing_else(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Nor does any other target but the tests bring them."""
+    (layout.requirements / 'docs.txt').write_text('mkdocs==1\n')
+    docs = Target(build=False, extras=(DOCS,))
+    carry_out(plan(environment, Target(build=False)), fake())
+    assert titles(environment, docs) == ['Installing what makes the manual']
+    assert 'Installing what makes the manual' not in titles(environment, Target())
+    carry_out(plan(environment, docs), fake())
+    assert titles(environment, docs) == []
+
+
 def test_old_environment_stays_while_the_new_is_out_of_reach(
     environment: Environment, layout: Layout, fake: Fake
 ) -> None:
@@ -228,6 +246,22 @@ def test_one_failed_package_does_not_cost_the_others(
     with pytest.raises(StepFailedError, match='quad_msgs'):
         carry_out(plan(environment, Target()), replace(runner, effect=effect))
     assert titles(environment, Target()) == ['Building quad_msgs']
+
+
+@pytest.mark.usefixtures('packages')
+def test_an_extra_is_installed_only_where_it_is_wanted(
+    environment: Environment, layout: Layout, fake: Fake
+) -> None:
+    """Once, and with nothing else; one that is not pinned is refused by its name."""
+    (layout.requirements / 'training.txt').write_text('learner==1\n')
+    carry_out(plan(environment, ALL), fake())
+    learning = Target(packages=('arm',), extras=('training',))
+    assert titles(environment, learning) == ['Installing what training imports']
+    carry_out(plan(environment, learning), fake())
+    assert titles(environment, learning) == []
+    assert titles(environment) == []
+    with pytest.raises(UnknownPackageError, match=r'flying\.txt'):
+        plan(environment, Target(extras=('flying',)))
 
 
 def test_interpreter_is_kept(environment: Environment, tmp_path: Path) -> None:

@@ -10,12 +10,13 @@ import os
 import signal
 import sys
 
-from .environment import choose_python, Environment
+from .environment import choose_python, DOCS, Environment
 from .errors import WorkspaceError
 from .interpreter import Interpreter, probe
 from .layout import Layout, this_checkout
 from .lint import lint
 from .lock import exclusive
+from .manual import build_manual
 from .pins import renew
 from .plan import carry_out, plan, Target
 from .process import Runner
@@ -32,8 +33,17 @@ def _parser() -> argparse.ArgumentParser:
     setup.add_argument('--dev', action='store_true', help='with the tools for testing')
     build = commands.add_parser('build', help='make the environment and build packages')
     build.add_argument('--dev', action='store_true', help='with the tools for testing')
+    build.add_argument(
+        '--with',
+        dest='extras',
+        action='append',
+        default=[],
+        metavar='NAME',
+        help='what requirements/NAME.txt pins, too',
+    )
     build.add_argument('packages', nargs='*', help='with what they need; none means all')
     commands.add_parser('lint', help='make the environment and check the code')
+    commands.add_parser('docs', help='make the environment and build the manual')
     commands.add_parser('pins', help='renew the pinned requirements')
     commands.add_parser('missing', help='name the system packages that are missing')
     return parser
@@ -48,7 +58,11 @@ def _environment(layout: Layout, python: str) -> Environment:
 
 def _target(options: argparse.Namespace) -> Target:
     if options.command == 'build':
-        return Target(dev=options.dev, packages=tuple(options.packages))
+        return Target(
+            dev=options.dev, packages=tuple(options.packages), extras=tuple(options.extras)
+        )
+    if options.command == 'docs':
+        return Target(build=False, extras=(DOCS,))
     return Target(dev=options.command in {'lint', 'pins'} or options.dev, build=False)
 
 
@@ -66,6 +80,8 @@ def _run(options: argparse.Namespace) -> int:
             print('All is up to date.')
         if options.command == 'pins':
             renew(layout, runner)
+    if options.command == 'docs':
+        return build_manual(layout, os.environ)
     return lint(layout, os.environ) if options.command == 'lint' else 0
 
 

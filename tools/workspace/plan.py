@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import time
 
 from .build import Builder
-from .environment import DEV, Environment, Step
+from .environment import DEV, DOCS, Environment, Step
+from .errors import UnknownPackageError
 from .packages import find_packages, needed_packages
 from .process import Runner
 from .state import read_state
@@ -23,24 +24,34 @@ class Target:
         dev: Whether the tools for testing, and all that any package imports.
         build: Whether any package.
         packages: Which ones; none means all.
+        extras: Requirements files besides, which no package needs by itself.
     """
 
     dev: bool = False
     build: bool = True
     packages: tuple[str, ...] = ()
+    extras: tuple[str, ...] = ()
 
 
 def plan(environment: Environment, target: Target) -> list[Step]:
     """List the steps from what is there to what is wanted.
 
     Raises:
-        UnknownPackageError: The workspace does not have a package that is wanted.
+        UnknownPackageError: The workspace does not have a package or an extra that is wanted.
     """
     layout = environment.layout
     found = find_packages(layout.root)
     packages = needed_packages(found, target.packages, environment.underlay)
     names = [DEV, *sorted(found)] if target.dev else sorted(packages) if target.build else []
-    steps = environment.steps(read_state(layout.state), names)
+    if target.dev:
+        names.append(DOCS)
+    for extra in target.extras:
+        if not (layout.requirements / f'{extra}.txt').is_file():
+            raise UnknownPackageError(
+                f'There is no {extra}.txt in {layout.requirements}.',
+                f'`make pins` makes it from {extra}.in.',
+            )
+    steps = environment.steps(read_state(layout.state), [*names, *target.extras])
     if not target.build:
         return steps
     builder = Builder(layout, environment.base, environment.underlay.kind)

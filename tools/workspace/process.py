@@ -33,7 +33,8 @@ Argument: TypeAlias = str | Path
 def clean_environment(environ: Mapping[str, str]) -> dict[str, str]:
     """Copy an environment without what belongs to another ROS, Python or make."""
     kept = {name: value for name, value in environ.items() if not _FOREIGN.match(name)}
-    return {**kept, 'PIP_DISABLE_PIP_VERSION_CHECK': '1', 'PYTHONUNBUFFERED': '1'}
+    own = {'PIP_DISABLE_PIP_VERSION_CHECK': '1', 'PYTHONUNBUFFERED': '1'}
+    return {**kept, **own, 'NO_MKDOCS_2_WARNING': '1'}
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,7 +113,7 @@ def test_an_interrupt_cancels_the_goal(
     server, env = counter
     words = [*PROGRAM, 'action', 'send_goal', '-f', '/count', TYPE, '{order: 100}']
     with RunningProcess(words, env) as process:
-        process.wait_for('^    step: 3$')
+        process.wait_for(r'^    step: \d+$')  # the first ones may come before it listens
         assert process.stop() == 2
         assert 'Canceling goal...' in process.lines
         assert process.lines[-1] == 'Goal canceled.'
