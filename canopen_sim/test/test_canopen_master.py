@@ -467,14 +467,21 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
     drive.select_mode(OperationMode.PROFILE_POSITION)
     drive.set_target(1000.0)
     wait_until_in_motion(drive)
-    ended = threading.Event()
+    ended, confirmed = threading.Event(), threading.Event()
     thread.on_failure = ended.set
-    thread.call(lambda: monkeypatch.setattr(thread, '_statistics', None))
-    assert ended.wait(TIMEOUT)
-    assert 'quick stop sent to joint1; nothing else stops joint1' in str(thread.failure)
-    with pytest.raises(DriveError, match='could not be stopped'):
-        master.close()
+
+    def see(_cob_id: int, response: bytearray, _timestamp: float) -> None:
+        if response[:3] == bytes((0x60, 0x40, 0x60)):  # download of the controlword confirmed
+            confirmed.set()
+
     with independent_client(bus, monkeypatch) as network:
+        network.subscribe(0x582, see)
+        thread.call(lambda: monkeypatch.setattr(thread, '_statistics', None))
+        assert ended.wait(TIMEOUT)
+        assert 'quick stop sent to joint1; nothing else stops joint1' in str(thread.failure)
+        with pytest.raises(DriveError, match='could not be stopped'):
+            master.close()
+        assert confirmed.wait(TIMEOUT)  # else this client takes it for the answer to its own
         deadline = time.monotonic() + TIMEOUT
         while (word := statusword(network, 2)) & 0x4F == 0x07:  # it brakes
             assert time.monotonic() < deadline
