@@ -7,4 +7,8 @@ import sys
 from .main import main
 
 if __name__ == '__main__':
-    sys.exit(main())
+    code = main()
+    # where SIGINT hit an exec() or eval(), as of a namedtuple, CPython ends `-m` by SIGINT though
+    # it was caught (unhandled_keyboard_interrupt); a later one without forgets it
+    exec('')  # noqa: S102
+    sys.exit(code)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
@@ -146,6 +147,19 @@ def test_an_interrupt_during_discovery_is_quiet(zoo_env: Mapping[str, str]) -> N
     with RunningProcess([*PROGRAM, 'topic', 'hz', '/never'], zoo_env) as process:
         process.wait_for('WARNING: topic .* does not appear to be published yet')
         assert process.stop() == 2
+        assert 'Traceback' not in process.output
+
+
+@pytest.mark.scenario
+def test_an_interrupt_while_a_module_is_imported_is_quiet(
+    zoo_env: Mapping[str, str], tmp_path: Path
+) -> None:
+    """Python makes a namedtuple by `eval()`; with `-m` an interrupt of that ended by SIGINT."""
+    interrupt = "__import__('os').kill(__import__('os').getpid(), 2)"
+    (tmp_path / 'difflib.py').write_text(f'eval({interrupt!r})\n')
+    env = {**zoo_env, 'PYTHONPATH': f'{tmp_path}{os.pathsep}{zoo_env["PYTHONPATH"]}'}
+    with RunningProcess([*PROGRAM, 'topic', 'hz', '/never'], env) as process:
+        assert process.wait() == 2
         assert 'Traceback' not in process.output
 
 
