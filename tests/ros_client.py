@@ -11,6 +11,7 @@ from typing import Any, TYPE_CHECKING
 import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
+from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 ANSWER_TIME = 5.0
 """Time in [s] after which an answer counts as lost."""
 
+READING = ('Get', 'Query', 'Read', 'List', 'Describe')
+"""How the types of services begin that change nothing."""
+
 
 class RosClient:
     """Calls services and listens to topics."""
@@ -34,30 +38,27 @@ class RosClient:
         rclpy.init(context=self._context, domain_id=domain_id)
         self.node = Node(name, context=self._context)
         self._actions: dict[str, ActionClient] = {}
+        self._clients: dict[str, Client] = {}
         self._executor = EventsExecutor(context=self._context)
         self._executor.add_node(self.node)
 
-    def call(self, service_type: Any, name: str, request: Any, timeout: float = 60.0) -> Any:
-        """Call a service and return its response."""
-        future = self.call_async(service_type, name, request, timeout)
-        self.spin_until(future.done, timeout, f'an answer of {name}')
-        return future.result()
+    def call(
+        self, service_type: Any, name: str, request: Any = None, timeout: float = 60.0
+    ) -> Any:
+        """Call a service and return its response; without a request, with an empty one.
 
-    def read(self, service_type: Any, name: str, timeout: float = 60.0) -> Any:
-        """Call a service that changes nothing, again where no answer comes.
-
-        On a busy machine DDS loses the answer to a client that the server does not know yet.
+        One that changes nothing is asked again where no answer comes: on a busy machine DDS loses
+        the answer to a client that the server does not know yet.
         """
-        client = self.node.create_client(service_type, name)
-        if not client.wait_for_service(timeout):
-            raise AssertionError(f'there is no service {name}')
-        futures = [client.call_async(service_type.Request())]
+        request = service_type.Request() if request is None else request
+        again = ANSWER_TIME if service_type.__name__.startswith(READING) else timeout
+        futures = [self.call_async(service_type, name, request, timeout)]
         asked = time.monotonic()
 
         def answered() -> bool:
             nonlocal asked
-            if time.monotonic() - asked > ANSWER_TIME:
-                futures.append(client.call_async(service_type.Request()))
+            if time.monotonic() - asked > again:
+                futures.append(self.call_async(service_type, name, request, timeout))
                 asked = time.monotonic()
             return any(future.done() for future in futures)
 
@@ -66,10 +67,11 @@ class RosClient:
 
     def call_async(self, service_type: Any, name: str, request: Any, timeout: float = 60.0) -> Any:
         """Wait for a service, call it and return the future."""
-        client = self.node.create_client(service_type, name)
-        if not client.wait_for_service(timeout):
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(service_type, name)
+        if not self._clients[name].wait_for_service(timeout):
             raise AssertionError(f'there is no service {name}')
-        return client.call_async(request)
+        return self._clients[name].call_async(request)
 
     def trigger(self, name: str, timeout: float = 60.0) -> Any:
         """Call a std_srvs/Trigger."""

@@ -41,7 +41,7 @@ def change(arm: SimulatedArm, node: str, label: str) -> bool:
 
 def states(arm: SimulatedArm) -> set[str]:
     """Return the states that occur among master and joints."""
-    return {arm.client.read(GetState, f'/{node}/get_state').current_state.label for node in NODES}
+    return {arm.client.call(GetState, f'/{node}/get_state').current_state.label for node in NODES}
 
 
 def test_the_manager_brings_up_and_deactivation_disables(
