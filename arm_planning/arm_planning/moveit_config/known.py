@@ -210,11 +210,12 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
     for name, value in values.items():
         found = known_of(name)
         if found is None:
-            if name.startswith(CLOSED):
-                table, _, key = name.rpartition('.')
-                raise ConfigError(
-                    f'{at(name, places)}: {table} has no {key!r}; it has {", ".join(_keys(table))}'
-                )
+            table, _, key = name.rpartition('.')
+            keys = _keys(table)
+            close = difflib.get_close_matches(key, keys, 1, ALIKE)
+            if close or name.startswith(CLOSED):
+                hint = f'did you mean {close[0]!r}?' if close else f'it has {", ".join(keys)}'
+                raise ConfigError(f'{at(name, places)}: {table} has no {key!r}; {hint}')
         elif not found.fits(value):
             raise ConfigError(f'{at(name, places)} is {value!r}; it must be {found.needed}')
 
