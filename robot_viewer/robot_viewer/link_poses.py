@@ -32,7 +32,7 @@ def joint_position(joint: Joint, positions: Mapping[str, float]) -> float:
     """
     if joint.mimic is None:
         return positions.get(joint.name, 0.0)
-    return joint.mimic.multiplier * positions.get(joint.mimic.source, 0.0) + joint.mimic.offset
+    return joint.mimic.position(positions.get(joint.mimic.source, 0.0))
 
 
 def link_pose(tree: KinematicTree, link: str, positions: Mapping[str, float]) -> Transform:

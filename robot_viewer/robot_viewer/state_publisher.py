@@ -211,7 +211,7 @@ class StatePublisher:
             mimic = joint.mimic
             if mimic is None or joint.name in positions or mimic.source not in positions:
                 continue
-            position = mimic.multiplier * positions[mimic.source] + mimic.offset
+            position = mimic.position(positions[mimic.source])
             yield self._named(joint, joint_transform(joint, position))
 
     def _named(self, joint: Joint, transform: Transform) -> FrameTransform:

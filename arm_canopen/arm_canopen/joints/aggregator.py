@@ -122,8 +122,8 @@ class JointAggregator:
         if not self._is_recent(mimic.source, now):
             return None
         leader = self._samples[mimic.source]
-        position = mimic.multiplier * leader.position + mimic.offset
-        return JointSample(position, mimic.multiplier * leader.velocity, 0.0)
+        position, velocity = mimic.position(leader.position), mimic.velocity(leader.velocity)
+        return JointSample(position, velocity, 0.0)
 
     def _is_recent(self, name: str, now: float) -> bool:
         return name in self._arrivals and now - self._arrivals[name] <= STALE_AFTER

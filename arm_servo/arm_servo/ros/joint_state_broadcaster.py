@@ -85,8 +85,8 @@ class JointSamples:
 
 def _mimicked(mimic: Mimic, source: JointSample) -> JointSample:
     """Return what a joint does that follows another."""
-    position = mimic.multiplier * source.position + mimic.offset
-    return JointSample(position, mimic.multiplier * source.velocity, source.time)
+    position, velocity = mimic.position(source.position), mimic.velocity(source.velocity)
+    return JointSample(position, velocity, source.time)
 
 
 def declare_broadcaster(node: Node) -> tuple[str, float, bool]:

@@ -52,6 +52,14 @@ class Mimic:
     multiplier: float = 1.0
     offset: float = 0.0
 
+    def position(self, source: float) -> float:
+        """Return the position in [rad] or [m] that belongs to one of the source."""
+        return self.multiplier * source + self.offset
+
+    def velocity(self, source: float) -> float:
+        """Return the velocity in [rad/s] or [m/s] that belongs to one of the source."""
+        return self.multiplier * source
+
 
 @dataclass(frozen=True, slots=True)
 class JointRange:
@@ -460,6 +468,7 @@ def _with_first_source(joint: Joint, joints: Mapping[str, Joint]) -> Joint:
             raise DescriptionError(f'joint {joint.name} mimics itself by way of {source.name}')
         passed.add(source.name)
         above = source.mimic
-        offset = mimic.multiplier * above.offset + mimic.offset
-        mimic = Mimic(above.source, mimic.multiplier * above.multiplier, offset)
+        mimic = Mimic(
+            above.source, mimic.multiplier * above.multiplier, mimic.position(above.offset)
+        )
     return replace(joint, mimic=mimic)

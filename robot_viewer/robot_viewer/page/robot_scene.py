@@ -122,7 +122,7 @@ class RobotScene:
         for name, joint in self._movable.items():
             mimic = joint.mimic
             if mimic is not None and mimic.source in positions:
-                position = mimic.multiplier * positions[mimic.source] + mimic.offset
+                position = mimic.position(positions[mimic.source])
             elif name in positions:
                 position = positions[name]
             else:
