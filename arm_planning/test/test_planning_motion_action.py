@@ -35,6 +35,7 @@ class Bench:
         self.plans = 0
         self.stops = True
         self.stale = 0
+        self.refusal: PlanningError | None = None
         self.executions: list[Done] = []
         self.background = Background(client.node, 'planning')
         planning: Any = SimpleNamespace(
@@ -52,6 +53,8 @@ class Bench:
         if self.stale:
             self.stale -= 1
             raise PlanningError(PlanningCode.ROBOT_STATE_STALE, 'nobody knows where it is')
+        if self.refusal is not None:
+            raise self.refusal
         self.plans += 1
         return lambda: PlannedMotion(RobotState(), [RobotTrajectory()] * count, 0.0)
 
@@ -123,6 +126,18 @@ def test_a_motion_that_is_not_clear_any_more_is_planned_anew_once(
     bench.executions[-1](PlanningCode.SUCCESS, '')
     status, result = bench.result(handle)
     assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1)
+
+
+def test_a_refusal_of_the_second_plan_says_why_the_first_has_ended(bench: Bench) -> None:
+    """The client sees an arm that stands on its way."""
+    handle = bench.move(delay=0.0)
+    bench.refusal = PlanningError(PlanningCode.GOAL_IN_COLLISION, 'the goal is covered')
+    bench.executions[-1](INVALIDATED, 'a box has come')
+    result = bench.result(handle)[1]
+    assert result.error_code.val == PlanningCode.GOAL_IN_COLLISION
+    assert result.error_code.message == (
+        'the goal is covered; the arm was stopped on its way: a box has come'
+    )
 
 
 def test_a_sequence_is_followed_part_by_part(bench: Bench) -> None:

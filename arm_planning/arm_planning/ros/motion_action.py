@@ -93,7 +93,7 @@ def sequence(planning: PlanningThread) -> MotionKind:
 
 @dataclass(slots=True, eq=False)
 class _Goal:
-    """A goal from its acceptance to its end."""
+    """A goal from its acceptance to its end; why it was stopped before it is planned anew."""
 
     handle: Any
     work: Future[Any] | None = None
@@ -103,6 +103,7 @@ class _Goal:
     outcome: tuple[PlanningCode, str] = (PlanningCode.SUCCESS, '')
     is_canceled: bool = False
     replans: int = 0
+    stop: str = ''
     state_waits: int = 0
     delay: Timer | None = None
 
@@ -157,9 +158,14 @@ class MotionAction:
                 goal.state_waits += 1
                 self._after(goal, STATE_PERIOD, self._plan)
             else:
-                self._end(goal, error.code, str(error))
+                self._refuse(goal, error)
             return
         goal.work = self._background.submit(work, lambda done: self._planned(goal, done))
+
+    def _refuse(self, goal: _Goal, refusal: PlanningError) -> None:
+        """End a goal that has no plan; one that was on its way has stopped there."""
+        before = f'; the arm was stopped on its way: {goal.stop}' if goal.stop else ''
+        self._end(goal, refusal.code, f'{refusal}{before}')
 
     def _planned(self, goal: _Goal, done: Future[Any]) -> None:
         if goal.is_canceled or done.cancelled():
@@ -167,8 +173,7 @@ class MotionAction:
             return
         error = done.exception()
         if error is not None:
-            refusal = as_refusal(error)
-            self._end(goal, refusal.code, str(refusal))
+            self._refuse(goal, as_refusal(error))
             return
         planned = goal.planned = done.result()
         self._planning.display(planned)
@@ -210,7 +215,7 @@ class MotionAction:
             self._end(goal, code, f'{reason}; planned anew {most} times')
             return
         self._node.get_logger().info(f'{self._kind.name}: {reason}; plans anew')
-        goal.replans, goal.begun = goal.replans + 1, 0
+        goal.replans, goal.begun, goal.stop = goal.replans + 1, 0, reason
         goal.execution = goal.work = goal.planned = None
         self._after(goal, max(options.replan_delay, 0.0), self._begin_planning)
 
