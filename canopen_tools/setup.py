@@ -43,7 +43,12 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/canopen_tools']),
         ('share/canopen_tools', ['package.xml']),
     ],
-    install_requires=['python-can>=4.3', sibling('arm_canopen')],
+    install_requires=[
+        'python-can>=4.3',
+        'PyYAML>=6',
+        sibling('arm_canopen'),
+        sibling('libraries/operator_input'),
+    ],
     extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Keys of a device in the text of a bus.yml: changed or added, all else stays as it is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import yaml
+
+from arm_canopen.exceptions import CanopenError
+
+NOT_DEVICES = frozenset({'options', 'master', 'defaults', 'nodes'})
+
+
+class BusEditError(CanopenError):
+    """The file has a form in which we change nothing; the message says what to write by hand."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Splice:
+    """A piece of text in the place of another one.
+
+    Attributes:
+        start: Where the old one begins.
+        end: Where it ends.
+        text: The new one.
+    """
+
+    start: int
+    end: int
+    text: str
+
+
+def edited(
+    text: str, device: str, values: Mapping[str, float | bool], reason: str, channel: int | None
+) -> str:
+    """Return the text with keys of a device changed.
+
+    A key that stands there gets its new value; others are added below the first key. Comments,
+    order and quotes of everything else stay. A line above says why.
+
+    Args:
+        text: A bus.yml that could be read.
+        device: Name of the device.
+        values: New values by key.
+        reason: Why, in a line.
+        channel: Place of the axis in ``channels``; None for a device with one axis.
+
+    Raises:
+        BusEditError: The device is an alias, or its axes have no ``channels`` to write to.
+    """
+    section = _section(text, device, channel, values)
+    if section.flow_style:
+        return _spliced(text, _in_flow(section, values))
+    return _spliced(text, _in_block(section, values, reason))
+
+
+def _section(
+    text: str, device: str, channel: int | None, values: Mapping[str, float | bool]
+) -> yaml.MappingNode:
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    nodes = _value(root, 'nodes')
+    key, found = _pair(nodes if nodes is not None else root, device)
+    if found is None and device not in NOT_DEVICES:
+        key, found = _pair(root, device)
+    wanted = ', '.join(f'{name}: {_written(value)}' for name, value in values.items())
+    if not isinstance(found, yaml.MappingNode) or key is None or not found.value:
+        raise BusEditError(f'no keys of {device} to change; write by hand: {wanted}')
+    if found.start_mark.index < key.start_mark.index:
+        raise BusEditError(
+            f'{device} is an alias (*) of another device; write its own keys by hand: {wanted}'
+        )
+    if channel is None:
+        return found
+    channels = _value(found, 'channels')
+    parts = channels.value if isinstance(channels, yaml.SequenceNode) else []
+    if channel >= len(parts) or not isinstance(parts[channel], yaml.MappingNode):
+        raise BusEditError(
+            f'{device} has no channels with keys; write by hand into entry {channel + 1} of its '
+            f'channels: {wanted}'
+        )
+    section: yaml.MappingNode = parts[channel]
+    return section
+
+
+def _pair(node: yaml.Node | None, name: str) -> tuple[yaml.ScalarNode | None, yaml.Node | None]:
+    pairs = node.value if isinstance(node, yaml.MappingNode) else []
+    for key, value in pairs:
+        if isinstance(key, yaml.ScalarNode) and key.value == name:
+            return key, value
+    return None, None
+
+
+def _value(node: yaml.Node | None, name: str) -> yaml.Node | None:
+    return _pair(node, name)[1]
+
+
+def _in_flow(section: yaml.MappingNode, values: Mapping[str, float | bool]) -> list[_Splice]:
+    changed = _replacements(section, values)
+    new = [name for name in values if _value(section, name) is None]
+    last = section.value[-1][1].end_mark.index
+    added = ''.join(f', {name}: {_written(values[name])}' for name in new)
+    return [*changed, _Splice(last, last, added)] if added else changed
+
+
+def _in_block(
+    section: yaml.MappingNode, values: Mapping[str, float | bool], reason: str
+) -> list[_Splice]:
+    first = section.value[0][0].start_mark
+    indent = ' ' * first.column
+    new = [name for name in values if _value(section, name) is None]
+    old = [key for key, _ in section.value if key.value in values]
+    splices = _replacements(section, values)
+    comment = f'# {reason}\n{indent}'
+    if new:
+        # before the first key: what stands behind its value may be a comment or a block
+        lines = ''.join(f'{name}: {_written(values[name])}\n{indent}' for name in new)
+        splices.append(_Splice(first.index, first.index, comment + lines))
+    elif old:
+        start = min(key.start_mark.index for key in old)
+        splices.append(_Splice(start, start, comment))
+    return splices
+
+
+def _replacements(section: yaml.MappingNode, values: Mapping[str, float | bool]) -> list[_Splice]:
+    splices = []
+    for key, value in section.value:
+        if not isinstance(key, yaml.ScalarNode) or key.value not in values:
+            continue
+        written = _written(values[key.value])
+        if value.start_mark.index < key.start_mark.index:
+            raise BusEditError(
+                f'{key.value} is an alias (*); write by hand: {key.value}: {written}'
+            )
+        splices.append(_Splice(value.start_mark.index, value.end_mark.index, written))
+    return splices
+
+
+def _spliced(text: str, splices: list[_Splice]) -> str:
+    for splice in sorted(splices, key=lambda each: each.start, reverse=True):
+        text = text[: splice.start] + splice.text + text[splice.end :]
+    return text
+
+
+def _written(value: float | bool) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)

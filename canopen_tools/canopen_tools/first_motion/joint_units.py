@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Units in which a person speaks of a joint: degrees and millimetres, against rad and m."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+import math
+import re
+
+QUANTITY = re.compile(r'(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+))\s*(?P<unit>deg|rad|mm|m)?')
+
+
+class JointKind(Enum):
+    """What a joint does; the value is the unit that a person reads."""
+
+    TURNS = 'deg'
+    SLIDES = 'mm'
+
+    @property
+    def size(self) -> float:
+        """That unit in the one of bus.yml, in [rad] or [m]."""
+        return math.pi / 180.0 if self is JointKind.TURNS else 0.001
+
+    def shown(self, value: float) -> str:
+        """Return a value in [rad] or [m] as a person reads it."""
+        return f'{value / self.size:.4g} {self.value}'
+
+
+UNITS: dict[str, tuple[JointKind, float]] = {
+    'deg': (JointKind.TURNS, math.pi / 180.0),
+    'rad': (JointKind.TURNS, 1.0),
+    'mm': (JointKind.SLIDES, 0.001),
+    'm': (JointKind.SLIDES, 1.0),
+}
+"""Kind of joint and size in [rad] or [m] of the units that can be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A distance or speed that a person has written.
+
+    Attributes:
+        kind: What the joint does.
+        value: In [rad] or [m], or those per second.
+    """
+
+    kind: JointKind
+    value: float
+
+
+def read_quantity(text: str, kind: JointKind = JointKind.TURNS) -> Quantity:
+    """Read ``1deg``, ``0.02rad``, ``2mm``, or a number in the unit of a kind of joint.
+
+    Raises:
+        ValueError: It is none.
+    """
+    match = QUANTITY.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f'{text!r} is no distance; write 1deg, 0.02rad or 2mm')
+    found, size = UNITS[match['unit'] or kind.value]
+    return Quantity(found, float(match['number']) * size)

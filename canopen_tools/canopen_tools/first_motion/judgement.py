@@ -1,0 +1,226 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a first motion says about the scale of a joint: pure.
+
+``factor`` is everywhere what the person saw over what the drive reported, in the unit of bus.yml.
+A scale that has a factor too many increments per unit makes the joint go that many times too far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+import math
+
+from .joint_units import JointKind
+
+LIKE = 1.5  # factor by which a distance that was seen by eye may be off
+MOVED = 0.2  # share of the commanded distance from which the drive reports a motion
+DEGREES = 180.0 / math.pi
+TURN = 2.0 * math.pi
+
+
+class Verdict(Enum):
+    """What is concluded; the value is how a person reads it."""
+
+    RIGHT = 'direction and distance are right'
+    WRONG_SIGN = 'wrong sign: it moved the other way'
+    WRONG_SCALE = 'wrong scale: it moved another distance'
+    WRONG_SIGN_AND_SCALE = 'wrong sign and wrong scale'
+    NO_MOTION = 'nothing moved'
+    ENCODER_ONLY = 'the drive reports a motion that nobody saw'
+    NOT_REPORTED = 'a motion was seen that the drive does not report'
+    OTHER_JOINT = 'another joint moved'
+
+    @property
+    def wants_change(self) -> bool:
+        """Whether scales of bus.yml mend it."""
+        return self in {
+            Verdict.WRONG_SIGN,
+            Verdict.WRONG_SCALE,
+            Verdict.WRONG_SIGN_AND_SCALE,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Why a scale is wrong by a factor.
+
+    Attributes:
+        factor: Seen over reported.
+        text: The cause in words.
+        kinds: Joints that it can have.
+    """
+
+    factor: float
+    text: str
+    kinds: frozenset[JointKind] = frozenset(JointKind)
+
+
+_TURNS, _SLIDES = frozenset({JointKind.TURNS}), frozenset({JointKind.SLIDES})
+_LINES = 'encoder lines in the place of their four edges (quadrature)'
+
+CAUSES: tuple[Cause, ...] = (
+    Cause(1 / 4, f'the scale counts {_LINES}'),
+    Cause(4.0, 'the scale counts four edges (quadrature) of an encoder that has them already'),
+    Cause(1 / DEGREES, 'the scale is increments per degree, it has to be per rad', _TURNS),
+    Cause(DEGREES, 'the scale was multiplied by 180/pi, it has to be per rad', _TURNS),
+    Cause(TURN, 'the scale is increments per turn, it has to be per rad', _TURNS),
+    Cause(1 / TURN, 'the scale was divided by 2 pi twice', _TURNS),
+    Cause(1 / 360, 'the scale was divided by 360', _TURNS),
+    Cause(360.0, 'the scale was multiplied by 360', _TURNS),
+    Cause(1 / 1000, 'the scale is increments per mm, it has to be per m', _SLIDES),
+    Cause(1000.0, 'the scale was multiplied by 1000; it is increments per m', _SLIDES),
+)
+"""Usual mistakes; those of a gear and of the drive's own factor group come with the drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveFacts:
+    """What the drive says about its increments; None where it does not.
+
+    Attributes:
+        scale: Increments per unit that the master uses; negative for the other direction.
+        gear: Turns of the motor per turn of the shaft (0x6091).
+        factor_scale: Increments per rad by its factor group (0x608F, 0x6091, 0x6092).
+    """
+
+    scale: float
+    gear: float | None = None
+    factor_scale: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a person saw.
+
+    Attributes:
+        direction: 1, -1, or 0 for no motion.
+        distance: How far about, in [rad] or [m]; None for what was expected.
+        other_joint: Another joint has moved.
+    """
+
+    direction: int
+    distance: float | None = None
+    other_joint: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What is concluded.
+
+    Attributes:
+        verdict: The conclusion.
+        sign: -1 where the scale has the wrong sign, else 1.
+        measured: Seen over reported, without the sign; 1 where no distance was said.
+        causes: Likely causes of a wrong scale, the nearest first; empty when no usual one fits.
+        remedy: What else to look at, in words; empty where a change of bus.yml mends it.
+    """
+
+    verdict: Verdict
+    sign: int = 1
+    measured: float = 1.0
+    causes: tuple[Cause, ...] = field(default=())
+    remedy: str = ''
+
+
+def judge(
+    kind: JointKind, commanded: float, reported: float, seen: Seen, facts: DriveFacts
+) -> Judgement:
+    """Conclude from a motion.
+
+    Args:
+        kind: What the joint does.
+        commanded: Distance that was commanded, in [rad] or [m].
+        reported: Distance that the drive reports, likewise.
+        seen: What the person saw.
+        facts: What the drive says about itself.
+    """
+    if seen.other_joint:
+        return Judgement(
+            Verdict.OTHER_JOINT,
+            remedy='two node ids are exchanged: compare node_id of this joint in bus.yml with the '
+            'address that its drive is set to, and the motor and encoder cables of both drives',
+        )
+    has_reported = abs(reported) >= MOVED * abs(commanded)
+    if seen.direction == 0:
+        return _still(moved=has_reported)
+    if not has_reported:
+        return Judgement(
+            Verdict.NOT_REPORTED,
+            remedy='the encoder of the joint does not reach the drive: look at its cable and the '
+            'encoder settings of the drive, and at 0x6064 while the joint is moved by hand',
+        )
+    sign = 1 if seen.direction * reported > 0 else -1
+    measured = 1.0 if seen.distance is None else seen.distance / abs(reported)
+    is_scaled, causes = _causes(kind, measured, facts)
+    if is_scaled:
+        verdict = Verdict.WRONG_SCALE if sign > 0 else Verdict.WRONG_SIGN_AND_SCALE
+        return Judgement(verdict, sign, measured, causes)
+    return Judgement(Verdict.RIGHT if sign > 0 else Verdict.WRONG_SIGN, sign, measured)
+
+
+def _still(*, moved: bool) -> Judgement:
+    if moved:
+        return Judgement(
+            Verdict.ENCODER_ONLY,
+            remedy='either the motion is too small to be seen, so that the scale has too few '
+            'increments per unit: repeat it with a larger --distance and say how far it went; or '
+            'the motor turns and the joint does not: look at the coupling between them',
+        )
+    return Judgement(
+        Verdict.NO_MOTION,
+        remedy='look at the brake (does the drive release it, 0x60FE?), at the safe torque off, '
+        'at the torque limit 0x6072, and whether the scale has far too few increments per unit: '
+        'then repeat it with a larger --distance',
+    )
+
+
+def _causes(kind: JointKind, measured: float, facts: DriveFacts) -> tuple[bool, tuple[Cause, ...]]:
+    """Return whether the scale is wrong, and what explains it."""
+    if measured <= 0.0:
+        return False, ()
+    own = list(_causes_of_drive(kind, facts))
+    usual = [cause for cause in CAUSES if kind in cause.kinds]
+    own.sort(key=lambda cause: _apart(measured, cause.factor))
+    usual.sort(key=lambda cause: _apart(measured, cause.factor))
+    likely = _distinct(
+        [cause for cause in (*own, *usual) if _apart(measured, cause.factor) < math.log(LIKE)]
+    )
+    nearest = min((_apart(measured, cause.factor) for cause in likely), default=math.inf)
+    if _apart(measured, 1.0) < math.log(LIKE) and _apart(measured, 1.0) <= nearest:
+        return False, ()
+    return True, likely
+
+
+def _causes_of_drive(kind: JointKind, facts: DriveFacts) -> Iterable[Cause]:
+    """Yield factors that follow from what the drive says, but for those near 1."""
+    if kind is JointKind.TURNS and facts.factor_scale:
+        yield from _unless_one(
+            abs(facts.scale) / facts.factor_scale,
+            f'the drive has {facts.factor_scale:g} increments per rad by its factor group (0x608F,'
+            f' 0x6091, 0x6092), bus.yml {abs(facts.scale):g}',
+        )
+    if facts.gear:
+        gear = f'the gear of {facts.gear:g} (0x6091)'
+        yield from _unless_one(1.0 / facts.gear, f'{gear} is missing in the scale')
+        yield from _unless_one(facts.gear, f'{gear} is in the scale twice')
+
+
+def _unless_one(factor: float, text: str) -> Iterable[Cause]:
+    if _apart(factor, 1.0) > math.log(1.05):
+        yield Cause(factor, text)
+
+
+def _distinct(causes: Sequence[Cause]) -> tuple[Cause, ...]:
+    """Keep the first of causes that lead to one factor."""
+    kept: list[Cause] = []
+    for cause in causes:
+        if all(_apart(cause.factor, other.factor) > math.log(1.01) for other in kept):
+            kept.append(cause)
+    return tuple(kept)
+
+
+def _apart(first: float, second: float) -> float:
+    return abs(math.log(first / second))

@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What moves the drive: its own profile in mode 1, or set-points of each cycle in 7 and 8."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+import math
+import time
+from typing import Protocol
+
+from arm_canopen import CanopenError, CanopenMaster
+from arm_canopen.config.model.drive import DriveConfig
+from arm_canopen.exceptions import DriveError, ObjectError, SdoError
+from arm_canopen.standard.objects import AXIS_OFFSET, Index
+
+from .guard import MotionPlan
+from .slow_motion import PERMIT, SlowMotion
+
+
+class Mover(Protocol):
+    """Moves an enabled drive to the target of a plan, and halts it; no call waits."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether the drive still carries out what was ordered last."""
+
+    @property
+    def problem(self) -> str:
+        """Why it cannot go on, in words; else empty."""
+
+    def go(self) -> None:
+        """Go to the target."""
+
+    def keep_going(self) -> None:
+        """Confirm that it may go on; to be called at least every 0.1 s."""
+
+    def halt(self) -> None:
+        """Come to rest."""
+
+    def close(self) -> None:
+        """Leave the drive as it was found."""
+
+
+class ProfileMover:
+    """Mode 1: the drive makes the way, with 0x6081 as its speed for that time."""
+
+    def __init__(
+        self, master: CanopenMaster, axis: DriveConfig, plan: MotionPlan, speed_dev: int
+    ) -> None:
+        """Write the speed.
+
+        Args:
+            master: The master.
+            axis: The axis.
+            plan: The motion.
+            speed_dev: Its speed in velocity units of the drive.
+
+        Raises:
+            DriveError: The drive does not take the speed; nothing has moved.
+        """
+        self._drive = master.drive(axis.name)
+        self._plan = plan
+        self._index = Index.PROFILE_VELOCITY + AXIS_OFFSET * axis.channel
+        self._pool = ThreadPoolExecutor(max_workers=2, thread_name_prefix='first_motion')
+        self._orders: list[Future[str]] = []
+        self._going: Future[str] | None = None
+        self._halted = False
+        self._failure = ''
+        try:
+            self._before = self._drive.sdo.read(self._index)
+            self._drive.sdo.write(self._index, speed_dev)
+        except (SdoError, ObjectError, DriveError) as error:
+            raise DriveError(
+                f'{axis.name}: its speed (0x{self._index:04X}) cannot be set, so the motion might '
+                f'be fast: {error}'
+            ) from error
+
+    @property
+    def busy(self) -> bool:
+        """Whether an order has no answer yet."""
+        for order in [order for order in self._orders if order.done()]:
+            self._orders.remove(order)
+            error = order.exception()
+            ended_by_halt = self._halted and order is self._going
+            if isinstance(error, CanopenError) and not ended_by_halt:
+                self._failure = self._failure or str(error)
+        return bool(self._orders)
+
+    @property
+    def problem(self) -> str:
+        """Why an order failed."""
+        return self._failure
+
+    def go(self) -> None:
+        """Order the target; the drive goes there by itself, and is halted when the key is up."""
+        self._going = self._pool.submit(self._drive.set_target, self._plan.target)
+        self._halted = False
+        self._orders.append(self._going)
+
+    def keep_going(self) -> None:
+        """Nothing: the drive goes on by itself."""
+
+    def halt(self) -> None:
+        """Order bit 8 of the controlword, also while a target is on its way."""
+        self._halted = True
+        self._orders.append(self._pool.submit(self._drive.halt))
+
+    def close(self) -> None:
+        """Write the speed of before."""
+        self._pool.shutdown(wait=True)
+        self._drive.sdo.write(self._index, self._before)
+
+
+class CyclicMover:
+    """Modes 7 and 8: the master makes the way, set-point by set-point."""
+
+    def __init__(self, master: CanopenMaster, axis: DriveConfig, plan: MotionPlan) -> None:
+        """Attach the source; it holds the joint where it is."""
+        self._master = master
+        self._source = SlowMotion(axis.name, plan.target, plan.speed)
+        master.attach(self._source)
+
+    @property
+    def busy(self) -> bool:
+        """Never: what is ordered takes effect in the next cycle."""
+        return False
+
+    @property
+    def problem(self) -> str:
+        """Why the drive was taken away."""
+        return self._source.problem
+
+    def go(self) -> None:
+        """Permit the motion."""
+        self.keep_going()
+
+    def keep_going(self) -> None:
+        """Renew the permission."""
+        self._source.permit(time.monotonic() + PERMIT)
+
+    def halt(self) -> None:
+        """Withdraw the permission."""
+        self._source.permit(-math.inf)
+
+    def close(self) -> None:
+        """Detach the source."""
+        self._master.detach(self._source)

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The first motion at a terminal: the motion, what was seen, and the conclusion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+import signal
+import sys
+
+from arm_canopen import BusConfig, load_bus, NodeConfig
+from arm_canopen.config.model.drive import DriveConfig
+
+from .checks import FASTEST, FURTHEST
+from .correction import apply, Correction
+from .dialogue import agrees, ask_seen, choose, FirstMotionError, say
+from .interruptions import Interrupted, Interruptions
+from .joint_units import JointKind
+from .judgement import DriveFacts, judge, Judgement, Verdict
+from .motion import move, Record, Request
+from .scales import corrected
+
+
+def run(request: Request) -> int:
+    """Move, ask and conclude, until the person has enough.
+
+    Returns:
+        0 when the joint moved as it should, else 1; 130 or 129 when it was interrupted, with the
+        drive stopped.
+
+    Raises:
+        CanopenError: The bus, a file or the drive prevents it; the drive is stopped.
+    """
+    _require_small(request)
+    try:
+        with Interruptions() as interruptions:
+            while True:
+                code = _once(request, interruptions)
+                if code is not None:
+                    return code
+    except Interrupted as interruption:
+        if interruption.number != signal.SIGHUP:
+            say('interrupted: the drive is stopped and disabled')
+        return 128 + interruption.number
+
+
+def _once(request: Request, interruptions: Interruptions) -> int | None:
+    """Make one motion and conclude; return the exit code, or None for another one."""
+    config = load_bus(request.path)
+    node, axis = _find(config, request)
+    record = move(request, axis, interruptions)
+    if record is None:
+        say('nothing was moved')
+        return 1
+    _show(request.distance.kind, record)
+    judgement = _conclude(request, record)
+    if judgement.verdict is Verdict.RIGHT:
+        return 0
+    if not judgement.verdict.wants_change or not _mend(request, node, axis, record, judgement):
+        return 1
+    return None if agrees('repeat the motion?') else 1
+
+
+def _require_small(request: Request) -> None:
+    kind = request.distance.kind
+    if abs(request.distance.value) > FURTHEST[kind] or not request.distance.value:
+        raise FirstMotionError(
+            f'--distance {kind.shown(request.distance.value)}: a first motion is short, up to '
+            f'{kind.shown(FURTHEST[kind])} and not 0'
+        )
+    if request.speed.kind is not kind or not 0.0 < request.speed.value <= FASTEST[kind]:
+        raise FirstMotionError(
+            f'--speed: a first motion is slow; give a speed above 0 and up to '
+            f'{kind.shown(FASTEST[kind])} per second'
+        )
+    if not sys.stdin.isatty():
+        raise FirstMotionError('a person has to hold a key: start this in a terminal')
+
+
+def _find(config: BusConfig, request: Request) -> tuple[NodeConfig, DriveConfig]:
+    for node in config.nodes:
+        for axis in node.axes if node.is_drive else ():
+            if (axis.name or node.name) == request.joint:
+                return node, replace(axis, name=request.joint)
+    known = ', '.join(config.joints) or 'none'
+    raise FirstMotionError(f'no joint {request.joint!r} in {request.path}; joints: {known}')
+
+
+def _show(kind: JointKind, record: Record) -> None:
+    say(f'The motion has ended: {record.detail}.')
+    say(
+        f'  the drive reported {kind.shown(record.before)} before, {kind.shown(record.after)} '
+        f'after: {record.after - record.before:+.4g} {"rad" if kind is JointKind.TURNS else "m"} '
+        f'in the unit of bus.yml, {kind.shown(record.after - record.before)}'
+    )
+
+
+def _conclude(request: Request, record: Record) -> Judgement:
+    """Ask what the person saw, and say what that means."""
+    kind, reported = request.distance.kind, record.after - record.before
+    seen = ask_seen(kind, reported)
+    facts = record.facts
+    scale = facts.axis.scale_pos_to_dev
+    says = DriveFacts(scale, facts.factors.gear, facts.factors.position_scale or None)
+    judgement = judge(kind, request.distance.value, reported, seen, says)
+    say(f'{request.joint}: {judgement.verdict.value}')
+    if judgement.remedy:
+        say(f'  {judgement.remedy}')
+    for number, cause in enumerate(judgement.causes, 1):
+        say(f'  {number}. {cause.text} (factor {cause.factor:.4g})')
+    return judgement
+
+
+def _mend(
+    request: Request,
+    node: NodeConfig,
+    axis: DriveConfig,
+    record: Record,
+    judgement: Judgement,
+) -> bool:
+    """Show the change of bus.yml, and make it when the person wants.
+
+    Returns:
+        Whether it was made.
+    """
+    factor, why, certain = _factor(judgement)
+    if factor is None:
+        return False
+    # what the file says decides which keys change; what the drive says, the values before
+    current = replace(record.facts.axis, scale_from_factor_group=axis.scale_from_factor_group)
+    values = corrected(current, judgement.sign, factor)
+    say(f'In {request.path}, at {node.name}:')
+    for key, value in values.items():
+        before = getattr(current, key)
+        say(f'  {key}: {before!r} -> {value!r}' if before != value else f'  {key}: {value!r}')
+    if not math.isclose(abs(axis.scale_vel_to_dev), abs(axis.scale_pos_to_dev)) and factor != 1.0:
+        say('  scale_vel_to_dev is in other units than increments per second: check it, too')
+    say('  limits 0x607D are in increments: those that were computed with the old scale are wrong')
+    if not (request.write and certain) and not agrees('change them?'):
+        return False
+    channel = axis.channel if len(node.axes) > 1 else None
+    reason = f'canopen first-motion: {why}; scale_pos_to_dev was {current.scale_pos_to_dev!r}'
+    apply(Correction(node.name, request.joint, channel, values, reason), request.path)
+    say(f'{request.path} is changed')
+    return True
+
+
+def _factor(judgement: Judgement) -> tuple[float | None, str, bool]:
+    """Choose the factor of the scale, its reason, and whether it is beyond doubt."""
+    turned = 'the sign was wrong'
+    if judgement.verdict is Verdict.WRONG_SIGN:
+        return 1.0, turned, True
+    sign = f'{turned}, and ' if judgement.sign < 0 else ''
+    causes = judgement.causes
+    if not causes:
+        say(
+            f'  no usual cause has the factor {judgement.measured:.3g}; as it was seen by eye, '
+            'measure it over a larger --distance before you keep it'
+        )
+        return judgement.measured, f'{sign}the scale by {judgement.measured:.4g}, by eye', False
+    chosen = causes[0] if len(causes) == 1 else choose(causes)
+    if chosen is None:
+        return None, '', False
+    return chosen.factor, f'{sign}{chosen.text}', len(causes) == 1

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The keys of bus.yml that correct the sign and the scale of an axis: pure."""
+
+from __future__ import annotations
+
+import math
+
+from arm_canopen.config.model.drive import DriveConfig
+
+SAME = 1e-6  # share by which two scales may differ and still be the same
+
+
+def corrected(axis: DriveConfig, sign: int, factor: float) -> dict[str, float | bool]:
+    """Return the keys to change with their new values, in the order of the file.
+
+    Args:
+        axis: The axis with the scales that the master uses.
+        sign: -1 to turn the direction, else 1.
+        factor: Way of the joint over what the drive reported, without the sign.
+    """
+    change = sign / factor
+    to_dev = axis.scale_pos_to_dev * change
+    # a velocity in increments per second is wrong by the same factor; in rpm, by none that we know
+    in_increments = math.isclose(
+        abs(axis.scale_vel_to_dev), abs(axis.scale_pos_to_dev), rel_tol=SAME
+    )
+    velocity = axis.scale_vel_to_dev * (change if in_increments else sign)
+    values: dict[str, float | bool] = {}
+    if axis.scale_from_factor_group:
+        values['scale_from_factor_group'] = False
+    values |= {
+        'scale_pos_to_dev': to_dev,
+        'scale_pos_from_dev': 1.0 / to_dev,
+        'scale_vel_to_dev': velocity,
+        'scale_vel_from_dev': 1.0 / velocity,
+    }
+    if sign < 0:
+        values |= {
+            'scale_eff_to_dev': -axis.scale_eff_to_dev,
+            'scale_eff_from_dev': -axis.scale_eff_from_dev,
+        }
+    if axis.offset_pos_from_dev:  # the place of the zero stays
+        values['offset_pos_from_dev'] = axis.offset_pos_from_dev / change
+    return {name: _rounded(value) for name, value in values.items()}
+
+
+def _rounded(value: float | bool) -> float | bool:
+    """Drop what double precision has added, as 1.0000000000000002."""
+    return value if isinstance(value, bool) else float(f'{value:.12g}')
