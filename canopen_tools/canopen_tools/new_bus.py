@@ -7,8 +7,8 @@ What an EDS leaves open is not guessed: the caller gives it, or learns what is m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 import json
 import math
@@ -26,6 +26,8 @@ from arm_canopen.standard.dictionary import ObjectEntry
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.objects import AXIS_OFFSET, Index, PDO_BITS_MAX
 from arm_canopen.standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
+
+from .si_unit import position_unit, SI_UNIT_POSITION, SI_UNIT_VELOCITY, velocity_unit
 
 POSITION_MODES = (
     OperationMode.CYCLIC_POSITION,
@@ -50,10 +52,16 @@ class Units:
     Attributes:
         scale: Increments of the drive per rad or m of the joint; negative for the other direction.
         said: The same in words.
+        slides: The joint slides, so that the scale is per m.
+        velocity: Velocity units of the drive per rad/s or m/s; None where nobody has said it.
+        velocity_said: The same in words.
     """
 
     scale: float
     said: str
+    slides: bool = False
+    velocity: float | None = None
+    velocity_said: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +74,9 @@ class NewDevice:
         eds: Its EDS.
         mode: Mode of operation; None takes the best one that the EDS names.
         units: Units of the joint; None where the factor group says them.
+        values: What the device itself holds, by index and sub-index; it counts before the
+            defaults of its EDS.
+        found: Who it is and why it has this EDS, where it was found on a bus; else empty.
     """
 
     name: str
@@ -73,6 +84,8 @@ class NewDevice:
     eds: Eds
     mode: OperationMode | None = None
     units: Units | None = None
+    values: Mapping[tuple[int, int], int] = field(default_factory=dict)
+    found: str = ''
 
     @property
     def is_drive(self) -> bool:
@@ -82,7 +95,17 @@ class NewDevice:
     @property
     def has_open_units(self) -> bool:
         """Whether neither its EDS nor anybody says how far an increment of its joint is."""
-        return self.is_drive and self.units is None and not _says_units(_factors(self.eds))
+        return self.is_drive and _said_units(self) is None and not _says_units(_factors(self))
+
+    def number(self, index: int, subindex: int = 0) -> int:
+        """Return what an object holds, by the device or else the EDS; 0 where nobody says it."""
+        entry = self.eds.dictionary.get(index, subindex)
+        default = entry.default if entry is not None else 0
+        return self.values.get((index, subindex), default if isinstance(default, int) else 0)
+
+    def source(self, *indices: int) -> str:
+        """Return who says what these objects hold, in words."""
+        return 'the drive' if any(index in indices for index, _ in self.values) else 'the EDS'
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +143,11 @@ def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
         if twice := sorted({value for value in values if values.count(value) > 1}):
             raise NewBusError(f'{what} {twice[0]} is there twice; give each device its own')
     free = {*range(NODE_ID_MIN, NODE_ID_MAX + 1)} - {device.node_id for device in devices}
+    if not free:
+        raise NewBusError(
+            f'all node ids, {NODE_ID_MIN} to {NODE_ID_MAX}, are those of devices, and the master '
+            'needs one; put a device on another bus'
+        )
     lines = [
         '# Made by `canopen new`: what follows a # is why. After a change: canopen check bus.yml',
         'options:',
@@ -139,7 +167,8 @@ def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
     lines.append('nodes:')
     for device, kind in zip(devices, kinds, strict=True):
         own = [f'node_id: {device.node_id}', *_units(device), *([] if are_alike else kind)]
-        lines += [f'  {device.name}:', *(f'    {line}' for line in own)]
+        found = [f'  # {device.found}'] if device.found else []
+        lines += [*found, f'  {device.name}:', *(f'    {line}' for line in own)]
     return '\n'.join(lines) + '\n'
 
 
@@ -180,15 +209,15 @@ def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
 def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     if device.mode is not None:
         return device.mode, 'as asked'
-    entry = device.eds.dictionary.get(Index.SUPPORTED_MODES)
-    bits = 0 if entry is None else _number(entry)
+    bits, source = device.number(Index.SUPPORTED_MODES), device.source(Index.SUPPORTED_MODES)
     offered = [mode for mode in POSITION_MODES if bits & mode.support_bit]
+    best = f'the best of 0x6502 in {source} (0x{bits:08X})'
     for mode in offered:
         target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
         if target is not None and RPDO.mappable(target):
-            return mode, f'the best of 0x6502 in the EDS (0x{bits:08X}) whose target can be mapped'
+            return mode, f'{best} whose target can be mapped'
     if offered:
-        return offered[0], f'the best of 0x6502 in the EDS (0x{bits:08X})'
+        return offered[0], best
     known = ', '.join(f'{int(mode)} ({mode.title.lower()})' for mode in POSITION_MODES)
     what = f'names no position mode in 0x6502 (0x{bits:08X})' if bits else 'has no 0x6502'
     raise NewBusError(
@@ -210,14 +239,9 @@ def _interpolation(device: NewDevice, period_ms: int) -> Iterator[str]:
 def _units(device: NewDevice) -> Iterator[str]:
     if not device.is_drive:
         return
-    factors, units = _factors(device.eds), device.units
+    factors, units = _factors(device), _said_units(device)
     if units is not None:
-        velocity = units.scale * (factors.velocity_factor or 1.0)
-        why = (
-            'by 0x6096 of the EDS'
-            if factors.velocity_factor
-            else 'increments per second, where the manual says nothing else'
-        )
+        velocity, why = _velocity(device, units, factors)
         yield f'scale_pos_to_dev: {units.scale!r}  # {units.said}'
         yield f'scale_pos_from_dev: {1.0 / units.scale!r}'
         yield f'scale_vel_to_dev: {velocity!r}  # {why}'
@@ -225,12 +249,14 @@ def _units(device: NewDevice) -> Iterator[str]:
         if units.scale < 0.0:
             yield 'scale_eff_to_dev: -1.0  # torque turns with the position'
             yield 'scale_eff_from_dev: -1.0'
+        if device.units is None and (doubt := _contradiction(device, units, factors)):
+            yield f'# {doubt}'
     elif _says_units(factors):
-        turn = factors.position_scale * TURN
-        yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by the EDS'
+        turn, source = factors.position_scale * TURN, device.source(*FACTOR_OBJECTS.values())
+        yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by {source}'
     else:
         raise NewBusError(
-            f'{device.name}: {device.eds.path.name} does not say how far an increment of the joint'
+            f'{device.name}: {_speaker(device)} not say how far an increment of the joint'
             ' is (0x608F or 0x6092, with the gear in 0x6091); give'
             f' --turn {device.name}=INCREMENTS for a turn of the joint with its gear, or'
             f' --metre {device.name}=INCREMENTS'
@@ -243,14 +269,76 @@ def _says_units(factors: FactorGroup) -> bool:
     return factors.gear is not None and bool(scale) and not is_coarse(scale)
 
 
-def _factors(eds: Eds) -> FactorGroup:
-    """Return the factor group by the defaults of an EDS."""
+def _speaker(device: NewDevice) -> str:
+    name = device.eds.path.name
+    return f'neither the drive nor {name} does' if device.found else f'{name} does'
+
+
+def _factors(device: NewDevice) -> FactorGroup:
+    """Return the factor group by what the drive holds, else by the defaults of its EDS."""
 
     def value(index: Index) -> float | None:
-        top, bottom = (eds.dictionary.get(index, sub) for sub in (1, 2))
-        return None if top is None or bottom is None else ratio(_number(top), _number(bottom))
+        return ratio(device.number(index, 1), device.number(index, 2))
 
     return FactorGroup(**{name: value(index) for name, index in FACTOR_OBJECTS.items()})
+
+
+def _said_units(device: NewDevice) -> Units | None:
+    """Return the units that somebody has said, else those that the drive names; None for none.
+
+    What it names in 0x60A8 and 0x60A9 counts where it was read from the drive: in an EDS these are
+    defaults that the maker changes by parameters.
+    """
+    units = device.units or _named_units(device)
+    velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0)))
+    if units is None or velocity is None or velocity.slides is not units.slides:
+        return units
+    said = f'0x60A9 of the drive: its unit is {velocity.text}'
+    return replace(units, velocity=1.0 / velocity.size, velocity_said=said)
+
+
+def _named_units(device: NewDevice) -> Units | None:
+    """Return the units that are written out, as the master does not read them from the drive."""
+    position = position_unit(device.values.get((SI_UNIT_POSITION, 0)))
+    if position is not None:
+        per = 'm' if position.slides else 'rad'
+        said = f'0x60A8 of the drive: its unit is {position.text}; per {per}'
+        return Units(1.0 / position.size, said, position.slides)
+    names_velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0))) is not None
+    factors = _factors(device)
+    if not (names_velocity or _has_unlisted(device)) or not _says_units(factors):
+        return None
+    source = device.source(*FACTOR_OBJECTS.values())
+    return Units(factors.position_scale, f'0x608F, 0x6091, 0x6092 of {source}; per rad')
+
+
+def _has_unlisted(device: NewDevice) -> bool:
+    """Whether the drive has ratios that its EDS lacks, so that the master would not read them."""
+    known = device.eds.dictionary
+    return any(
+        (index, 1) in device.values and known.get(index, 1) is None
+        for index in FACTOR_OBJECTS.values()
+    )
+
+
+def _velocity(device: NewDevice, units: Units, factors: FactorGroup) -> tuple[float, str]:
+    if units.velocity is not None:
+        return math.copysign(units.velocity, units.scale), units.velocity_said
+    if factors.velocity_factor:
+        source = device.source(Index.VELOCITY_FACTOR)
+        return units.scale * factors.velocity_factor, f'by 0x6096 of {source}'
+    return units.scale, 'increments per second, where the manual says nothing else'
+
+
+def _contradiction(device: NewDevice, units: Units, factors: FactorGroup) -> str:
+    """Return what to look at where 0x60A8 and the factor group differ; else nothing."""
+    by_factors = factors.position_scale
+    if not _says_units(factors) or math.isclose(units.scale, by_factors, rel_tol=0.01):
+        return ''
+    return (
+        f'its factor group has {by_factors:g} per rad: try which it is, canopen first-motion'
+        f' bus.yml {device.name}'
+    )
 
 
 def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:
@@ -319,7 +407,3 @@ def _needed(device: NewDevice, wanted: _Wanted, what: str) -> NewBusError:
 
 def _writable(entry: ObjectEntry | None) -> bool:
     return entry is not None and entry.access.writable
-
-
-def _number(entry: ObjectEntry) -> int:
-    return entry.default if isinstance(entry.default, int) else 0

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``canopen new``: a bus.yml of EDS files, each choice with its reason, and checked."""
+"""``canopen new``: a bus.yml of EDS files or of a live bus, each choice with its reason."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
-import re
 import shutil
 import sys
+import tempfile
 
-from arm_canopen.config.read.eds import load_eds
 from arm_canopen.standard.drive import OperationMode
 
 from ..new_bus import bus_text, NewDevice, POSITION_MODES, TURN, Units
-from .arguments import node_id, SubParsers, UsageError
+from .arguments import add_bus_argument, node_id, seconds, SubParsers, UsageError
 from .check import show_check
+from .new_scan import given_devices, scanned_devices
 from .output import print_line
+from .scan import LISTEN
 
-DEVICE = re.compile(r'(?P<name>[A-Za-z][A-Za-z0-9_]*)=(?P<file>.+)@(?P<node>[^@]+)')
-"""A device on the command line; its name is one of a ROS node."""
 PERIOD_MS = 10
 """Time between two SYNC in [ms]."""
 
@@ -31,15 +30,44 @@ def add_parser(parsers: SubParsers) -> None:
     """Add the verb."""
     parser = parsers.add_parser(
         'new',
-        help='write the bus.yml of a new robot from the EDS files of its devices',
-        description='Write a bus.yml from EDS files: modes, PDOs, SYNC, heartbeats and units, '
-        'each with its reason, and check it. What the files do not say is asked for. Exit code: '
-        '0, 1 with errors, 2 wrong usage.',
-        epilog='example: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000',
+        help='write the bus.yml of a new robot from EDS files, or from what is on a bus',
+        description='Write a bus.yml from EDS files, or with --scan from the devices on a bus: '
+        'modes, PDOs, SYNC, heartbeats and units, each with its reason, and check it. What nobody '
+        'says is asked for. Exit code: 0, 1 with errors, 2 wrong usage.',
+        epilog='examples: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000; '
+        'canopen new --scan --can can0 eds_files/ shoulder@2 elbow@3',
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add('devices', metavar='NAME=FILE.eds@NODE', nargs='+', help='name, EDS and node id of each')
+    add(
+        'devices',
+        metavar='DEVICE',
+        nargs='*',
+        help='NAME=FILE.eds@NODE: name, EDS and node id of each; with --scan also a folder or '
+        'file of EDS files to choose from, and NAME@NODE for the name of a device',
+    )
+    add(
+        '--scan',
+        action='store_true',
+        help='take the devices that are on the bus, each with the EDS of its vendor, product and '
+        'revision, or the one that it has in 0x1021',
+    )
+    add_bus_argument(parser)
+    add(
+        '--without',
+        metavar='NODE',
+        type=node_id,
+        action='append',
+        default=[],
+        help='leave out a device that --scan finds',
+    )
+    add(
+        '--listen',
+        type=seconds,
+        default=LISTEN,
+        metavar='S',
+        help=f'how long --scan listens first in s (default: {LISTEN})',
+    )
     add(
         '--turn',
         metavar='NAME=INCREMENTS',
@@ -79,8 +107,19 @@ def run(options: argparse.Namespace) -> int:
     output: Path = options.output
     if output.exists() and not options.force:
         raise UsageError(f'{output} is there already; choose another --output, or --force')
-    devices = [_asked(each) if each.has_open_units else each for each in _devices(options)]
-    text = bus_text(devices, options.period)
+    with tempfile.TemporaryDirectory() as stored:
+        devices = _with_choices(
+            options,
+            scanned_devices(options, Path(stored)) if options.scan else given_devices(options),
+        )
+        devices = [_asked(each) if each.has_open_units else each for each in devices]
+        _write(devices, bus_text(devices, options.period), output)
+    print_line(f'{output} is written; what it says and why is in it')
+    return show_check(output)
+
+
+def _write(devices: Sequence[NewDevice], text: str, output: Path) -> None:
+    """Write a bus.yml, with the EDS files beside it."""
     files: dict[str, Path] = {}
     for path in (device.eds.path for device in devices):
         for other in (files.setdefault(path.name, path), output.parent / path.name):
@@ -91,21 +130,10 @@ def run(options: argparse.Namespace) -> int:
         if not (output.parent / name).exists():
             shutil.copy(path, output.parent / name)
     output.write_text(text, encoding='utf-8')
-    print_line(f'{output} is written; what it says and why is in it')
-    return show_check(output)
 
 
-def _devices(options: argparse.Namespace) -> list[NewDevice]:
-    devices = []
-    for text in options.devices:
-        match = DEVICE.fullmatch(text)
-        if match is None:
-            raise UsageError(f'{text!r} is no device; write it as shoulder=drive.eds@2')
-        try:
-            node = node_id(match['node'])
-        except argparse.ArgumentTypeError as error:
-            raise UsageError(f'{text}: {error}') from error
-        devices.append(NewDevice(match['name'], node, load_eds(Path(match['file']))))
+def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> list[NewDevice]:
+    """Return the devices with the units and modes of the command line."""
     drives = [device.name for device in devices if device.is_drive]
     units = {
         name: read(name, value)
@@ -140,7 +168,7 @@ def _turn(name: str, text: str) -> Units:
 
 def _metre(name: str, text: str) -> Units:
     number = _increments('metre', name, text)
-    return Units(number, f'{number:g} increments per m, as said')
+    return Units(number, f'{number:g} increments per m, as said', slides=True)
 
 
 def _increments(option: str, name: str, text: str) -> float:

@@ -13,6 +13,7 @@ from arm_canopen.config import load_bus
 from arm_canopen.config.model import BusConfig, NodeConfig
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import SdoError
+from arm_canopen.master import SdoClient
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.nmt import NmtState
 from arm_canopen.standard.objects import Index
@@ -25,6 +26,7 @@ from .session import Session
 
 LISTEN = 1.5  # [s] many devices send a heartbeat each second
 ANSWER = 0.3  # [s]
+SECOND_ANSWER = 0.02  # [s] for that of another device with the same node id
 GROUP = 8  # devices that are queried at a time, so that no transmit queue fills up
 GROUP_PAUSE = 0.01  # [s]
 
@@ -61,6 +63,7 @@ class Found:
         numbers: Its identity, by attribute of Identity; None where it refuses.
         config: Its entry in bus.yml.
         answers: It has answered an SDO.
+        twice: More answers came than it was asked for, so another device has its node id.
     """
 
     node_id: int
@@ -68,6 +71,7 @@ class Found:
     numbers: dict[str, int | None] = field(default_factory=dict)
     config: NodeConfig | None = None
     answers: bool = False
+    twice: bool = False
 
     @property
     def is_there(self) -> bool:
@@ -107,17 +111,40 @@ def run(options: argparse.Namespace) -> int:
     config = load_bus(options.bus_config) if options.bus_config else None
     with open_bus(options.can) as bus:
         session = Session(bus, config)
-        warn(f'listening on {bus.name} for {options.listen:g} s')
-        session.listen(options.listen)
-        found = _frames(session, config)
-        if session.masters and session.states and config is None:
-            warn('a master with a heartbeat is listed like a device; --bus-config leaves it out')
-        if _may_query(session, query=options.query):
-            _find_silent(session, found)
-            for device in found.values():
-                _identify(session, device)
-            _find_unconfigured(session)
+        found = find_devices(session, config, options.listen, query=options.query)
         return _show(found, config, queried=options.query or not session.masters)
+
+
+def find_devices(
+    session: Session, config: BusConfig | None, listen: float, *, query: bool
+) -> dict[int, Found]:
+    """Listen, then read the identity of every node id where that disturbs no master.
+
+    Args:
+        session: The connection to the bus.
+        config: What should be on it; None where nobody knows.
+        listen: How long to listen first in [s].
+        query: Read beside a master, too.
+
+    Returns:
+        Devices by node id: those that are there, and those of the configuration.
+    """
+    warn(f'listening on {session.bus.name} for {listen:g} s')
+    session.listen(listen)
+    found = _frames(session, config)
+    if session.masters and session.states and config is None:
+        warn('a master with a heartbeat is listed like a device; --bus-config leaves it out')
+    if _may_query(session, query=query):
+        _find_silent(session, found)
+        for device in found.values():
+            _identify(session, device)
+            if device.twice:
+                warn(
+                    f'node {device.node_id}: several devices answer; switch all but one of them '
+                    'off, and give each a node id of its own (canopen lss, or its switches)'
+                )
+        _find_unconfigured(session)
+    return found
 
 
 def _frames(session: Session, config: BusConfig | None) -> dict[int, Found]:
@@ -182,6 +209,23 @@ def _identify(session: Session, device: Found) -> None:
     if not device.is_there:
         return
     client = session.client(device.node_id)
+    responses = 0
+
+    def count(frame: Frame) -> None:
+        nonlocal responses
+        responses += frame.can_id == CobId.SDO_RESPONSE + device.node_id
+
+    session.listeners.append(count)
+    try:
+        _read_identity(session, device, client)
+        session.listen(SECOND_ANSWER)
+    finally:
+        session.listeners.remove(count)
+    # each of these values comes in one frame; those that another master has asked for do not count
+    device.twice = not session.masters and responses > len(IDENTITY)
+
+
+def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
     for attribute, _, index, subindex in IDENTITY:
         if session.masters:
             session.await_quiet(device.node_id)

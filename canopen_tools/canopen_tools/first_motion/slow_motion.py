@@ -12,6 +12,7 @@ from arm_canopen import AxisFeedback, Refusal
 
 PERMIT = 0.25  # [s] for which one permission holds
 RAMP_TIME = 0.25  # [s] from rest to full speed, and back
+NEAR = 0.01  # share of a full step within which the target counts as reached
 
 
 class SlowMotion:
@@ -69,14 +70,15 @@ class SlowMotion:
         """Advance by a cycle; the speed changes by its ramp, and ends at the target."""
         position = self._position or 0.0
         left = self._target - position
-        acceleration = self._speed / RAMP_TIME
-        # the speed from which it can still stop at the target
-        fastest = min(self._speed, math.sqrt(2.0 * acceleration * abs(left)))
+        change = self._speed / RAMP_TIME * period
+        # the speed from which it can still stop at the target after this step
+        fastest = min(
+            self._speed, math.sqrt(change**2 + 2.0 * change * abs(left) / period) - change
+        )
         wanted = math.copysign(fastest, left) if permitted else 0.0
-        change = acceleration * period
         self._velocity += min(max(wanted - self._velocity, -change), change)
         step = self._velocity * period
-        if permitted and abs(step) >= abs(left):
+        if abs(step) >= abs(left) or abs(left - step) < NEAR * self._speed * period:
             self._position, self._velocity = self._target, 0.0
         else:
             self._position = position + step

@@ -32,6 +32,8 @@ class Eds:
         node_id: Node id of a DCF, None in an EDS.
         dummy_types: Data types that may stand in an RPDO as a gap.
         warnings: What was odd but could be understood.
+        numbers: VendorNumber, ProductNumber and RevisionNumber of [DeviceInfo]; 0 where it has
+            none.
     """
 
     path: Path
@@ -39,6 +41,7 @@ class Eds:
     node_id: int | None = None
     dummy_types: frozenset[int] = frozenset(DUMMY_TYPES)
     warnings: tuple[Problem, ...] = ()
+    numbers: tuple[int, int, int] = (0, 0, 0)
 
 
 def load_eds(path: str | os.PathLike[str]) -> Eds:
@@ -65,7 +68,9 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
         findings.warning(Place(path, line), message, TOLERATED)
     for line, key, message in objects.oddities:
         findings.warning(Place(path, line, key=key), message, TOLERATED)
-    return Eds(path, dictionary, _node_id(ini), _dummy_types(ini), findings.warnings)
+    return Eds(
+        path, dictionary, _node_id(ini), _dummy_types(ini), findings.warnings, _numbers(ini)
+    )
 
 
 def read_eds_text(path: Path, findings: Findings) -> str:
@@ -97,6 +102,18 @@ def _node_id(ini: IniFile) -> int | None:
             if NODE_ID_MIN <= node_id <= NODE_ID_MAX:
                 return node_id
     return None
+
+
+def _numbers(ini: IniFile) -> tuple[int, int, int]:
+    section = ini.sections.get('deviceinfo')
+
+    def number(key: str) -> int:
+        try:
+            return parse_integer(section.text(key)) if section is not None else 0
+        except ValueError:
+            return 0
+
+    return number('vendornumber'), number('productnumber'), number('revisionnumber')
 
 
 def _dummy_types(ini: IniFile) -> frozenset[int]:

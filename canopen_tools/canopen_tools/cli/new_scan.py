@@ -1,0 +1,275 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The devices of ``canopen new``: those of the command line, or those that answer on a bus."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+import re
+
+from arm_canopen.can import open_bus
+from arm_canopen.config.model.factor_group import FACTOR_OBJECTS
+from arm_canopen.config.model.identity import Identity
+from arm_canopen.config.read.eds import Eds, load_eds
+from arm_canopen.exceptions import ConfigError, SdoError
+from arm_canopen.standard.objects import Index
+
+from ..eds_match import (
+    eds_identity,
+    identity_text,
+    Match,
+    match_eds,
+    NoMatchError,
+    SeveralMatchError,
+)
+from ..new_bus import NewBusError, NewDevice
+from ..si_unit import SI_UNIT_POSITION, SI_UNIT_VELOCITY
+from .arguments import node_id, UsageError
+from .output import print_line
+from .scan import find_devices, Found
+from .session import Session
+
+NAME = r'(?P<name>[A-Za-z][A-Za-z0-9_]*)'  # one of a ROS node
+DEVICE = re.compile(NAME + '=(?P<file>.+)@(?P<node>[^@]+)')
+NAMED = re.compile(NAME + '@(?P<node>[^@=]+)')
+STORE_EDS, STORE_FORMAT = 0x1021, 0x1022  # CiA 301, 7.5.2.22 and 7.5.2.23
+UNCOMPRESSED = 0  # value of 0x1022 for text as it is
+TIMEOUT = 0.5  # [s] of an answer
+FACTS: tuple[tuple[int, int], ...] = (
+    (Index.SUPPORTED_MODES, 0),
+    *((index, subindex) for index in FACTOR_OBJECTS.values() for subindex in (1, 2)),
+    (SI_UNIT_POSITION, 0),
+    (SI_UNIT_VELOCITY, 0),
+)
+"""Objects in which a drive itself says what its EDS may leave open."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """What the command line says of a device.
+
+    Attributes:
+        name: Its name.
+        eds: Its EDS; None where the scan shall find it.
+    """
+
+    name: str
+    eds: Eds | None = None
+
+
+def given_devices(options: argparse.Namespace) -> list[NewDevice]:
+    """Return the devices of the command line.
+
+    Raises:
+        UsageError: One is not written as such, or there is none.
+    """
+    if not options.devices:
+        raise UsageError(
+            'name devices as shoulder=drive.eds@2, or take those of a bus with --scan'
+        )
+    devices = []
+    for text in options.devices:
+        match = DEVICE.fullmatch(text)
+        if match is None:
+            raise UsageError(f'{text!r} is no device; write it as shoulder=drive.eds@2')
+        devices.append(
+            NewDevice(match['name'], _node(text, match['node']), load_eds(Path(match['file'])))
+        )
+    return devices
+
+
+def scanned_devices(options: argparse.Namespace, folder: Path) -> list[NewDevice]:
+    """Return the devices that are on the bus.
+
+    Args:
+        options: The command line.
+        folder: Gets the EDS files that devices have in themselves.
+
+    Raises:
+        UsageError: The command line names a device that is not there, or files that are none.
+        NewBusError: The bus is silent or led by a master, or a device has no EDS or shares its
+            node id; every problem is listed, with its remedy.
+    """
+    choices, candidates = _choices(options.devices)
+    with open_bus(options.can) as bus:
+        session = Session(bus)
+        everyone = find_devices(session, None, options.listen, query=False)
+        if session.masters:
+            raise NewBusError(
+                f'a master is on this bus ({", ".join(sorted(session.masters))}), and a device '
+                'answers one of both; end it, then scan'
+            )
+        found = [each for each in everyone.values() if each.is_there]
+        if not found:
+            raise NewBusError(
+                f'no device answers on {bus.name}: is the bus powered, wired and terminated, and '
+                'is this its bit rate?'
+            )
+        _require_present({*choices, *options.without}, {each.node_id for each in found})
+        devices, problems = [], []
+        for each in sorted(found, key=lambda device: device.node_id):
+            if each.node_id in options.without:
+                continue
+            try:
+                devices.append(
+                    _device(session, each, choices.get(each.node_id), candidates, folder)
+                )
+            except NoMatchError as error:
+                problems.append(f'{_title(each)}: {error}')
+    if problems:
+        raise NewBusError('\n'.join(problems))
+    if not devices:
+        raise NewBusError('every device was left out; a bus.yml has one or more')
+    return devices
+
+
+def _choices(texts: Sequence[str]) -> tuple[dict[int, _Choice], list[Eds]]:
+    """Return what the command line says, by node id, and the EDS files to choose from."""
+    choices: dict[int, _Choice] = {}
+    candidates: list[Eds] = []
+    for text in texts:
+        match = DEVICE.fullmatch(text) or NAMED.fullmatch(text)
+        if match is None or Path(text).exists():
+            candidates += _eds_files(Path(text))
+            continue
+        node = _node(text, match['node'])
+        if node in choices:
+            raise UsageError(f'{text}: node {node} is there already, as {choices[node].name}')
+        file = match.groupdict().get('file')
+        choices[node] = _Choice(match['name'], load_eds(Path(file)) if file else None)
+    return choices, candidates
+
+
+def _eds_files(path: Path) -> Iterator[Eds]:
+    if not path.is_dir():
+        yield load_eds(path)
+        return
+    files = sorted(each for each in path.iterdir() if each.suffix.lower() == '.eds')
+    if not files:
+        raise UsageError(f'{path} has no EDS files (*.eds)')
+    yield from map(load_eds, files)
+
+
+def _node(text: str, node: str) -> int:
+    try:
+        return node_id(node)
+    except argparse.ArgumentTypeError as error:
+        raise UsageError(f'{text}: {error}') from error
+
+
+def _require_present(wanted: set[int], there: set[int]) -> None:
+    if missing := sorted(wanted - there):
+        known = ', '.join(map(str, sorted(there)))
+        raise UsageError(f'node {missing[0]} does not answer; on the bus: {known}')
+
+
+def _identity(found: Found) -> Identity:
+    return Identity(**{name: number or 0 for name, number in found.numbers.items()})
+
+
+def _title(found: Found) -> str:
+    identity = _identity(found)
+    who = f' ({identity_text(identity)})' if identity.vendor_id else ''
+    return f'node {found.node_id}{who}'
+
+
+def _device(
+    session: Session,
+    found: Found,
+    choice: _Choice | None,
+    candidates: Sequence[Eds],
+    folder: Path,
+) -> NewDevice:
+    """Return a device that was found.
+
+    Raises:
+        NoMatchError: It has no EDS, or shares its node id.
+    """
+    node = found.node_id
+    if found.twice:
+        raise NoMatchError(
+            'several devices have this node id; switch all but one of them off, and give each one '
+            'of its own (canopen lss, or its switches)'
+        )
+    match = _match(session, found, choice, candidates, folder)
+    is_drive = NewDevice('', node, match.eds).is_drive
+    name = choice.name if choice is not None else f'{"joint" if is_drive else "device"}{node}'
+    reason = f'{identity_text(_identity(found))}; {match.eds.path.name}: {match.reason}'
+    print_line(f'node {node} is {name}: {reason}')
+    values = _values(session, node) if is_drive else {}
+    return NewDevice(name, node, match.eds, values=values, found=f'scanned: {reason}')
+
+
+def _match(
+    session: Session,
+    found: Found,
+    choice: _Choice | None,
+    candidates: Sequence[Eds],
+    folder: Path,
+) -> Match:
+    identity, node = _identity(found), found.node_id
+    if choice is not None and choice.eds is not None:
+        differs = (choice_id := eds_identity(choice.eds)).vendor_id and (
+            (choice_id.vendor_id, choice_id.product_code)
+            != (identity.vendor_id, identity.product_code)
+        )
+        note = f', though it is for {identity_text(choice_id)}' if differs else ''
+        return Match(choice.eds, f'as said{note}')
+    try:
+        return match_eds(identity, candidates)
+    except SeveralMatchError as error:
+        raise NoMatchError(f'{error}; choose with NAME=FILE.eds@{node}') from error
+    except NoMatchError as error:
+        stored = _stored_eds(session, found, folder)
+        if stored is None:
+            raise NoMatchError(
+                f'{error}, and it has none in 0x1021; get it from its vendor and name its file or '
+                f'folder, choose one with NAME=FILE.eds@{node}, or leave it out: --without {node}'
+            ) from error
+        return Match(stored, 'from the device itself (0x1021)')
+
+
+def _stored_eds(session: Session, found: Found, folder: Path) -> Eds | None:
+    """Read the EDS that a device has in itself; None where it has none that can be read."""
+    client = session.client(found.node_id)
+
+    async def upload(index: int) -> bytes:
+        return await client.read(index, 0, TIMEOUT, block=index == STORE_EDS)
+
+    try:
+        form = session.run(upload(STORE_FORMAT))
+        if int.from_bytes(form, 'little') != UNCOMPRESSED:
+            return None
+        data = session.run(upload(STORE_EDS))
+    except SdoError:
+        return None
+    identity = _identity(found)
+    path = folder / (
+        f'{identity.vendor_id:08X}_{identity.product_code:08X}_{identity.revision_number:08X}.eds'
+    )
+    path.write_bytes(data.rstrip(b'\0'))
+    try:
+        return load_eds(path)
+    except ConfigError:
+        return None
+
+
+def _values(session: Session, node: int) -> dict[tuple[int, int], int]:
+    """Read what a drive says of its modes and units."""
+    client = session.client(node)
+    values: dict[tuple[int, int], int] = {}
+    for address in FACTS:
+
+        async def upload(index: int = address[0], subindex: int = address[1]) -> bytes:
+            return await client.read(index, subindex, TIMEOUT)
+
+        try:
+            values[address] = int.from_bytes(session.run(upload()), 'little')
+        except TimeoutError:
+            break  # it will not answer the others either
+        except SdoError:
+            continue  # no drive has all of them
+    return values

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which EDS is that of a device, by vendor, product and revision: pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+from arm_canopen.config.model.identity import Identity
+from arm_canopen.config.read.eds import Eds
+from arm_canopen.exceptions import CanopenError
+from arm_canopen.standard.device_profile import PROFILE_MASK, profile_number
+from arm_canopen.standard.objects import Index
+
+MAJOR_SHIFT = (
+    16  # of 0x1018:03: above it the revision of the CANopen behaviour (CiA 301, 7.5.2.19)
+)
+
+
+class NoMatchError(CanopenError):
+    """No EDS fits a device; the message follows the name of the device."""
+
+
+class SeveralMatchError(NoMatchError):
+    """Several EDS fit a device equally well."""
+
+
+class Likeness(IntEnum):
+    """How well an EDS fits; the best one counts."""
+
+    OTHER_REVISION = 1
+    SAME_MAJOR = 2
+    SAME_REVISION = 3
+
+
+WORDS = {
+    Likeness.OTHER_REVISION: 'vendor and product agree; the revision differs: compare the manual',
+    Likeness.SAME_MAJOR: 'vendor, product and major revision agree',
+    Likeness.SAME_REVISION: 'vendor, product and revision agree',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """An EDS for a device.
+
+    Attributes:
+        eds: The EDS.
+        reason: Why, in words.
+    """
+
+    eds: Eds
+    reason: str
+
+
+def eds_identity(eds: Eds) -> Identity:
+    """Return whom an EDS describes: by the defaults of 0x1018, else by its [DeviceInfo]."""
+
+    def number(subindex: int) -> int:
+        entry = eds.dictionary.get(Index.IDENTITY, subindex)
+        value = entry.default if entry is not None else None
+        return value if isinstance(value, int) and value else eds.numbers[subindex - 1]
+
+    return Identity(
+        device_type=profile_number(eds.dictionary),
+        vendor_id=number(1),
+        product_code=number(2),
+        revision_number=number(3),
+    )
+
+
+def identity_text(identity: Identity) -> str:
+    """Write an identity for a person."""
+    return (
+        f'vendor 0x{identity.vendor_id:08X}, product 0x{identity.product_code:08X}, '
+        f'revision 0x{identity.revision_number:08X}'
+    )
+
+
+def match_eds(identity: Identity, candidates: Sequence[Eds]) -> Match:
+    """Return the EDS of a device.
+
+    Args:
+        identity: What the device says of itself; 0 where it says nothing.
+        candidates: The files that there are; one that is there twice counts once.
+
+    Raises:
+        NoMatchError: None fits.
+        SeveralMatchError: Several fit equally well.
+    """
+    if not identity.vendor_id or not identity.product_code:
+        raise NoMatchError('it does not say who it is (0x1018)')
+    fitting = [
+        (likeness, eds) for eds in candidates if (likeness := _likeness(identity, eds)) is not None
+    ]
+    if not fitting:
+        known = [
+            f'{eds.path.name} is for {identity_text(eds_identity(eds))}' for eds in candidates
+        ]
+        raise NoMatchError(f'no EDS fits ({"; ".join(known) or "none is given"})')
+    best = max(likeness for likeness, _ in fitting)
+    chosen = [eds for likeness, eds in fitting if likeness is best]
+    contents = {eds.path.read_bytes() for eds in chosen}
+    if len(contents) > 1:
+        names = ', '.join(str(eds.path) for eds in chosen)
+        raise SeveralMatchError(f'several EDS fit equally well: {names}')
+    return Match(chosen[0], WORDS[best])
+
+
+def _likeness(identity: Identity, eds: Eds) -> Likeness | None:
+    described = eds_identity(eds)
+    profile = identity.device_type & PROFILE_MASK
+    if profile and described.device_type and profile != described.device_type:
+        return None
+    if (described.vendor_id, described.product_code) != (
+        identity.vendor_id,
+        identity.product_code,
+    ):
+        return None
+    if described.revision_number == identity.revision_number:
+        return Likeness.SAME_REVISION
+    if described.revision_number >> MAJOR_SHIFT == identity.revision_number >> MAJOR_SHIFT:
+        return Likeness.SAME_MAJOR
+    return Likeness.OTHER_REVISION

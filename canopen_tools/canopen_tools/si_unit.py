@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The units that a drive names in 0x60A8 and 0x60A9 (CiA 402-2), as CiA 303-2 codes them: pure.
+
+Bits 24 to 31 are a power of ten, 16 to 23 the unit of the position, 8 to 15 that of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+
+SI_UNIT_POSITION, SI_UNIT_VELOCITY = 0x60A8, 0x60A9
+PLAIN_TIME = 0x03  # second
+TIMES: dict[int, tuple[float, str]] = {
+    PLAIN_TIME: (1.0, 's'),
+    0x47: (60.0, 'min'),
+    0x48: (3600.0, 'h'),
+}
+"""Length in [s] and name of the units of time."""
+
+
+@dataclass(frozen=True, slots=True)
+class LengthUnit:
+    """A unit of a position.
+
+    Attributes:
+        size: In [rad] or [m].
+        name: Its name.
+        slides: It is one of a joint that slides.
+    """
+
+    size: float
+    name: str
+    slides: bool = False
+
+
+POSITIONS: dict[int, LengthUnit] = {
+    0x01: LengthUnit(1.0, 'm', slides=True),
+    0x10: LengthUnit(1.0, 'rad'),
+    0x41: LengthUnit(math.pi / 180.0, 'deg'),
+    0x42: LengthUnit(math.pi / 10_800.0, 'arcmin'),
+    0x43: LengthUnit(math.pi / 648_000.0, 'arcsec'),
+    0xB4: LengthUnit(2.0 * math.pi, 'turns'),
+}
+"""Units that say how far they are; increments (0xB5) and steps (0xAC) do not."""
+
+
+@dataclass(frozen=True, slots=True)
+class NamedUnit:
+    """What one unit of a drive is.
+
+    Attributes:
+        size: In [rad] or [m], or per second.
+        text: In words.
+        slides: It is one of a joint that slides.
+    """
+
+    size: float
+    text: str
+    slides: bool
+
+
+def position_unit(value: int | None) -> NamedUnit | None:
+    """Return what 0x60A8 says; None where it is not there, or says nothing about a joint."""
+    if value is None or (value >> 8) & 0xFF:
+        return None
+    return _named(value, 1.0, '')
+
+
+def velocity_unit(value: int | None) -> NamedUnit | None:
+    """Return what 0x60A9 says; None where it is not there, or says nothing about a joint."""
+    time = None if value is None else TIMES.get((value >> 8) & 0xFF)
+    if value is None or time is None:
+        return None
+    return _named(value, time[0], f'/{time[1]}')
+
+
+def _named(value: int, seconds: float, suffix: str) -> NamedUnit | None:
+    unit = POSITIONS.get((value >> 16) & 0xFF)
+    if unit is None:
+        return None
+    prefix = (value >> 24) & 0xFF
+    exponent = prefix - 0x100 if prefix >= 0x80 else prefix
+    factor = 10.0**exponent
+    return NamedUnit(factor * unit.size / seconds, f'{factor:g} {unit.name}{suffix}', unit.slides)
