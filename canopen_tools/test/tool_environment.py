@@ -10,6 +10,12 @@ from pathlib import Path
 REPOSITORY = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {
     'PYTHONPATH': os.pathsep.join(
-        str(REPOSITORY / package) for package in ('arm_canopen', 'canopen_tools')
+        str(REPOSITORY / package)
+        for package in (
+            'arm_canopen',
+            'canopen_tools',
+            'libraries/operator_input',
+            'libraries/realtime_loop',
+        )
     )
 }

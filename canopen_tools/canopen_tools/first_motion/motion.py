@@ -27,7 +27,8 @@ from .movers import CyclicMover, Mover, ProfileMover
 
 PERIOD = 0.03  # [s] between two looks at the drive
 STATE_TIMEOUT = 2.0  # [s] after the boot, for the first TPDOs
-SETTLE_TIME = 0.3  # [s] after the halt, until the position is read
+HALT_TIMEOUT = 3.0  # [s] for a slow joint to come to rest
+SETTLE_TIME = 0.4  # [s] after the halt, until the position is read
 KEY = 'space'
 QUIT = frozenset({'q', 'escape', 'ctrl+c'})
 FOLLOWING = 0.5  # share of the distance that the joint may be behind set-points of each cycle
@@ -237,7 +238,9 @@ class _GuardedMotion:
         finally:
             line.end()
         if self._guard.outcome.is_judged:
-            self._drive.halt()
+            deadline = time.monotonic() + HALT_TIMEOUT
+            while self._mover.busy and time.monotonic() < deadline:
+                time.sleep(PERIOD)
             time.sleep(SETTLE_TIME)
         return self._drive.position
 
