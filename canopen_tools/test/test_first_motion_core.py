@@ -109,7 +109,7 @@ def test_a_held_up_loop_is_a_release() -> None:
     assert joint.step(held=True) is Order.GO
 
 
-def test_a_busy_drive_is_halted_but_not_told_to_go() -> None:
+def test_a_busy_drive_is_halted_but_not_ordered_to_go() -> None:
     """A halt may not wait for anything."""
     guard = MotionGuard(PLAN, 0.0)
     sample = Sample(PLAN.start)
@@ -166,6 +166,10 @@ def test_nobody_there_and_enough() -> None:
     assert guard.step(IDLE_TIME + 1, Sample(PLAN.start), held=False, busy=False) is Order.END
     assert guard.outcome is Outcome.IDLE
     guard = MotionGuard(PLAN, 0.0)
+    assert guard.finish() is Order.END
+    assert guard.outcome is Outcome.IDLE
+    guard = MotionGuard(PLAN, 0.0)
+    assert guard.step(0.1, Sample(PLAN.start), held=True, busy=False) is Order.GO
     assert guard.finish() is Order.END
     assert guard.outcome is Outcome.FINISHED
 
@@ -261,7 +265,7 @@ def test_a_right_scale_is_left_alone(
 
 
 def test_what_the_drive_says_goes_before_the_usual_causes() -> None:
-    """A gear of 50 and 180/pi cannot be told apart by eye: both are named."""
+    """A gear of 50 and 180/pi cannot be distinguished by eye: both are named."""
     facts = DriveFacts(scale=1000.0, gear=50.0, factor_scale=50_000.0)
     judgement = judge(JointKind.TURNS, 0.02, 0.02, Seen(1, 0.02 / 53), facts)
     assert [round(1 / cause.factor, 1) for cause in judgement.causes] == [50.0, 57.3]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 import math
 import os
 from pathlib import Path
@@ -22,8 +23,12 @@ import pytest
 from tool_environment import ENVIRONMENT, REPOSITORY
 
 from arm_canopen import DriveState, load_bus
+from arm_canopen.config.model.factor_group import FactorGroup
 from canopen_sim import DeviceRunner, Fault, FaultInjection, simulated_devices
 from canopen_tools.cli.main import main
+from canopen_tools.first_motion.checks import AxisFacts
+from canopen_tools.first_motion.guard import Outcome
+from canopen_tools.first_motion.motion import Record
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +36,7 @@ DRIVE = REPOSITORY / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 PER_TURN = 36_000  # [inc] of the simulated joints
 DEADLINE = 60.0  # [s]
 REPEAT = 0.03  # [s] of a keyboard
+RELEASE = 0.6  # [s] after which a key is up in any case
 ESCAPES = re.compile(r'\x1b\[[0-9;?<>=]*[a-zA-Z]|[\r\x1b]')
 
 
@@ -53,8 +59,7 @@ class Person:
         deadline = time.monotonic() + DEADLINE
         while (match := re.compile(pattern).search(self.screen, self._read)) is None:
             assert time.monotonic() < deadline, f'no {pattern!r} in\n{self.screen}'
-            if hold:
-                self.type(hold)
+            self._repeat(hold)
             if not self._look(REPEAT):
                 match = re.compile(pattern).search(self.screen, self._read)
                 assert match is not None, f'no {pattern!r} at the end of\n{self.screen}'
@@ -62,12 +67,12 @@ class Person:
         self._read = match.end()
         return match[0]
 
-    def await_true(self, condition: Callable[[], bool], *, hold: str) -> None:
-        """Hold a key until something is so."""
+    def await_true(self, condition: Callable[[], bool], *, hold: str = '') -> None:
+        """Wait until something is so; a key may be held meanwhile."""
         deadline = time.monotonic() + DEADLINE
         while not condition():
             assert time.monotonic() < deadline, self.screen
-            self.type(hold)
+            self._repeat(hold)
             self._look(REPEAT)
 
     def await_end(self) -> int:
@@ -84,6 +89,15 @@ class Person:
         """Close the window."""
         os.close(self.master)
         self.master = -1
+
+    def _repeat(self, key: str) -> None:
+        """Send a held key once more; let go of it first where the program wants that."""
+        last = max(map(self.screen.rfind, ('moving |', 'at rest |')))
+        if key and self.screen.rfind('release the key') > last:
+            end = time.monotonic() + RELEASE
+            while time.monotonic() < end:
+                self._look(REPEAT)
+        self.type(key)
 
     def _look(self, wait: float) -> bool:
         """Read what is shown; return whether there may be more."""
@@ -135,12 +149,17 @@ def increments(runner: DeviceRunner) -> float:
     return runner.call(lambda: runner.host.device(2).drives[0].position).result(DEADLINE)
 
 
+def speed(runner: DeviceRunner) -> float:
+    """Return how fast it turns in [inc/s]."""
+    return runner.call(lambda: runner.host.device(2).drives[0].velocity).result(DEADLINE)
+
+
 def state(runner: DeviceRunner) -> DriveState:
     """Return the state of the drive of the shoulder."""
     return runner.call(lambda: runner.host.device(2).drives[0].state).result(DEADLINE)
 
 
-def test_a_wrong_sign_and_scale_are_found_and_mended(tmp_path: Path) -> None:
+def test_a_wrong_sign_and_scale_are_found_and_corrected(tmp_path: Path) -> None:
     """Encoder lines in the place of edges, the other way round; in the drive's own mode 1."""
     name = free_multicast()
     truth, mine = tmp_path / 'truth', tmp_path / 'mine'
@@ -152,13 +171,17 @@ def test_a_wrong_sign_and_scale_are_found_and_mended(tmp_path: Path) -> None:
         assert state(runner) is not DriveState.OPERATION_ENABLED
         person.type('y\n')
         person.await_text('Hold the space bar')
+        person.await_true(lambda: increments(runner) < -5, hold=' ')
+        person.await_text('moving')
+        person.await_text('at rest')
+        person.await_true(lambda: abs(speed(runner)) < 1.0)
         person.await_text('which way', hold=' ')
         assert state(runner) is not DriveState.OPERATION_ENABLED
         seen = increments(runner) * 360 / PER_TURN  # [deg]
         assert seen == pytest.approx(-0.25, abs=0.05)
         person.type('-\n')
         person.await_text('how far')
-        person.type(f'{abs(seen):.1f}\n')
+        person.type(f'{abs(seen):.2f}\n')
         person.await_text('wrong sign and wrong scale')
         person.await_text('edges')
         person.await_text('change them')
@@ -196,7 +219,10 @@ def test_whatever_ends_it_the_drive_stands_without_power(end: str, tmp_path: Pat
         person.await_true(lambda: increments(runner) > start + 10, hold=' ')
         assert state(runner) is DriveState.OPERATION_ENABLED
         if end == 'release':
+            person.await_text('moving')
             person.await_text('at rest')
+            person.await_true(lambda: abs(speed(runner)) < 1.0)
+            assert state(runner) is DriveState.OPERATION_ENABLED
             person.type('\n')
             person.await_text('ended by you before the target')
             person.await_text('which way')
@@ -262,6 +288,62 @@ def test_what_is_no_first_motion(
     monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
     assert main(['first-motion', str(bus_yml), 'wrist', '--can', 'no:such', *options]) == 1
     assert re.search(words, capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    ('write', 'seen', 'changes', 'factor', 'code'),
+    [
+        (True, ['-', '', 'n'], True, -1.0, 1),
+        (False, ['-', '', 'n'], False, -1.0, 1),
+        (True, ['+', '0.019', ''], False, 1.0, 1),
+        (True, ['+', '0.019', '2', 'y', 'n'], True, 180 / math.pi, 1),
+        (True, ['+', '17', 'n'], False, 17.0, 1),
+        (True, ['+', '1.2'], False, 1.0, 0),
+        (True, ['x', '0'], False, 1.0, 1),
+        (True, ['o'], False, 1.0, 1),
+    ],
+)
+def test_what_is_changed_and_what_is_asked(
+    *,
+    write: bool,
+    seen: list[str],
+    changes: bool,
+    factor: float,
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With --write nothing is asked where one cause fits; a choice and an estimate are."""
+    bus_yml = robot(tmp_path, PER_TURN, 8)
+    before = bus_yml.read_text()
+    axis = replace(load_bus(bus_yml).nodes[0].drive, name='shoulder')
+    factors = FactorGroup(gear=50.0)
+    record = Record(
+        Outcome.REACHED, 'there', 0.0, math.radians(1), AxisFacts(axis, factors, None, None, 0.01)
+    )
+    monkeypatch.setattr('canopen_tools.first_motion.program.move', lambda *_: record)
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
+    answers = iter(seen)
+    monkeypatch.setattr('builtins.input', lambda _: next(answers))
+    options = ['--write'] if write else []
+    assert main(['first-motion', str(bus_yml), 'shoulder', *options]) == code
+    assert next(answers, None) is None
+    assert (bus_yml.read_text() != before) is changes
+    if changes:
+        scale = load_bus(bus_yml).nodes[0].drive.scale_pos_to_dev
+        assert scale == pytest.approx(PER_TURN / math.tau * factor)
+
+
+def test_without_the_keyboard_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an environment of `pip install ./canopen_tools`: the extra that it needs is named."""
+    bus_yml = robot(tmp_path, PER_TURN, 8)
+    for module in [each for each in sys.modules if each.startswith('canopen_tools.first_motion.')]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, 'operator_input', None)
+    assert main(['first-motion', str(bus_yml), 'shoulder']) == 2
+    assert './canopen_tools[first_motion]' in capsys.readouterr().err
 
 
 def test_without_a_terminal_nothing_is_begun(

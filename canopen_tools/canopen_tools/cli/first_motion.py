@@ -56,10 +56,16 @@ def add_parser(parsers: SubParsers) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Move the joint; return the exit code."""
-    # terminal and master are loaded for this verb alone
-    from ..first_motion.motion import Request
-    from ..first_motion.program import run as run_motion
-
+    try:  # terminal and master are loaded for this verb alone
+        from ..first_motion.motion import Request
+        from ..first_motion.program import run as run_motion
+    except ModuleNotFoundError as error:
+        if error.name != 'operator_input':
+            raise
+        raise UsageError(
+            'first-motion reads the keyboard by operator_input, which is not installed: '
+            "pip install './canopen_tools[first_motion]', or make build for `ros2 run`"
+        ) from error
     distance: Quantity = options.distance
     try:
         speed = read_quantity(options.speed or SPEEDS[distance.kind], distance.kind)

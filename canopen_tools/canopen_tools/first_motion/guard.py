@@ -42,7 +42,7 @@ class Outcome(Enum):
     RUNNING = 'it runs'
     REACHED = 'the drive reports that it is there'
     FINISHED = 'ended by you before the target'
-    IDLE = f'no key was held for {IDLE_TIME:g} s'
+    IDLE = 'the key was not held'
     STALLED = 'the position that the drive reports does not change'
     PROBLEM = 'the drive cannot go on'
     FOLLOWING_ERROR = 'the joint does not follow its set-points'
@@ -54,7 +54,7 @@ class Outcome(Enum):
     @property
     def is_judged(self) -> bool:
         """Whether what a person has seen says something; the others are errors."""
-        return self in {Outcome.REACHED, Outcome.FINISHED, Outcome.IDLE, Outcome.STALLED}
+        return self in {Outcome.REACHED, Outcome.FINISHED, Outcome.STALLED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +114,7 @@ class MotionGuard:
         outcome: How it ended.
         detail: The same with figures, for a person; empty while it runs.
         travelled: Way of the joint so far, positive in the direction commanded.
+        needs_release: The key has to be released before it counts again.
     """
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
@@ -127,8 +128,8 @@ class MotionGuard:
         self.outcome = Outcome.RUNNING
         self.detail = ''
         self.travelled = 0.0
-        self._moving = False
-        self._needs_release = False
+        self._moving = self._has_begun = False
+        self.needs_release = False
         self._last = now
         self._idle_since = now
         self._progress = (now, 0.0)
@@ -136,12 +137,12 @@ class MotionGuard:
 
     @property
     def moving(self) -> bool:
-        """Whether the drive was told to move."""
+        """Whether the drive was ordered to move."""
         return self._moving
 
     def finish(self) -> Order:
-        """End it as the person wishes; what was seen is judged."""
-        return self._end(Outcome.FINISHED)
+        """End it as the person wishes; what was seen is judged, if it has moved at all."""
+        return self._end(Outcome.FINISHED if self._has_begun else Outcome.IDLE)
 
     def step(self, now: float, sample: Sample, *, held: bool, busy: bool) -> Order:
         """Take a sample; return what is to be done.
@@ -150,7 +151,7 @@ class MotionGuard:
             now: Time.
             sample: What the drives report.
             held: The person holds the key.
-            busy: The drive still carries out what was ordered last, so it is not told to go.
+            busy: The drive still carries out what was ordered last, so it is not ordered to go.
         """
         if self.outcome is not Outcome.RUNNING:
             return Order.END
@@ -160,13 +161,14 @@ class MotionGuard:
         )
         if (ended := self._ended(now, sample)) is not None:
             return self._end(*ended)
-        self._needs_release = held and (self._needs_release or gap > LOOP_GAP)
-        permitted = held and not self._needs_release
+        self.needs_release = held and (self.needs_release or gap > LOOP_GAP)
+        permitted = held and not self.needs_release
         if self._moving and not permitted:
             self._moving, self._idle_since = False, now
             return Order.HALT
         if permitted and not self._moving and not busy:
-            self._moving, self._progress = True, (now, self.travelled)
+            self._moving = self._has_begun = True
+            self._progress = (now, self.travelled)
             return Order.GO
         return Order.NONE
 
@@ -188,7 +190,8 @@ class MotionGuard:
         if abs(plan.target - sample.position) <= max(REACHED * abs(plan.distance), plan.increment):
             return Outcome.REACHED, ''
         if not self._moving:
-            return (Outcome.IDLE, '') if now - self._idle_since > IDLE_TIME else None
+            idle = now - self._idle_since > IDLE_TIME
+            return (Outcome.IDLE, f'for {IDLE_TIME:g} s') if idle else None
         since, before = self._progress
         if abs(self.travelled - before) > max(plan.increment, REACHED * abs(plan.distance)):
             self._progress = (now, self.travelled)

@@ -35,7 +35,7 @@ class Verdict(Enum):
 
     @property
     def wants_change(self) -> bool:
-        """Whether scales of bus.yml mend it."""
+        """Whether other scales in bus.yml correct it."""
         return self in {
             Verdict.WRONG_SIGN,
             Verdict.WRONG_SCALE,
@@ -115,7 +115,7 @@ class Judgement:
         sign: -1 where the scale has the wrong sign, else 1.
         measured: Seen over reported, without the sign; 1 where no distance was said.
         causes: Likely causes of a wrong scale, the nearest first; empty when no usual one fits.
-        remedy: What else to look at, in words; empty where a change of bus.yml mends it.
+        remedy: What else to look at, in words; empty where a change of bus.yml corrects it.
     """
 
     verdict: Verdict

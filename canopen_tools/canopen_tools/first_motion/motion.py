@@ -149,7 +149,7 @@ def _check(request: Request, drive: CanopenDrive, facts: AxisFacts, position: fl
     say(f'{drive.name}: {status.summary}')
     if status.faulted:
         say(f'  fault: {status.error or "no error code"}')
-        if not agrees('is its cause removed? reset the fault?'):
+        if not agrees('is its cause removed? reset the fault (it is enabled for a moment)?'):
             raise FirstMotionError(f'{drive.name} is faulted; remove the cause first')
         drive.recover()
         drive.disable()
@@ -282,6 +282,8 @@ class _GuardedMotion:
     def _status(self, kind: JointKind) -> str:
         guard = self._guard
         state = ('moving', Style.GREEN) if guard.moving else ('at rest', Style.YELLOW)
+        if guard.needs_release:
+            state = ('release the key: the program was held up', Style.RED)
         way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(guard.plan.distance))}'
         return status_text([state, (way, Style.PLAIN)], colour=self._colour)
 

@@ -57,7 +57,7 @@ def _once(request: Request, interruptions: Interruptions) -> int | None:
     judgement = _conclude(request, record)
     if judgement.verdict is Verdict.RIGHT:
         return 0
-    if not judgement.verdict.wants_change or not _mend(request, node, axis, record, judgement):
+    if not judgement.verdict.wants_change or not _correct(request, node, axis, record, judgement):
         return 1
     return None if agrees('repeat the motion?') else 1
 
@@ -112,7 +112,7 @@ def _conclude(request: Request, record: Record) -> Judgement:
     return judgement
 
 
-def _mend(
+def _correct(
     request: Request,
     node: NodeConfig,
     axis: DriveConfig,
