@@ -49,6 +49,7 @@ setup(
         'msgpack>=1.0.3',
         'python-can>=4.3',
         'PyYAML>=6',
+        sibling('libraries/black_box'),
         sibling('libraries/realtime_loop'),
         sibling('libraries/urdf_reader'),
     ],

@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 import re
 import socket
+from tempfile import TemporaryDirectory
 
 from dds_network import restrict_dds
 
@@ -19,6 +20,7 @@ DOMAINS = 100  # above, DDS ports run into the ephemeral ones
 RESERVATIONS = 24500  # a TCP port for each domain; who holds it has the domain
 
 _turn = itertools.count(os.getpid())
+_logs = TemporaryDirectory(prefix='ros_logs_')  # and what black boxes write
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,12 @@ class Isolation:
     @property
     def env(self) -> dict[str, str]:
         """Environment for the test's processes; bring-ups have no page in it."""
-        own = {'ROS_DOMAIN_ID': str(self.domain_id), 'PYTHONUNBUFFERED': '1', 'NO_VIEW': '1'}
+        own = {
+            'ROS_DOMAIN_ID': str(self.domain_id),
+            'PYTHONUNBUFFERED': '1',
+            'NO_VIEW': '1',
+            'ROS_LOG_DIR': _logs.name,
+        }
         env = os.environ | own
         restrict_dds(env)
         return env

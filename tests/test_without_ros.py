@@ -58,6 +58,7 @@ IMPORTED = [
     'quad_sim.env',
     'quad_sim.physics',
     'quad_teleop',
+    'black_box',
     'realtime_loop',
     'robot_viewer',
     'rosbag_files',

@@ -30,7 +30,11 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/node_runner']),
         ('share/node_runner', ['package.xml']),
     ],
-    install_requires=[sibling('libraries/dds_network'), sibling('libraries/realtime_loop')],
+    install_requires=[
+        sibling('libraries/black_box'),
+        sibling('libraries/dds_network'),
+        sibling('libraries/realtime_loop'),
+    ],
     extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named
     zip_safe=True,
     maintainer='The arm and quad developers',

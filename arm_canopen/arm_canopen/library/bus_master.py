@@ -11,6 +11,8 @@ from contextlib import suppress
 import struct
 import time
 
+from black_box import BlackBox, BlackBoxSettings
+
 from ..can.bus import Bus
 from ..can.frame import Frame
 from ..can.load import BusLoad
@@ -22,7 +24,7 @@ from ..cia402.state_machine import Command
 from ..cia402.stop_sequence import SHUTDOWN_MAX
 from ..config.model import BusConfig
 from ..exceptions import BusError, CanopenError, DriveError
-from ..master.events import Event, EventKind, Report
+from ..master.events import Event, EventKind, Report, Severity
 from ..master.network import Network
 from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
@@ -31,10 +33,13 @@ from ..master.scheduler import Scheduler
 from ..standard.cob_id import CobId
 from ..standard.objects import Index
 from ..standard.sdo import DownloadRequest
+from .bus_recording import BusRecording
 
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 QUICK_STOP = struct.pack('<H', Command.QUICK_STOP)
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
+NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED)
+"""A device that is absent is no fault of one in operation."""
 
 
 async def leave_device(
@@ -64,12 +69,19 @@ class BusMaster:
         thread: The thread of the cycle, which owns all of this once it was started.
         load: How busy the bus is.
         commands: Commands of the drives, by name.
+        black_box: Writes the last frames when a fault happens; None without.
         started: The cycle was started, so that the devices are ours to stop.
         on_operational: Called in the thread of the cycle when the last device has booted.
     """
 
     def __init__(
-        self, config: BusConfig, can: Bus, report: Report, *, beside_master: bool = False
+        self,
+        config: BusConfig,
+        can: Bus,
+        report: Report,
+        *,
+        beside_master: bool = False,
+        black_box: BlackBoxSettings | None = None,
     ) -> None:
         """Build it; nothing is sent before :meth:`start`.
 
@@ -78,14 +90,25 @@ class BusMaster:
             can: The open CAN interface; it stays the caller's to close.
             report: Takes events, in the thread of the cycle.
             beside_master: Start although another master is found, and command no device of its.
+            black_box: How the last frames are written when a fault happens; None for not at all.
         """
         self.config = config
         self.can = can
         self._report_event = report
         self._beside_master = beside_master
         self.load = BusLoad(config.master.bitrate, time.monotonic())
-        self.network = Network(config, self._send, self._report, beside_master=beside_master)
-        self.network.on_frame = self.load.count
+        self.black_box: BlackBox | None = None
+        self._transmit = self._send
+        receive = self.load.count
+        if black_box is not None:
+            recording = BusRecording(config, can.name, black_box.window)
+            self.black_box = BlackBox(f'can_{can.name}', recording, black_box)
+            self._transmit = recording.sending(self._send)
+            receive = recording.receiving(self.load.count)
+        self.network = Network(
+            config, self._transmit, self._report, beside_master=beside_master
+        )
+        self.network.on_frame = receive
         self.thread = NetworkThread(can, self.network)
         scheduler = self.network.scheduler
         drives = [
@@ -129,7 +152,15 @@ class BusMaster:
             begin: Called first in the thread of the cycle, which may want a priority.
         """
         self.started = True
+        if self.black_box is not None:
+            self.black_box.start()
         self.thread.start(begin)
+
+    def close(self) -> None:
+        """End the cycle, and write what the black box still has to write."""
+        self.thread.stop()
+        if self.black_box is not None:
+            self.black_box.close()
 
     def stop_drives(self) -> None:
         """Bring every drive to quick stop and disable it; the cycle goes on.
@@ -188,13 +219,15 @@ class BusMaster:
         Returns:
             What was sent, and to which drives it is all that stops them.
         """
+        if self.black_box is not None:
+            self.black_box.fault('', f'{OWNER} has ended by a defect')
         powered = [axis.drive for axis in self.commands.values() if not axis.drive.stop.disabled]
         for drive in powered:
             index = drive.objects.at(Index.CONTROLWORD)
             request = DownloadRequest(index, 0, QUICK_STOP)
             cob_id = CobId.SDO_REQUEST + drive.node.config.node_id
             with suppress(BusError):
-                self.can.send(Frame(cob_id, request.encode()))
+                self._transmit(Frame(cob_id, request.encode()))
         if not powered:
             return ''
         text = f'; quick stop sent to {", ".join(drive.name for drive in powered)}'
@@ -212,6 +245,10 @@ class BusMaster:
 
     def _report(self, event: Event) -> None:
         self._report_event(event)
+        if self.black_box is not None:
+            is_fault = event.severity is Severity.ERROR and event.kind not in NO_FAULTS
+            keep = self.black_box.fault if is_fault else self.black_box.note
+            keep(event.node, event.text)
         if event.kind is EventKind.HEARTBEAT_LOST:
             self._operational.discard(event.node)
         elif event.kind is EventKind.BOOT and event.node not in self._operational:

@@ -244,7 +244,7 @@ class CanopenMaster:
                 if self._master.started:
                     self._master.stop_drives()
             finally:
-                self._master.thread.stop()
+                self._master.close()
 
     def __enter__(self) -> Self:
         """Use it in a with statement."""

@@ -36,6 +36,7 @@ class BusStatus:
         receive_errors: Its receive error counter.
         error_frames: Number of its error frames.
         last_error: The last of them in words.
+        recording: Last file of the black box; empty before one.
     """
 
     name: str
@@ -50,22 +51,29 @@ class BusStatus:
     receive_errors: int = 0
     error_frames: int = 0
     last_error: str = ''
+    recording: str = ''
 
 
-def device_diagnostic(bus: str, status: NodeStatus) -> DiagnosticStatus:
-    """Describe a device that is no drive."""
+def device_diagnostic(bus: str, status: NodeStatus, recording: str = '') -> DiagnosticStatus:
+    """Describe a device that is no drive.
+
+    Args:
+        bus: Name of the CAN interface.
+        status: The device.
+        recording: Last file of the black box with a fault of it; empty before one.
+    """
     level, message = _device_level(status)
     return DiagnosticStatus(
         level=level,
         name=f'{status.name}: device',
         message=message,
         hardware_id=f'{bus}/{status.node_id}',
-        values=_values(_device_values(status)),
+        values=_values(_device_values(status) | {'black_box': recording}),
     )
 
 
-def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
-    """Describe a drive."""
+def drive_diagnostic(bus: str, status: DriveStatus, recording: str = '') -> DiagnosticStatus:
+    """Describe a drive; arguments as of :func:`device_diagnostic`."""
     level, message = _device_level(status.node)
     if level == DiagnosticStatus.OK:
         message = status.summary
@@ -92,6 +100,7 @@ def drive_diagnostic(bus: str, status: DriveStatus) -> DiagnosticStatus:
                 'velocity': f'{status.velocity:.6f}',
                 'setpoint': f'{status.setpoint:.6f}',
                 'following_error': f'{status.following_error:.6f}',
+                'black_box': recording,
             }
         ),
     )
@@ -128,6 +137,7 @@ def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
                 'receive_errors': str(status.receive_errors),
                 'error_frames': str(status.error_frames),
                 'last_error': status.last_error,
+                'black_box': status.recording,
             }
         ),
     )

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import sys
 import threading
 
+from black_box import BlackBoxSettings
 from rclpy.node import Node
 
 from node_runner import (
+    declare_black_box,
     declare_thread_priority,
     LINGER,
     log_as,
@@ -53,6 +55,9 @@ parameters:
   diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
   thread_priority     SCHED_FIFO priority of the thread of the cycle, 0 for none
                       (default {THREAD_PRIORITY})
+  black_box_window    what is written when a fault happens: the last [s] of the bus, 0 for nothing
+                      (default 60)
+  black_box_folder    where to (default ~/.ros/log/black_box, or where the logs of ROS go)
   beside_master       start although another master is on the bus (default false)
   master_config, master_bin
                       accepted for ros2_canopen; not needed
@@ -107,6 +112,7 @@ class Parameters:
         beside_master: Start although another master is found on the bus.
         robot_joint_states: Publish the joints of all drives as ``joint_states``.
         robot_description: URDF as XML text; empty to take it from the topic.
+        black_box: How the last frames are written when a fault happens; None for not at all.
     """
 
     bus_configs: list[str]
@@ -116,6 +122,7 @@ class Parameters:
     beside_master: bool
     robot_joint_states: bool
     robot_description: str
+    black_box: BlackBoxSettings | None
 
 
 def serve_buses(stop: threading.Event, extend: Extend | None = None) -> None:
@@ -160,6 +167,7 @@ def _make_process(config: BusConfig, can: Bus, stack: ExitStack) -> MasterProces
         diagnostics_period=parameters.diagnostics_period,
         thread_priority=parameters.thread_priority,
         beside_master=parameters.beside_master,
+        black_box=parameters.black_box,
     )
     if parameters.robot_joint_states:
         process.publish_robot_joint_states(parameters.robot_description)
@@ -268,6 +276,7 @@ def _declare(node: Node) -> Parameters:
         'URDF as XML text, for the order of joint_states and the joints that mimic others; '
         'without it, the topic robot_description',
     )
+    black_box = declare_black_box(read)
     refuse_misspelt(node)
     if not configs:
         raise CanopenError(
@@ -281,6 +290,7 @@ def _declare(node: Node) -> Parameters:
         beside_master,
         robot_joint_states,
         description,
+        black_box,
     )
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(

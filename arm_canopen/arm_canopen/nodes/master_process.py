@@ -9,6 +9,7 @@ from functools import partial
 import threading
 import time
 
+from black_box import BlackBoxSettings
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
@@ -51,6 +52,7 @@ class MasterProcess:
         diagnostics_period: float,
         thread_priority: int = 0,
         beside_master: bool = False,
+        black_box: BlackBoxSettings | None = None,
     ) -> None:
         """Build it; nothing is sent before :meth:`start`.
 
@@ -61,12 +63,15 @@ class MasterProcess:
             diagnostics_period: Time between two /diagnostics messages in [s].
             thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
             beside_master: Start although another master is found, and command no device of its.
+            black_box: How the last frames are written when a fault happens; None for not at all.
         """
         self.bus = config
         self._node = node
         self._output = OutputThread(node.get_logger())
         self._thread_priority = thread_priority
-        self._master = BusMaster(config, can, self._report, beside_master=beside_master)
+        self._master = BusMaster(
+            config, can, self._report, beside_master=beside_master, black_box=black_box
+        )
         self._master.on_operational = lambda: self._output.post(self._report_ready)
         self._network, self._thread = self._master.network, self._master.thread
         self._devices = {
@@ -135,7 +140,7 @@ class MasterProcess:
         finally:
             last = self._request_diagnostics()  # in which states the drives are left
             wait([last], LAST_DIAGNOSTICS_TIMEOUT)
-            self._thread.stop()
+            self._master.close()
             self._output.stop()
 
     def publish_robot_joint_states(self, description: str) -> None:
@@ -178,7 +183,7 @@ class MasterProcess:
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
         controller = self._network.controller
-        status = BusStatus(
+        bus = BusStatus(
             self._master.can.name,
             self._master.can.counters,
             self._master.load.figures(now),
@@ -191,16 +196,28 @@ class MasterProcess:
             controller.receive_errors,
             controller.error_frames,
             controller.last_error,
+            self._recording(),
         )
-        statuses = [bus_diagnostic(self._node.get_name(), status)]
+        statuses = [bus_diagnostic(self._node.get_name(), bus)]
         for device in self._network.nodes.values():
             services = self._drives.get(device.name)
             if services is None:
-                statuses.append(device_diagnostic(self._master.can.name, node_status(device, now)))
+                status = node_status(device, now)
+                recording = self._recording(device.name)
+                statuses.append(device_diagnostic(self._master.can.name, status, recording))
                 continue
             drives = [drive_status(axis, now) for axis in services.axes]
-            statuses += [drive_diagnostic(self._master.can.name, drive) for drive in drives]
+            recording = self._recording(device.name)
+            statuses += [
+                drive_diagnostic(self._master.can.name, drive, recording) for drive in drives
+            ]
         return statuses
+
+    def _recording(self, device: str = '') -> str:
+        """Return the last file of the black box, of a device or of any; empty before one."""
+        box = self._master.black_box
+        path = None if box is None else box.recording_of(device) if device else box.last
+        return '' if path is None else str(path)
 
     def _log_event(self, event: Event) -> None:
         logger = self._node.get_logger()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node's program has to do, once: start, end, and refuse parameters with words."""
 
+from .black_box_parameters import declare_black_box
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .exceptions import ParameterError
 from .joining import init_ros
@@ -22,6 +23,7 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
+    'declare_black_box',
     'declare_given',
     'declare_thread_priority',
     'destroyed_if_refused',

@@ -1,0 +1,109 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The last frames of a bus in a fixed piece of memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import struct
+from typing import NamedTuple
+
+from .frame import Frame
+
+_RECORD = struct.Struct('<dIB8s')  # time, identifier with flags, length with direction, data
+RECORD_SIZE = _RECORD.size  # [byte]
+_EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
+_IDENTIFIER = 0x1FFF_FFFF
+_LENGTH = 0x0F
+_CHUNK = 64  # records that are copied at once
+
+
+class RecordedFrame(NamedTuple):
+    """A frame of the ring.
+
+    Attributes:
+        frame: The frame, with its steady time in [s] also when it was sent.
+        sent: This process sent it; otherwise it was received.
+    """
+
+    frame: Frame
+    sent: bool
+
+
+class FrameRing:
+    """Keeps the last frames; the oldest make room for new ones.
+
+    Frames are packed into one block of bytes: no object of a frame outlives it, so that the
+    garbage collector has nothing to look at, however many there are. One thread records, any other
+    one may read meanwhile; nothing is locked.
+
+    Attributes:
+        SENT: Direction of a frame that this process has sent.
+        capacity: How many frames it holds.
+        count: How many were recorded since the start.
+    """
+
+    SENT = 0x80
+
+    def __init__(self, capacity: int) -> None:
+        """Take the memory.
+
+        Args:
+            capacity: How many frames it holds, of :data:`RECORD_SIZE` each.
+
+        Raises:
+            ValueError: It holds none.
+        """
+        if capacity < 1:
+            raise ValueError(f'a ring of {capacity} frames holds nothing')
+        self.capacity = capacity
+        self.count = 0
+        self._places = capacity + 1  # one is being written while others are read
+        self._end = self._places * RECORD_SIZE
+        self._memory = bytearray(self._end)
+        self._at = 0  # [byte] where the next one goes
+
+    def record(self, frame: Frame, timestamp: float, direction: int = 0) -> None:
+        """Keep a frame.
+
+        Args:
+            frame: A classic CAN frame.
+            timestamp: Its steady time in [s].
+            direction: 0 for a frame that was received, :attr:`SENT` for one that was sent.
+        """
+        can_id, data, _, is_extended, is_remote, is_error = frame
+        if is_extended or is_remote or is_error:
+            can_id |= _EXTENDED * is_extended | _REMOTE * is_remote | _ERROR * is_error
+        at = self._at
+        _RECORD.pack_into(self._memory, at, timestamp, can_id, len(data) | direction, data)
+        at += RECORD_SIZE
+        self._at = at if at < self._end else 0
+        self.count += 1
+
+    def chunks(self) -> Iterator[list[RecordedFrame]]:
+        """Yield what is there now, the oldest first, a few at once.
+
+        Frames whose place is taken by newer ones while this is read are left out.
+        """
+        end = self.count
+        number = max(0, end - self.capacity)
+        while number < end:
+            place = number % self._places
+            size = min(_CHUNK, end - number, self._places - place)
+            start = place * RECORD_SIZE
+            copied = bytes(self._memory[start : start + size * RECORD_SIZE])
+            overtaken = max(0, self.count - self.capacity - number)
+            yield [_unpack(*record) for record in _RECORD.iter_unpack(copied)][overtaken:]
+            number += size
+
+
+def _unpack(timestamp: float, can_id: int, length: int, data: bytes) -> RecordedFrame:
+    frame = Frame(
+        can_id & _IDENTIFIER,
+        data[: length & _LENGTH],
+        timestamp,
+        bool(can_id & _EXTENDED),
+        bool(can_id & _REMOTE),
+        bool(can_id & _ERROR),
+    )
+    return RecordedFrame(frame, bool(length & FrameRing.SENT))

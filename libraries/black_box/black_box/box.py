@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Writes what was kept in memory into a folder, some seconds after a fault, in its own thread."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+import logging
+import os
+from pathlib import Path
+from queue import Empty, SimpleQueue
+import re
+import shutil
+import threading
+import time
+from typing import Protocol, TypeAlias
+
+from .settings import BlackBoxSettings
+
+REPORT = 'report.txt'
+NOTES = 2000  # lines of what was reported that are kept at most
+BREATH = 1e-3  # [s] in which other threads get the interpreter
+CLOSE_TIMEOUT = 10.0  # [s] for what is still to be written when the program ends
+_PARTIAL = '.partial'
+
+logger = logging.getLogger(__name__)
+
+Pause: TypeAlias = Callable[[], None]
+"""Called after each small piece of work; lets other threads have the interpreter."""
+
+
+class Contents(Protocol):
+    """What a black box holds, besides what was reported."""
+
+    @property
+    def about(self) -> str:
+        """What it is of, in a line or some."""
+
+    def save(self, folder: Path, pause: Pause) -> Path:
+        """Write it; called in the thread of the black box.
+
+        Args:
+            folder: An empty folder.
+            pause: To be called after each small piece of work.
+
+        Returns:
+            The file that people want to open first.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+
+    def usage(self, path: Path) -> str:
+        """Return the command that shows the file that people want to open first."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Note:
+    """Something that was reported; the time is steady, in [s]."""
+
+    time: float
+    subject: str
+    text: str
+
+    @property
+    def line(self) -> str:
+        return f'{self.subject}: {self.text}' if self.subject else self.text
+
+
+class BlackBox:
+    """Waits for faults, and writes a folder for each, or for several that come together.
+
+    What reports a fault never waits: not for the disk, and not for a lock. A disk that is full or
+    a folder that cannot be made is a warning, and harms nothing else.
+
+    Attributes:
+        last: File of the last recording that people want to open first; None before one.
+    """
+
+    def __init__(self, name: str, contents: Contents, settings: BlackBoxSettings) -> None:
+        """Prepare; nothing is written before :meth:`start`.
+
+        Args:
+            name: What it is of, for the names of its folders.
+            contents: What it holds.
+            settings: How it behaves.
+        """
+        self.last: Path | None = None
+        self._name = re.sub(r'[^A-Za-z0-9.-]+', '_', name).strip('_.') or 'fault'
+        self._contents = contents
+        self._settings = settings
+        self._notes: deque[_Note] = deque(maxlen=NOTES)
+        self._by_subject: dict[str, Path] = {}
+        self._faults: SimpleQueue[_Note | None] = SimpleQueue()
+        self._written_at = -settings.pause
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name='black box', daemon=True)
+
+    def start(self) -> None:
+        """Start its thread."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Write what is still to be written, at once, and end; never raises."""
+        self._closing = True
+        self._faults.put(None)
+        if self._thread.is_alive():
+            self._thread.join(CLOSE_TIMEOUT)
+
+    def note(self, subject: str, text: str) -> None:
+        """Keep what was reported, for the report of a fault that comes later.
+
+        Args:
+            subject: Name of the device concerned; empty for none.
+            text: What was reported.
+        """
+        self._notes.append(_Note(time.monotonic(), subject, text))
+
+    def fault(self, subject: str, text: str) -> None:
+        """Have a recording written for a fault; returns at once.
+
+        Args:
+            subject: Name of the device that has it; empty for none.
+            text: The fault in words.
+        """
+        note = _Note(time.monotonic(), subject, text)
+        self._notes.append(note)
+        self._faults.put(note)
+
+    def recording_of(self, subject: str) -> Path | None:
+        """Return the file of the last recording with a fault of a device; None before one."""
+        return self._by_subject.get(subject)
+
+    def _run(self) -> None:
+        while (fault := self._faults.get()) is not None:
+            faults = [fault]
+            due = max(fault.time + self._settings.after, self._written_at + self._settings.pause)
+            ended = self._collect(faults, due)
+            try:
+                self._write(faults)
+            except OSError as error:
+                logger.warning(
+                    'the black box cannot be written to %s: %s; the fault was: %s. Make room, or '
+                    'choose another folder by the parameter black_box_folder',
+                    self._settings.folder,
+                    error,
+                    fault.line,
+                )
+            except Exception:
+                logger.exception('a defect in the black box of %s', self._name)
+            self._written_at = time.monotonic()
+            if ended:
+                return
+
+    def _collect(self, faults: list[_Note], due: float) -> bool:
+        """Wait until a recording is due, for other faults too; return whether it is the last."""
+        while (left := due - time.monotonic()) > 0.0:
+            try:
+                fault = self._faults.get(timeout=left)
+            except Empty:
+                return False
+            if fault is None:
+                return True
+            faults.append(fault)
+        return False
+
+    def _write(self, faults: list[_Note]) -> None:
+        settings = self._settings
+        settings.folder.mkdir(parents=True, exist_ok=True)
+        now = time.time()
+        stamp = time.strftime('%Y-%m-%dT%H-%M-%S', time.localtime(now))
+        final = _unused(settings.folder / f'{self._name}_{stamp}.{int(now % 1.0 * 1000):03d}')
+        partial = settings.folder / f'{final.name}{_PARTIAL}'
+        try:
+            partial.mkdir()
+            main = self._contents.save(partial, self._pause)
+            opened = final / main.name
+            (partial / REPORT).write_text(self._report(faults, opened), encoding='utf-8')
+            partial.rename(final)
+        except BaseException:
+            shutil.rmtree(partial, ignore_errors=True)
+            raise
+        self.last = opened
+        for fault in faults:
+            if fault.subject:
+                self._by_subject[fault.subject] = opened
+        more = f', and {len(faults) - 1} more' if len(faults) > 1 else ''
+        logger.warning('black box: %s (%s%s)', opened, faults[0].line, more)
+        self._remove_old(final)
+
+    def _pause(self) -> None:
+        if not self._closing:  # then no cycle needs the interpreter any more
+            time.sleep(BREATH)
+
+    def _report(self, faults: list[_Note], opened: Path) -> str:
+        begin = faults[0].time - self._settings.window
+        offset = time.time() - time.monotonic()
+        lines = [self._contents.about, '', 'faults:']
+        lines += [_line(fault, offset) for fault in faults]
+        lines += ['', 'reported:']
+        lines += [_line(note, offset) for note in tuple(self._notes) if note.time >= begin]
+        lines += ['', 'to look at it:', f'  {self._contents.usage(opened)}', '']
+        return '\n'.join(lines)
+
+    def _remove_old(self, newest: Path) -> None:
+        """Remove recordings beyond those that are kept, and what a killed program has left."""
+        own = re.compile(rf'{re.escape(self._name)}_\d{{4}}-\d\d-\d\dT[0-9-]{{8}}\.\d{{3}}(-\d+)?')
+        found = []
+        for path in self._settings.folder.iterdir():
+            if own.fullmatch(path.name.removesuffix(_PARTIAL)) and path != newest:
+                found.append(path)
+        kept = self._settings.kept - 1
+        for path in sorted(found, key=_age)[kept:]:
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _age(path: Path) -> float:
+    with suppress(OSError):
+        return -os.stat(path).st_mtime
+    return 0.0
+
+
+def _unused(path: Path) -> Path:
+    """Return the path, or one with a number behind where there is something already."""
+    candidate, number = path, 1
+    while candidate.exists():
+        number += 1
+        candidate = path.with_name(f'{path.name}-{number}')
+    return candidate
+
+
+def _line(note: _Note, offset: float) -> str:
+    wall = note.time + offset
+    clock = time.strftime('%Y-%m-%d %H:%M:%S', time.localtime(wall))
+    return f'  {clock}.{int(wall % 1.0 * 1000):03d}  {note.line}'
