@@ -13,6 +13,7 @@ FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 EXECUTABLES = [
     'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
     'master = arm_canopen.nodes.master:main',
+    'replay = arm_canopen.nodes.replay:main',
     # names of before that keep working; the programs are those of canopen_tools and _sim
     'candump = arm_canopen.aliases:candump',
     'canopen = arm_canopen.aliases:canopen',

@@ -10,7 +10,6 @@ import signal
 import time
 from typing import TYPE_CHECKING
 
-from arm_msgs.srv import InjectFault
 from bus_recorder import BusRecorder
 import can
 from diagnostic_msgs.msg import DiagnosticArray
@@ -19,6 +18,7 @@ from simulated_arm import SimulatedArm
 
 from arm_canopen.can.frame_log import read_log
 from arm_canopen.standard.cob_id import CobId
+from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -69,7 +69,7 @@ def test_a_fault_is_written_with_what_came_before_and_after(
         recorder.pause()
 
     ours = list(read_log(path))
-    emergency = CobId.EMERGENCY + FAULTY
+    emergency = CobId.EMCY + FAULTY
     (raised,) = [
         number
         for number, frame in enumerate(ours)

@@ -9,7 +9,6 @@ from pathlib import Path
 import threading
 import time
 
-from black_box import BlackBox, BlackBoxSettings
 import can
 from can_strategies import frames
 from config_samples import write_bus
@@ -22,6 +21,7 @@ from arm_canopen.can import Frame
 from arm_canopen.can.frame_log import read_log
 from arm_canopen.can.frame_ring import FrameRing
 from arm_canopen.library.bus_recording import BusRecording
+from black_box import BlackBox, BlackBoxSettings
 
 SENT = FrameRing.SENT
 error_frames = st.tuples(st.integers(1, 0x1FFF_FFFF), st.binary(max_size=8)).map(

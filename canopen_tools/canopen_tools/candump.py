@@ -21,11 +21,11 @@ from time import monotonic, time
 from types import FrameType
 
 from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.can.frame_log import LogWriter, read_log
 from arm_canopen.config import load_bus
 from arm_canopen.config.model import BusConfig
 from arm_canopen.exceptions import CanopenError
 
-from arm_canopen.can.frame_log import LogWriter, read_log
 from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle
 from .ros_arguments import split_ros_arguments

@@ -19,9 +19,9 @@ import pytest
 from tool_environment import ENVIRONMENT
 
 from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen.can.frame_log import LogWriter, read_log
 from arm_canopen.exceptions import BusError
 from canopen_tools import candump
-from arm_canopen.can.frame_log import LogWriter, read_log
 
 pytestmark = pytest.mark.slow
 

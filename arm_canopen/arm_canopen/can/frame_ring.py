@@ -15,7 +15,7 @@ RECORD_SIZE = _RECORD.size  # [byte]
 _EXTENDED, _REMOTE, _ERROR = 0x8000_0000, 0x4000_0000, 0x2000_0000
 _IDENTIFIER = 0x1FFF_FFFF
 _LENGTH = 0x0F
-_CHUNK = 64  # records that are copied at once
+_CHUNK = 32  # records that are copied at once
 
 
 class RecordedFrame(NamedTuple):

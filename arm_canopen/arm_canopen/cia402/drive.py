@@ -12,8 +12,7 @@ from ..master.events import EventKind, Severity
 from ..master.process_image import SentRpdo
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler, Task
-from ..standard.drive import DriveState, mode_title, OperationMode, Statusword, statusword_text
-from ..standard.emcy import error_code_text
+from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_control import DriveControl
 from .drive_view import DriveView, FAULTY, POWERED
@@ -29,7 +28,6 @@ from .target_limits import check_setpoint
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
 POSITION_AGE_MAX = 0.25  # [s] of a position at which an axis may be held
-EMCY_AGE_MAX = 0.2  # [s] of an EMCY that came with a fault
 UNSEEN_STOP_TIME = 1.0  # [s] in which a motion source may lead a silent drive to rest on its path
 
 
@@ -98,30 +96,7 @@ class Drive:
 
     def describe(self) -> str:
         """Describe the drive in a sentence."""
-        node, view = self.node, self.view
-        if not node.online:
-            detail = f' ({node.phase_detail})' if node.phase_detail else ''
-            loss = f'; lost before: {node.loss}' if node.loss else ''
-            return f'offline: {node.phase.value}{detail}{loss}'
-        parts = ['no statusword yet']
-        if view.state is not DriveState.UNKNOWN:
-            parts = [
-                statusword_text(view.statusword),
-                f'mode {mode_title(self.objects.mode_display)}',
-            ]
-            if not view.fresh:
-                parts.append(f'no TPDOs for {view.age:.1f} s')
-        if self.control.halted:
-            parts.append('halted')
-        if view.error:
-            parts.append(f'error {view.error}')
-        if self.failure:
-            parts.append(f'the master stopped it: {self.failure}')
-        if node.emergencies.last is not None:
-            parts.append(f'EMCY {node.emergencies.last}')
-        if node.left_operational and node.nmt_state is not None:
-            parts.append(f'NMT state {node.nmt_state.name}: start it by NMT')
-        return '; '.join(parts)
+        return self.view.describe(halted=self.control.halted, failure=self.failure)
 
     def report(self, severity: Severity, text: str) -> None:
         """Report something about this drive to the owner of the network."""
@@ -342,7 +317,7 @@ class Drive:
             control.halt.release()
         if view.state in FAULTY and before not in FAULTY:
             control.goal = DriveState.SWITCH_ON_DISABLED
-            view.error = self._error_of_emcy()
+            view.error = view.error_of_emcy()
             self.released(Refusal(RefusalCause.FAULT, view.error))
             self._scheduler.background(self._report_fault())
         elif left and control.goal is DriveState.OPERATION_ENABLED:
@@ -363,11 +338,6 @@ class Drive:
             f'left Operation enabled by itself: {self.describe()}; {cause} Enable it again when '
             'it is safe',
         )
-
-    def _error_of_emcy(self) -> str:
-        """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
-        emergency = self.node.emergencies.since(self._scheduler.now - EMCY_AGE_MAX)
-        return '' if emergency is None else error_code_text(emergency.code)
 
     async def _report_fault(self) -> None:
         await self.view.read_error_code()

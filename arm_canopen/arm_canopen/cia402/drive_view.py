@@ -11,7 +11,7 @@ from ..config.model.drive import DriveConfig
 from ..exceptions import CodecError, DriveError, SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Scheduler
-from ..standard.drive import drive_state, DriveState
+from ..standard.drive import drive_state, DriveState, mode_title, statusword_text
 from ..standard.emcy import error_code_text
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
@@ -22,6 +22,7 @@ from .units import clamp, INT16_MAX, INT32_MAX, Units
 from .velocity_estimate import VelocityEstimate
 
 FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
+EMCY_AGE_MAX = 0.2  # [s] of an EMCY that came with a fault
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which it may move under power, and falls or coasts when that goes."""
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
@@ -133,6 +134,43 @@ class DriveView:
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
         return self.state is not DriveState.UNKNOWN and self.cache.known and self.fresh
+
+    def error_of_emcy(self) -> str:
+        """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
+        emergency = self.node.emergencies.since(self._scheduler.now - EMCY_AGE_MAX)
+        return '' if emergency is None else error_code_text(emergency.code)
+
+    def describe(self, *, halted: bool = False, failure: str = '') -> str:
+        """Describe the axis in a sentence.
+
+        Args:
+            halted: The master halts it.
+            failure: Why the master stopped it; else empty.
+        """
+        node = self.node
+        if not node.online:
+            detail = f' ({node.phase_detail})' if node.phase_detail else ''
+            loss = f'; lost before: {node.loss}' if node.loss else ''
+            return f'offline: {node.phase.value}{detail}{loss}'
+        parts = ['no statusword yet']
+        if self.state is not DriveState.UNKNOWN:
+            parts = [
+                statusword_text(self.statusword),
+                f'mode {mode_title(self.objects.mode_display)}',
+            ]
+            if not self.fresh:
+                parts.append(f'no TPDOs for {self.age:.1f} s')
+        if halted:
+            parts.append('halted')
+        if self.error:
+            parts.append(f'error {self.error}')
+        if failure:
+            parts.append(f'the master stopped it: {failure}')
+        if node.emergencies.last is not None:
+            parts.append(f'EMCY {node.emergencies.last}')
+        if node.left_operational and node.nmt_state is not None:
+            parts.append(f'NMT state {node.nmt_state.name}: start it by NMT')
+        return '; '.join(parts)
 
     async def read_error_code(self) -> None:
         """Read 0x603F, so that the answer can name the error."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..master.status import node_status, NodeStatus
 from ..standard.drive import DriveState, mode_title, Statusword, statusword_text
 from .drive import Drive
-from .drive_view import FAULTY
+from .drive_view import DriveView, FAULTY
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,21 +63,50 @@ def drive_status(drive: Drive, now: float) -> DriveStatus:
         drive: The drive.
         now: Steady time in [s].
     """
-    word = drive.view.statusword
-    return DriveStatus(
-        name=drive.name,
-        node=node_status(drive.node, now),
-        state=drive.view.state,
-        mode=mode_title(drive.objects.mode_display),
-        statusword=statusword_text(word),
-        warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
-        error=drive.view.error,
-        failure=drive.failure,
-        fresh=drive.view.fresh,
-        age=drive.view.age,
-        position=drive.view.position,
-        velocity=drive.view.velocity,
+    return axis_status(
+        drive.view,
+        now,
         setpoint=drive.control.setpoint,
         following_error=drive.following_error,
+        failure=drive.failure,
         summary=drive.describe(),
+    )
+
+
+def axis_status(
+    view: DriveView,
+    now: float,
+    *,
+    setpoint: float,
+    following_error: float,
+    failure: str = '',
+    summary: str = '',
+) -> DriveStatus:
+    """Take a snapshot of an axis, whoever commands it.
+
+    Args:
+        view: Its state.
+        now: Steady time in [s].
+        setpoint: Position last commanded in user units.
+        following_error: Set-point that was sent before the position was measured, minus that.
+        failure: Why the master stopped it; else empty.
+        summary: All of it in a sentence; without one, that of the view.
+    """
+    word = view.statusword
+    return DriveStatus(
+        name=view.name,
+        node=node_status(view.node, now),
+        state=view.state,
+        mode=mode_title(view.objects.mode_display),
+        statusword=statusword_text(word),
+        warning=bool(word & (Statusword.WARNING | Statusword.INTERNAL_LIMIT)),
+        error=view.error,
+        failure=failure,
+        fresh=view.fresh,
+        age=view.age,
+        position=view.position,
+        velocity=view.velocity,
+        setpoint=setpoint,
+        following_error=following_error,
+        summary=summary or view.describe(),
     )

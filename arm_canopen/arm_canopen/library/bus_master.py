@@ -98,16 +98,14 @@ class BusMaster:
         self._beside_master = beside_master
         self.load = BusLoad(config.master.bitrate, time.monotonic())
         self.black_box: BlackBox | None = None
-        self._transmit = self._send
-        receive = self.load.count
+        self._transmit: Callable[[Frame], None] = self._send
+        receive: Callable[[Frame], None] = self.load.count
         if black_box is not None:
             recording = BusRecording(config, can.name, black_box.window)
             self.black_box = BlackBox(f'can_{can.name}', recording, black_box)
             self._transmit = recording.sending(self._send)
             receive = recording.receiving(self.load.count)
-        self.network = Network(
-            config, self._transmit, self._report, beside_master=beside_master
-        )
+        self.network = Network(config, self._transmit, self._report, beside_master=beside_master)
         self.network.on_frame = receive
         self.thread = NetworkThread(can, self.network)
         scheduler = self.network.scheduler

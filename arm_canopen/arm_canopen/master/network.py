@@ -54,6 +54,7 @@ class Network:
             drives have taken.
         next_update: When :meth:`update` is due in [s]; infinite when it is done in this cycle.
         on_frame: Called with each received frame, for statistics.
+        on_node_lost: Called with a device that shows no sign of life any more; boots it again.
         send: Sends a frame; a bus that refuses it is reported once until it works again.
         missed_pdos: TPDOs that did not answer a SYNC, over all devices.
         controller: The CAN controller as its error frames show it.
@@ -117,6 +118,7 @@ class Network:
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
+        self.on_node_lost: Callable[[RemoteNode], None] = self._boots.start
         self._unconfigured_clients: dict[int, SdoClient] = {}
         self._handlers = dict(
             self._connect(OtherMasterWatch(config, report, expected=beside_master))
@@ -160,7 +162,7 @@ class Network:
 
     def _watch(self, now: float, node: RemoteNode) -> None:
         if node.watch(now):
-            self._boots.start(node)
+            self.on_node_lost(node)
 
     def sync(self) -> None:
         """Send SYNC at its deadline; nothing that takes time stands before it."""

@@ -163,7 +163,7 @@ class RemoteNode:
         self.wanted = COMMANDED_STATES.get(command)
         self._commanded = command
         self._commanded_at = self._scheduler.now
-        if self.wanted is not None and self.wanted is not self.nmt_state and self._is_mute:
+        if self.wanted is not None and self.wanted is not self.nmt_state and self.is_mute:
             self._nmt_state_changed(self.wanted)
 
     def go_online(self, now: float, *, taken_over: bool = False) -> None:
@@ -252,7 +252,7 @@ class RemoteNode:
         return self._commanded in RESETS and recent
 
     @property
-    def _is_mute(self) -> bool:
+    def is_mute(self) -> bool:
         """Whether it never sends its NMT state, so that it counts as in the commanded one."""
         return not self.config.heartbeat_producer and not self.config.uses_node_guarding
 

@@ -112,6 +112,19 @@ class RemoteObjects:
                 entry.timestamp = self._scheduler.now
             await self._scheduler.timer(period)
 
+    def note_value(self, index: int, subindex: int, data: bytes) -> None:
+        """Take the value of an object that somebody else has read; of use where it is polled."""
+        entry = self._polled.get((index, subindex))
+        listed = self.config.dictionary.get(index, subindex)
+        if entry is None or listed is None:
+            return
+        try:
+            value = decode(listed.data_type, data)
+        except CodecError:
+            return
+        entry.value = value if isinstance(value, (int, float)) else None
+        entry.timestamp = self._scheduler.now
+
     def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
         """Return the entry of an object in the EDS.
 

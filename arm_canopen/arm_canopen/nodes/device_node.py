@@ -13,30 +13,21 @@ from canopen_interfaces.msg import COData
 from canopen_interfaces.srv import CORead, COWrite
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
-from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from node_runner import destroyed_when_refused, LATCHED
+from node_runner import destroyed_when_refused
 
 from ..exceptions import CanopenError, SdoError
-from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes, raw_from_number
-from ..master.process_image import ReceivedTpdo
+from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.dictionary import object_address
-from ..standard.nmt import NmtCommand, NmtState
+from ..standard.nmt import NmtCommand
 from .deferred_service import DeferredServices
+from .device_topics import DeviceTopics, node_options
 from .object_services import ObjectServices
 from .output_thread import OutputThread
-
-NMT_STATE_WORDS: dict[NmtState, str] = {
-    NmtState.BOOT_UP: 'BOOTUP',
-    NmtState.PRE_OPERATIONAL: 'PREOP',
-    NmtState.OPERATIONAL: 'START',
-    NmtState.STOPPED: 'STOP',
-}
-"""The states of ~/nmt_state, in ros2_canopen's words; ERROR stands for a device that was lost."""
 
 NMT_SERVICES: dict[str, NmtCommand] = {
     'nmt_start_node': NmtCommand.START,
@@ -54,6 +45,7 @@ class DeviceNode(Node):
     Attributes:
         device: The device.
         output: The thread that publishes and answers.
+        topics: What it publishes.
         admit: Called before every request; raises CanopenError when none is taken at the moment.
     """
 
@@ -67,13 +59,7 @@ class DeviceNode(Node):
             output: The thread that publishes and answers.
         """
         config = device.config
-        remappings = [f'{old}:={new}' for old, new in config.remappings.items()]
-        arguments = [word for rule in remappings for word in ('-r', rule)]
-        super().__init__(
-            config.name,
-            namespace=config.namespace or None,
-            cli_args=['--ros-args', *arguments] if arguments else None,
-        )
+        super().__init__(config.name, **node_options(config))
         self.device = device
         self.output = output
         self._thread = thread
@@ -81,8 +67,7 @@ class DeviceNode(Node):
         self._deferred = DeferredServices(output)
         fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
         self.declare_parameter('node_id', config.node_id, fixed, ignore_override=True)
-        self._nmt_state = self.create_publisher(String, '~/nmt_state', LATCHED)
-        self._rpdo = self.create_publisher(COData, '~/rpdo', 10)
+        self.topics = DeviceTopics(self, device, output)
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
@@ -128,27 +113,6 @@ class DeviceNode(Node):
                 self.get_logger().warning(f'{name}: {error}')
 
         self.offer(Trigger, name, lambda request: handler(), respond)
-
-    def publish_nmt_state(self) -> None:
-        """Publish the NMT state; called when it changes."""
-        state = self.device.nmt_state
-        self._nmt_state.publish(String(data='ERROR' if state is None else NMT_STATE_WORDS[state]))
-
-    def update_listeners(self) -> None:
-        """Publish each received object on ~/rpdo while somebody listens, and only then."""
-        listened = self._rpdo.get_subscription_count() > 0
-        listener = self._received if listened else None
-        for entry in self.device.image.tpdos:
-            entry.listener = listener
-
-    def _received(self, entry: ReceivedTpdo) -> None:
-        values = entry.values or ()
-        self.output.post_stream(entry, partial(self._publish_objects, entry, values))
-
-    def _publish_objects(self, entry: ReceivedTpdo, values: tuple[float, ...]) -> None:
-        for mapped, value in zip(entry.config.mapping, values, strict=True):
-            data = raw_from_number(mapped, value)
-            self._rpdo.publish(COData(index=mapped.index, subindex=mapped.subindex, data=data))
 
     def _write_pdo(self, message: COData) -> None:
         try:

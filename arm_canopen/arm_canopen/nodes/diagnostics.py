@@ -12,6 +12,7 @@ from ..can.bus import BusCounters
 from ..can.error_frames import ControllerState
 from ..can.load import LoadFigures
 from ..cia402.status import DriveStatus
+from ..master.network import Network
 from ..master.statistics import CycleFigures
 from ..master.status import NodeStatus
 from ..standard.drive import DriveState
@@ -52,6 +53,43 @@ class BusStatus:
     error_frames: int = 0
     last_error: str = ''
     recording: str = ''
+
+
+def bus_status(
+    name: str,
+    counters: BusCounters,
+    load: LoadFigures,
+    cycle: CycleFigures,
+    *,
+    network: Network,
+    recording: str,
+) -> BusStatus:
+    """Take a snapshot of a bus.
+
+    Args:
+        name: Name of the CAN interface.
+        counters: Frames so far.
+        load: Frames per second and load.
+        cycle: Figures of the SYNC cycle.
+        network: Its devices.
+        recording: Last file of the black box; empty before one.
+    """
+    controller = network.controller
+    return BusStatus(
+        name,
+        counters,
+        load,
+        cycle,
+        network.missed_pdos,
+        network.late_pdos,
+        network.unknown_frames,
+        controller.state,
+        controller.transmit_errors,
+        controller.receive_errors,
+        controller.error_frames,
+        controller.last_error,
+        recording,
+    )
 
 
 def device_diagnostic(bus: str, status: NodeStatus, recording: str = '') -> DiagnosticStatus:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import sys
 import threading
 
-from black_box import BlackBoxSettings
 from rclpy.node import Node
 
+from black_box import BlackBoxSettings
 from node_runner import (
     declare_black_box,
     declare_thread_priority,

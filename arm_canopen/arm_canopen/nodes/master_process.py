@@ -9,10 +9,10 @@ from functools import partial
 import threading
 import time
 
-from black_box import BlackBoxSettings
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
+from black_box import BlackBoxSettings
 from node_runner import notify_ready, raise_thread_priority
 
 from ..can.bus import Bus
@@ -21,10 +21,11 @@ from ..cia402.status import drive_status
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..library.bus_master import BusMaster
-from ..master.events import Event, EventKind, Severity
+from ..master.events import Event
 from ..master.status import node_status
 from .device_node import DeviceNode
-from .diagnostics import bus_diagnostic, BusStatus, device_diagnostic, drive_diagnostic
+from .device_topics import log_bus_event
+from .diagnostics import bus_diagnostic, bus_status, device_diagnostic, drive_diagnostic
 from .drive_services import DriveServices
 from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
@@ -182,21 +183,13 @@ class MasterProcess:
 
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
-        controller = self._network.controller
-        bus = BusStatus(
+        bus = bus_status(
             self._master.can.name,
             self._master.can.counters,
             self._master.load.figures(now),
             self._thread.figures(),
-            self._network.missed_pdos,
-            self._network.late_pdos,
-            self._network.unknown_frames,
-            controller.state,
-            controller.transmit_errors,
-            controller.receive_errors,
-            controller.error_frames,
-            controller.last_error,
-            self._recording(),
+            network=self._network,
+            recording=self._recording(),
         )
         statuses = [bus_diagnostic(self._node.get_name(), bus)]
         for device in self._network.nodes.values():
@@ -220,18 +213,10 @@ class MasterProcess:
         return '' if path is None else str(path)
 
     def _log_event(self, event: Event) -> None:
-        logger = self._node.get_logger()
-        if event.severity is Severity.INFO and event.kind is EventKind.NMT_STATE:
-            logger.debug(str(event))  # ~/nmt_state has it
-        elif event.severity is Severity.INFO:
-            logger.info(str(event))
-        elif event.severity is Severity.WARNING:
-            logger.warning(str(event))
-        else:
-            logger.error(str(event))
+        log_bus_event(self._node, event)
         node = self._devices.get(event.node)
-        if node is not None and event.kind in (EventKind.NMT_STATE, EventKind.HEARTBEAT_LOST):
-            node.publish_nmt_state()
+        if node is not None:
+            node.topics.take_event(event)
 
     def _report_ready(self) -> None:
         self._node.get_logger().info(f'all {len(self.bus.nodes)} devices operational')
@@ -255,4 +240,4 @@ class MasterProcess:
     def _update_listeners(self) -> None:
         self._joint_states.update_listeners()
         for node in self._devices.values():
-            node.update_listeners()
+            node.topics.update_listeners()

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 import logging
-import os
 from pathlib import Path
 from queue import Empty, SimpleQueue
 import re
@@ -208,10 +207,11 @@ class BlackBox:
     def _remove_old(self, newest: Path) -> None:
         """Remove recordings beyond those that are kept, and what a killed program has left."""
         own = re.compile(rf'{re.escape(self._name)}_\d{{4}}-\d\d-\d\dT[0-9-]{{8}}\.\d{{3}}(-\d+)?')
-        found = []
-        for path in self._settings.folder.iterdir():
-            if own.fullmatch(path.name.removesuffix(_PARTIAL)) and path != newest:
-                found.append(path)
+        found = [
+            path
+            for path in self._settings.folder.iterdir()
+            if own.fullmatch(path.name.removesuffix(_PARTIAL)) and path != newest
+        ]
         kept = self._settings.kept - 1
         for path in sorted(found, key=_age)[kept:]:
             shutil.rmtree(path, ignore_errors=True)
@@ -219,7 +219,7 @@ class BlackBox:
 
 def _age(path: Path) -> float:
     with suppress(OSError):
-        return -os.stat(path).st_mtime
+        return -path.stat().st_mtime
     return 0.0
 
 

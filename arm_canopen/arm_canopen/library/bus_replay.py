@@ -1,0 +1,288 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bus as a log of it shows it: the network of the master, fed with frames, and sending none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+import math
+
+from ..can.bus import BusCounters
+from ..can.frame import Frame
+from ..can.load import BusLoad
+from ..cia402.drive_view import DriveView, FAULTY
+from ..cia402.status import axis_status, DriveStatus
+from ..config.model import BusConfig
+from ..exceptions import CodecError
+from ..master.events import EventKind, Report, Severity
+from ..master.network import Network
+from ..master.process_image import SentRpdo
+from ..master.remote_node import BootPhase, RemoteNode
+from ..master.statistics import CycleFigures, CycleStatistics
+from ..standard.cob_id import CAN_ID_MASK, CobId
+from ..standard.drive import DriveState, OperationMode
+from ..standard.emcy import error_code_text
+from ..standard.nmt import NmtState
+from ..standard.objects import Index
+from ..standard.sdo import decode_response, UploadResponse
+
+STEP = 0.02  # [s] in which time passes at most without a look for what is missing
+
+
+class ReplayedAxis:
+    """An axis of a drive: its view, and what the recorded master commands to it.
+
+    Attributes:
+        view: Its state.
+        setpoint: Position last commanded in user units, NaN while no RPDO has carried one.
+        following_error: Set-point that was sent before the position was measured, minus that.
+    """
+
+    def __init__(self, view: DriveView) -> None:
+        """Take the view."""
+        self.view = view
+        self.setpoint = self.following_error = math.nan
+        self._commanded = False
+
+    def note_command(self) -> None:
+        """Take the target of an RPDO."""
+        self._commanded = True
+
+    def forget(self) -> None:
+        """Know nothing, as at the beginning."""
+        self.view.lose_sight()
+        self.view.error = ''
+        self.setpoint = self.following_error = math.nan
+        self._commanded = False
+
+    def observe(self, report: Callable[[Severity, str], None]) -> None:
+        """Take state and position of this cycle; report a fault that is new.
+
+        Args:
+            report: Takes what happens to the axis.
+        """
+        view = self.view
+        before = view.state
+        view.observe()
+        if view.state is DriveState.UNKNOWN:
+            return
+        self.following_error = self.setpoint - view.position
+        if view.state in FAULTY and before not in FAULTY:
+            view.error = view.error_of_emcy()
+            report(Severity.ERROR, f'FAULT: {view.describe()}')
+        elif view.state not in FAULTY:
+            view.error = ''
+        if self._commanded:
+            self.setpoint = self._target()
+
+    def _target(self) -> float:
+        objects = self.view.objects
+        interpolated = objects.mode_display == OperationMode.INTERPOLATED_POSITION
+        target = objects.held_position(
+            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION
+        )
+        return math.nan if target is None else self.view.units.position_commanded(target)
+
+    def status(self, now: float) -> DriveStatus:
+        """Take a snapshot at a time of the log in [s]."""
+        return axis_status(
+            self.view, now, setpoint=self.setpoint, following_error=self.following_error
+        )
+
+
+class BusReplay:
+    """The devices of a bus.yml as the frames of a log show them.
+
+    Frames are decoded and devices watched by the network of the master. Where the master boots a
+    device, here its frames say that it is in operation. Times are those of the log, in [s].
+
+    Attributes:
+        network: The network; nothing that it sends goes anywhere.
+        axes: Axes of the drives, by the name of their device.
+        load: How busy the bus was.
+        counters: Frames so far.
+    """
+
+    def __init__(self, config: BusConfig, report: Report) -> None:
+        """Build it.
+
+        Args:
+            config: The bus.
+            report: Takes events.
+        """
+        self.network = network = Network(config, _send_nothing, report, beside_master=True)
+        self.load = BusLoad(config.master.bitrate, 0.0)
+        self.counters = BusCounters()
+        self._report = report
+        self._period = config.master.cycle_period
+        self._has_sync = config.master.sync_period > 0
+        self._statistics = CycleStatistics(self._period)
+        self._cycle_time = 0.0
+        self._begun = False
+        master = config.master  # its own frames, which the network, being one, never receives
+        self._of_master = {CobId.HEARTBEAT + master.node_id, master.time_cob_id & CAN_ID_MASK}
+        self._of_master |= {CobId.SDO_REQUEST + node.node_id for node in config.nodes}
+        network.on_cycle = self._observe
+        network.on_node_lost = _await_again
+        self.axes: dict[str, list[ReplayedAxis]] = {}
+        self._rpdos: dict[int, tuple[RemoteNode, SentRpdo]] = {}
+        self._tpdos: dict[int, RemoteNode] = {}
+        self._answers: dict[int, RemoteNode] = {}
+        self._heartbeats: dict[int, RemoteNode] = {}
+        for node in network.nodes.values():
+            self._connect(node)
+
+    def _connect(self, node: RemoteNode) -> None:
+        config = node.config
+        node.on_boot_up = partial(_restart, node)
+        node.on_dropped_out = lambda pause, node=node: _await_again(node)  # type: ignore[misc]
+        if config.is_drive:
+            warn = partial(node.report, EventKind.DRIVE, Severity.WARNING)
+            self.axes[node.name] = [
+                ReplayedAxis(DriveView(node, self.network.scheduler, axis, warn))
+                for axis in config.axes
+            ]
+        for output in node.image.rpdos:
+            self._rpdos[output.config.cob_id] = (node, output)
+        for entry in node.image.tpdos:
+            self._tpdos[entry.config.cob_id] = node
+        self._answers[CobId.SDO_RESPONSE + config.node_id] = node
+        self._heartbeats[CobId.HEARTBEAT + config.node_id] = node
+
+    @property
+    def now(self) -> float:
+        """Time of the log that has come."""
+        return self.network.scheduler.now
+
+    def receive(self, frame: Frame) -> None:
+        """Take the next frame of the log."""
+        if not self._begun:
+            self._begun = True
+            self.network.scheduler.set_time(frame.timestamp)
+            self.load.figures(frame.timestamp)
+        self.advance(frame.timestamp)
+        self.counters.received += 1
+        self.load.count(frame)
+        if frame.is_error or frame.is_extended or frame.is_remote:
+            self.network.receive(frame)
+        elif frame.can_id == CobId.SYNC:
+            self._cycle(frame.timestamp)
+        elif frame.can_id in self._rpdos:
+            self._take_command(*self._rpdos[frame.can_id], frame)
+        elif frame.can_id not in self._of_master:
+            self._take(frame)
+        self._update_when_due(frame.timestamp)
+
+    def advance(self, now: float) -> None:
+        """Let time pass, so that what does not come any more is missed.
+
+        Args:
+            now: Time of the log in [s].
+        """
+        while self.now < now:
+            step = min(now, self.now + STEP)
+            self.network.advance(step)
+            if not self._has_sync and step - self._cycle_time >= self._period:
+                self._cycle(step)
+            self._update_when_due(step)
+
+    def restart(self) -> None:
+        """Forget all devices, as the log begins again; time goes on."""
+        for node in self.network.nodes.values():
+            node.emergencies.restarted()
+            node.nmt_state = node.wanted = None
+            node.offline('the log begins again')
+            _await_again(node)
+        for axis in (axis for axes in self.axes.values() for axis in axes):
+            axis.forget()
+
+    def figures(self) -> CycleFigures:
+        """Return how late each SYNC was after the one before."""
+        return self._statistics.figures()
+
+    def _cycle(self, now: float) -> None:
+        if self._cycle_time:
+            self._statistics.record(max(0.0, now - self._cycle_time - self._period), 0)
+        self._cycle_time = now
+        self.network.cycle(now, self._period)
+
+    def _update_when_due(self, now: float) -> None:
+        if now >= self.network.next_update:
+            self.network.update(self._cycle_time, self._period)
+
+    def _observe(self, now: float, period: float) -> None:
+        for name, axes in self.axes.items():
+            node = self.network.nodes[name]
+            for axis in axes:
+                axis.observe(partial(_report_axis, node, axis.view.name))
+
+    def _take(self, frame: Frame) -> None:
+        node = self._tpdos.get(frame.can_id) or self._heartbeats.get(frame.can_id)
+        shows = frame.can_id in self._tpdos or frame.data[:1] == bytes([NmtState.OPERATIONAL])
+        if node is not None and shows and not node.online:
+            _go_online(node, frame.timestamp)
+        if node is None and frame.can_id in self._answers:
+            self._note_answer(self._answers[frame.can_id], frame)
+        self.network.receive(frame)
+
+    def _take_command(self, node: RemoteNode, output: SentRpdo, frame: Frame) -> None:
+        try:
+            output.values[:] = output.codec.unpack(frame.data)
+        except CodecError as error:
+            node.report(EventKind.PDO, Severity.WARNING, f'odd RPDO: {error}')
+            return
+        for axis in self.axes.get(node.name, ()):
+            axis.note_command()
+
+    def _note_answer(self, node: RemoteNode, frame: Frame) -> None:
+        """Take what an SDO has read, where it is part of the state."""
+        try:
+            answer = decode_response(frame.data)
+        except CodecError:
+            return
+        if not isinstance(answer, UploadResponse) or answer.data is None:
+            return
+        node.objects.note_value(answer.index, answer.subindex, answer.data)
+        for axis in self.axes.get(node.name, ()):
+            view = axis.view
+            if answer.index == view.objects.at(Index.ERROR_CODE) and view.state in FAULTY:
+                view.error = error_code_text(int.from_bytes(answer.data[:2], 'little'))
+
+
+def _go_online(node: RemoteNode, now: float) -> None:
+    """Take a device for one in operation, because it sends what only such a device sends."""
+    node.wanted = node.wanted or NmtState.OPERATIONAL
+    node.phase, node.phase_detail = BootPhase.OPERATIONAL, ''
+    if node.is_mute:
+        node.nmt_state = NmtState.OPERATIONAL  # otherwise its heartbeat shows it
+    node.go_online(now, taken_over=True)
+    node.report(EventKind.BOOT, Severity.INFO, 'operational')
+
+
+def _await_again(node: RemoteNode) -> None:
+    node.phase, node.phase_detail = BootPhase.WAITING, ''
+
+
+def _restart(node: RemoteNode) -> None:
+    node.restarted()
+    _await_again(node)
+
+
+def _report_axis(node: RemoteNode, name: str, severity: Severity, text: str) -> None:
+    about = text if name == node.name else f'{name}: {text}'
+    node.report(EventKind.DRIVE, severity, about)
+
+
+def _send_nothing(frame: Frame) -> None:
+    """A replay sends on no bus."""
+
+
+def unknown_scales(config: BusConfig) -> list[str]:
+    """Return the axes whose scales only the drive knows, which a log without its boot lacks."""
+    return [
+        axis.name or node.name
+        for node in config.nodes
+        for axis in node.axes
+        if axis.scale_from_factor_group
+    ]

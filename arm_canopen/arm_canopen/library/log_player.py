@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Plays the frames of a log to a replay of its bus, at the times at which they came."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+import threading
+import time
+
+from ..can.frame import Frame
+from ..exceptions import CanopenError
+from .bus_replay import BusReplay
+
+WAIT_MIN = 1e-3  # [s] below which frames are not worth a wait
+WAIT_MAX = 0.02  # [s] after which one looks what is missing
+GAP = 0.1  # [s] between the last frame and the first one of the next turn
+
+
+class LogPlayer:
+    """Plays a log, once or for ever.
+
+    Attributes:
+        seeking: What comes is before the place at which it is to begin.
+        on_tick: Called in the thread of :meth:`play`, some ten times a second at least.
+    """
+
+    def __init__(
+        self, bus: BusReplay, read: Callable[[], Iterable[Frame]], *, rate: float, start: float
+    ) -> None:
+        """Prepare.
+
+        Args:
+            bus: Gets the frames.
+            read: Yields the frames of the log, from the first one.
+            rate: How many seconds of the log go by in one.
+            start: How far from its beginning it is played in time, in [s]; what comes before is
+                taken at once, so that states are known.
+        """
+        self.seeking = False
+        self.on_tick: Callable[[], None] = lambda: None
+        self._bus = bus
+        self._read = read
+        self._rate = rate
+        self._start = start
+        self._zero = 0.0  # steady time in [s] at which log time `_log_zero` is played
+        self._log_zero = 0.0
+
+    def steady(self, log_time: float) -> float:
+        """Return the steady time at which a time of the log is played, both in [s]."""
+        return self._zero + (log_time - self._log_zero) / self._rate
+
+    def play(self, stop: threading.Event, *, loop: bool) -> None:
+        """Play until the end, or until stopped.
+
+        Args:
+            stop: Ends it.
+            loop: Begin again at the end.
+
+        Raises:
+            CodecError: The log is damaged.
+            CanopenError: It has no frames, or begins too late.
+            OSError: It cannot be read.
+        """
+        shift = 0.0  # of the times of the log, so that they go on in the next turn
+        while not stop.is_set():
+            last = self._play_once(stop, shift)
+            if not loop:
+                return
+            shift = last + GAP
+            self._bus.restart()
+
+    def _play_once(self, stop: threading.Event, shift: float) -> float:
+        """Play it from its first frame, whose time is the shift; return the time of the last."""
+        first: float | None = None
+        began = False
+        now = shift
+        for frame in self._read():
+            if first is None:
+                first = frame.timestamp
+            at = frame.timestamp - first
+            now = max(now, at + shift)  # a log may have been put together, out of order
+            if not began and at >= self._start:
+                began = True
+                self._log_zero, self._zero = now, time.monotonic()
+            self.seeking = not began
+            if began:
+                self._wait(now, stop)
+            if stop.is_set():
+                break
+            self._bus.receive(frame._replace(timestamp=now))
+        if not began and not stop.is_set():
+            length = 0.0 if first is None else now - shift
+            raise CanopenError(
+                f'nothing to play: the log has {length:.1f} s, and start is {self._start:g} s'
+                if first is not None
+                else 'nothing to play: the log has no frames'
+            )
+        return now
+
+    def _wait(self, log_time: float, stop: threading.Event) -> None:
+        """Wait until a time of the log in [s]; meanwhile time passes for what is missing."""
+        due = self.steady(log_time)
+        while (left := due - time.monotonic()) > WAIT_MIN:
+            if stop.wait(min(left, WAIT_MAX)):
+                return
+            played = self._log_zero + (time.monotonic() - self._zero) * self._rate
+            self._bus.advance(min(played, log_time))
+            self.on_tick()
+        self.on_tick()

@@ -1,0 +1,316 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_canopen replay``: a log of a bus as the topics that its master had published."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+import sys
+import threading
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+
+from node_runner import log_as, notify_ready, ParameterReader, refuse_misspelt, run_program, spin
+
+from ..can.frame_log import read_log
+from ..config import load_bus
+from ..config.model import BusConfig
+from ..exceptions import CanopenError
+from ..library.bus_replay import BusReplay, unknown_scales
+from ..library.log_player import LogPlayer
+from ..master.events import Event
+from ..master.status import node_status
+from .device_topics import DeviceTopics, log_bus_event, node_options
+from .diagnostics import bus_diagnostic, bus_status, device_diagnostic, drive_diagnostic
+from .joint_states import BusJointStates, DriveJointStates
+from .output_thread import OutputThread
+
+MASTER = 'master'
+DISCOVERY_TIME = 2.0  # [s] in which nodes that run are discovered
+WATCH_PERIOD = 0.5  # [s] between two looks for a master
+LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
+RATES = (0.01, 100.0)
+HELP = """\
+Publish what a master had published while a log of its bus was recorded; nothing is sent on a bus.
+
+usage: ros2 run arm_canopen replay --ros-args -p log:=FILE -p bus_config:=FILE [-p NAME:=VALUE ...]
+
+example:
+  ros2 run arm_canopen replay --ros-args -p bus_config:=bus.yml -p log:=can.log -p rate:=0.2
+
+parameters:
+  log                 file of a black box, candump, ASC, BLF or pcap (required)
+  bus_config          the bus.yml of that bus (required)
+  rate                how many seconds of the log go by in one (default 1.0)
+  start               where it begins, in [s] after the first frame (default 0.0)
+  loop                begin again at the end (default false)
+  robot_joint_states  publish the joints of all drives as /joint_states (default false)
+  robot_description   URDF as XML text, for /joint_states (default: the topic robot_description)
+  diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Parameters of the program.
+
+    Attributes:
+        log: The log.
+        bus_config: Path of the bus.yml.
+        rate: How many seconds of the log go by in one.
+        start: Where it begins, in [s] after the first frame.
+        loop: Begin again at the end.
+        robot_joint_states: Publish the joints of all drives as ``joint_states``.
+        robot_description: URDF as XML text; empty to take it from the topic.
+        diagnostics_period: Time between two /diagnostics messages in [s].
+    """
+
+    log: Path
+    bus_config: str
+    rate: float
+    start: float
+    loop: bool
+    robot_joint_states: bool
+    robot_description: str
+    diagnostics_period: float
+
+
+def main() -> int:
+    """Run until the end of the log or Ctrl-C; return the exit code."""
+    return run_program('replay', _serve, CanopenError, OSError, help_text=HELP)
+
+
+class ReplayProcess:
+    """The nodes of a bus that is replayed.
+
+    Attributes:
+        nodes: The nodes, for the executor.
+        failure: Why it has ended; None for the end of the log, or when it was stopped.
+    """
+
+    def __init__(
+        self, node: Node, config: BusConfig, parameters: Parameters, stack: ExitStack
+    ) -> None:
+        """Build it.
+
+        Args:
+            node: The node of the replay.
+            config: The bus.
+            parameters: Parameters of the program.
+            stack: Destroys the nodes of the devices.
+        """
+        self.failure: Exception | None = None
+        self._node = node
+        self._parameters = parameters
+        self._name = parameters.log.name
+        self._output = OutputThread(node.get_logger())
+        self._bus = bus = BusReplay(config, self._report)
+        self._player = LogPlayer(
+            bus,
+            partial(read_log, parameters.log),
+            rate=parameters.rate,
+            start=parameters.start,
+        )
+        self._player.on_tick = self._tick
+        self.nodes = [node]
+        self._topics: dict[str, DeviceTopics] = {}
+        drives = []
+        for device in bus.network.nodes.values():
+            own = Node(device.name, **node_options(device.config))
+            stack.callback(own.destroy_node)
+            self.nodes.append(own)
+            self._topics[device.name] = DeviceTopics(own, device, self._output)
+            if device.name in bus.axes:
+                drives.append(DriveJointStates(own, [axis.view for axis in bus.axes[device.name]]))
+        self._joint_states = BusJointStates(node, drives, self._output)
+        if parameters.robot_joint_states:
+            self._joint_states.publish_robot(parameters.robot_description)
+        bus.network.on_feedback = self._feedback
+        self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+        self._diagnostics_due = 0.0
+        node.create_timer(LISTENER_PERIOD, self._update_listeners)
+
+    def play(self, stop: threading.Event) -> None:
+        """Play the log in a thread of its own, and serve the nodes meanwhile.
+
+        Args:
+            stop: Ends it; set at the end of the log.
+        """
+        self._node.create_timer(WATCH_PERIOD, partial(self._look_for_master, stop))
+        thread = threading.Thread(target=self._run, args=(stop,), name='replay', daemon=True)
+        self._output.start()
+        thread.start()
+        try:
+            spin(self.nodes, stop)
+        finally:
+            stop.set()
+            thread.join()
+            self._output.stop()
+
+    def _run(self, stop: threading.Event) -> None:
+        notify_ready()
+        try:
+            self._player.play(stop, loop=self._parameters.loop)
+        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
+            self.failure = error
+        else:
+            self._node.get_logger().info(f'{self._name}: end of the log')
+        stop.set()
+
+    def _look_for_master(self, stop: threading.Event) -> None:
+        own = [node.get_fully_qualified_name() for node in self.nodes]
+        if found := _live_nodes(self._node, self._bus.network.config, own):
+            self.failure = _refusal(found)
+            stop.set()
+
+    def _report(self, event: Event) -> None:
+        self._output.post_stream((event.kind, event.node), partial(self._take_event, event))
+        if not self._player.seeking:
+            self._output.post_stream(('log', event.kind, event.node), partial(self._log, event))
+
+    def _take_event(self, event: Event) -> None:
+        if event.node in self._topics:
+            self._topics[event.node].take_event(event)
+
+    def _log(self, event: Event) -> None:
+        log_bus_event(self._node, event)
+
+    def _feedback(self, sync_time: float) -> None:
+        if not self._player.seeking:
+            self._joint_states.feedback(self._player.steady(sync_time))
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        if now >= self._diagnostics_due:
+            self._diagnostics_due = now + self._parameters.diagnostics_period
+            self._output.post_stream('diagnostics', partial(self._publish, self._collect()))
+
+    def _collect(self) -> list[DiagnosticStatus]:
+        bus, now = self._bus, self._bus.now
+        path = str(self._parameters.log)
+        figures = bus.load.figures(now)
+        status = bus_status(
+            self._name, bus.counters, figures, bus.figures(), network=bus.network, recording=path
+        )
+        statuses = [bus_diagnostic(MASTER, status)]
+        for device in bus.network.nodes.values():
+            axes = bus.axes.get(device.name)
+            if axes is None:
+                statuses.append(device_diagnostic(self._name, node_status(device, now)))
+            else:
+                statuses += [drive_diagnostic(self._name, axis.status(now)) for axis in axes]
+        return statuses
+
+    def _publish(self, statuses: list[DiagnosticStatus]) -> None:
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    def _update_listeners(self) -> None:
+        self._joint_states.update_listeners()
+        for topics in self._topics.values():
+            topics.update_listeners()
+
+
+def _serve(stop: threading.Event) -> None:
+    with ExitStack() as stack:
+        first = Node('replay')
+        try:
+            config = load_bus(_declare(first).bus_config)
+        finally:
+            first.destroy_node()  # bus.yml says in which namespace it is
+        node = Node('replay', namespace=config.master.namespace or None)
+        stack.callback(node.destroy_node)
+        log_as(node)
+        parameters = _declare(node)
+        for name in unknown_scales(config):
+            node.get_logger().warning(
+                f'{name}: its units are those of its factor group, which the master had read from '
+                'the drive; here they are those of bus.yml without it. Write scale_pos_to_dev and '
+                'scale_pos_from_dev into a copy of bus.yml'
+            )
+        _refuse_beside_master(node, config, stop)
+        if stop.is_set():
+            return
+        process = ReplayProcess(node, config, parameters, stack)
+        node.get_logger().info(f'replay of {parameters.log} with {config.file}')
+        process.play(stop)
+        if process.failure is not None:
+            raise process.failure
+
+
+def _refuse_beside_master(node: Node, config: BusConfig, stop: threading.Event) -> None:
+    deadline = time.monotonic() + DISCOVERY_TIME
+    while time.monotonic() < deadline and not stop.wait(LISTENER_PERIOD):
+        if found := _live_nodes(node, config, [node.get_fully_qualified_name()]):
+            raise _refusal(found)
+
+
+def _live_nodes(node: Node, config: BusConfig, own: Sequence[str]) -> list[str]:
+    """Return the nodes of others that publish what a replay of this bus publishes."""
+    here = node.get_namespace().rstrip('/')
+    # __ns of the command line goes before the namespaces of bus.yml
+    moved = here != f'/{config.master.namespace.strip("/")}'.rstrip('/')
+    names = {f'{here}/{MASTER}', node.get_fully_qualified_name()}
+    for device in config.nodes:
+        space = here if moved else f'/{device.namespace.strip("/")}'.rstrip('/')
+        names.add(f'{space}/{device.name}')
+    graph = [
+        f'{namespace.rstrip("/")}/{name}'
+        for name, namespace in node.get_node_names_and_namespaces()
+    ]
+    return sorted(name for name in names if graph.count(name) > own.count(name))
+
+
+def _refusal(found: Sequence[str]) -> CanopenError:
+    return CanopenError(
+        f'{found[0]} runs already, so topics would have messages of both: end it, or replay into '
+        'a namespace of its own by -r __ns:=/replay'
+    )
+
+
+def _declare(node: Node) -> Parameters:
+    read = ParameterReader(node)
+    log = read.text('log', '', 'log of a bus: of a black box, candump, ASC, BLF or pcap')
+    config = read.text('bus_config', '', 'the bus.yml of that bus')
+    rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
+    start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first frame [s]')
+    loop = read.flag('loop', 'begin again at the end', default=False)
+    robot_joint_states = read.flag(
+        'robot_joint_states', 'publish the joints of all drives as joint_states', default=False
+    )
+    description = read.text(
+        'robot_description',
+        '',
+        'URDF as XML text, for joint_states; without it, the topic robot_description',
+    )
+    period = read.number(
+        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+    )
+    refuse_misspelt(node)
+    if not log or not config:
+        raise CanopenError(
+            'give a log and its bus.yml: --ros-args -p log:=FILE -p bus_config:=FILE'
+        )
+    if not Path(log).is_file():
+        raise CanopenError(f'{log}: there is no such file')
+    return Parameters(
+        Path(log),
+        config,
+        rate,
+        start,
+        loop,
+        robot_joint_states,
+        description,
+        period,
+    )
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,307 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A bus as the frames of a log show it, without the clock of this computer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import math
+from pathlib import Path
+import struct
+import threading
+
+from config_samples import BUS, load_text
+import pytest
+
+from arm_canopen.can import Frame
+from arm_canopen.exceptions import CanopenError
+from arm_canopen.library.bus_replay import BusReplay, unknown_scales
+from arm_canopen.library.log_player import LogPlayer
+from arm_canopen.master.events import Event, EventKind, Severity
+from arm_canopen.standard.drive import DriveState
+from arm_canopen.standard.nmt import NmtState
+
+PERIOD = 0.01  # [s] of SYNC
+ENABLED, FAULT = 0x1237, 0x1218  # statuswords
+PDOS = {
+    """\
+  tpdo:
+    1:
+      mapping:
+        - {index: 0x6041}
+""": """\
+  tpdo:
+    1:
+      transmission: 0x01
+      mapping:
+        - {index: 0x6041}
+        - {index: 0x6061}
+    2:
+      transmission: 0x01
+      mapping:
+        - {index: 0x6064}
+        - {index: 0x606C}
+""",
+    """\
+        - {index: 0x6040}
+""": """\
+        - {index: 0x6040}
+        - {index: 0x607A}
+""",
+    '    node_id: 2\n': '    node_id: 2\n    heartbeat_producer: 100\n',
+}
+LOG_BUS = BUS
+for before, after in PDOS.items():
+    LOG_BUS = LOG_BUS.replace(before, after)
+
+
+class Log:
+    """Frames of a bus with one drive, cycle by cycle, as a master and the drive make them.
+
+    Attributes:
+        frames: All of them.
+        now: Time of the last cycle in [s].
+    """
+
+    def __init__(self, start: float = 1.7e9) -> None:
+        self.frames: list[Frame] = []
+        self.now = start
+        self._cycles = 0
+
+    def add(self, can_id: int, data: bytes, later: float = 0.0) -> None:
+        """Add a frame some time in [s] after the beginning of the cycle."""
+        self.frames.append(Frame(can_id, data, self.now + later))
+
+    def cycles(
+        self,
+        count: int,
+        *,
+        word: int = ENABLED,
+        position: int = 0,
+        target: int = 0,
+        silent: bool = False,
+    ) -> None:
+        """Add cycles in which the drive shows a state, and its heartbeat each 100 ms."""
+        for _ in range(count):
+            self.now += PERIOD
+            self._cycles += 1
+            self.add(0x080, b'')
+            self.add(0x202, struct.pack('<Hi', 0x0F, target), 0.004)
+            if silent:
+                continue
+            self.add(0x182, struct.pack('<Hb', word, 8), 0.001)
+            self.add(0x282, struct.pack('<ii', position, 500), 0.002)
+            if self._cycles % 10 == 0:
+                self.add(0x702, b'\x05', 0.005)
+
+
+class Watched:
+    """A replay, and what it has reported.
+
+    Attributes:
+        bus: The replay.
+        events: Its events.
+        cycles: Times of the SYNCs whose TPDOs were taken.
+    """
+
+    def __init__(self, folder: Path, text: str = LOG_BUS) -> None:
+        self.events: list[Event] = []
+        self.cycles: list[float] = []
+        self.bus = BusReplay(load_text(folder, text), self.events.append)
+        self.bus.network.on_feedback = self.cycles.append
+
+    def play(self, log: Log) -> None:
+        """Give it all frames of a log, which is empty then."""
+        for frame in sorted(log.frames, key=lambda frame: frame.timestamp):
+            self.bus.receive(frame)
+        log.frames.clear()
+
+    def texts(self, severity: Severity) -> list[str]:
+        """Return what was reported with a severity."""
+        return [str(event) for event in self.events if event.severity is severity]
+
+
+@pytest.fixture
+def watched(tmp_path: Path) -> Watched:
+    """Return a replay of the bus."""
+    return Watched(tmp_path)
+
+
+def test_a_drive_in_operation_is_seen_from_the_middle_of_a_log(watched: Watched) -> None:
+    """Its boot is not in the log: state, units, set-point and following error are."""
+    log = Log()
+    log.cycles(30, position=1500, target=1600)
+    watched.play(log)
+    (axis,) = watched.bus.axes['joint1']
+    status = axis.status(watched.bus.now)
+    assert status.node.online
+    assert status.node.nmt_state is NmtState.OPERATIONAL
+    assert status.state is DriveState.OPERATION_ENABLED
+    assert status.fresh
+    assert (status.position, status.velocity) == (1.5, 0.5)
+    assert status.setpoint == 1.6
+    assert status.following_error == pytest.approx(0.1)
+    assert watched.texts(Severity.ERROR) == []
+    assert len(watched.cycles) >= 29
+    assert watched.bus.network.missed_pdos == 0
+    assert watched.bus.figures().jitter_max < 1e-5
+
+
+def test_nothing_is_known_before_it_was_seen(watched: Watched) -> None:
+    """A master alone on the bus makes no drive."""
+    log = Log()
+    log.cycles(20, silent=True)
+    watched.play(log)
+    (axis,) = watched.bus.axes['joint1']
+    status = axis.status(watched.bus.now)
+    assert not status.node.online
+    assert status.state is DriveState.UNKNOWN
+    assert math.isnan(status.position)
+
+
+def test_a_fault_is_reported_as_the_master_does(watched: Watched) -> None:
+    """EMCY and statusword in words; the error code that is read later, too; until it is reset."""
+    log = Log()
+    log.cycles(20)
+    log.add(0x082, struct.pack('<HB5x', 0x4310, 0x09), 0.006)
+    log.cycles(20, word=FAULT)
+    watched.play(log)
+    errors = watched.texts(Severity.ERROR)
+    assert 'joint1: EMCY: 0x4310' in errors[0]
+    assert 'joint1: FAULT: 0x1218' in errors[1]
+    assert 'error 0x4310' in errors[1]
+    assert len(errors) == 2
+    (axis,) = watched.bus.axes['joint1']
+    log.add(0x582, struct.pack('<BHBHxx', 0x4B, 0x603F, 0, 0x8611), 0.007)
+    log.cycles(1, word=FAULT)
+    watched.play(log)
+    assert '0x8611' in axis.status(watched.bus.now).error
+    log.cycles(5)
+    watched.play(log)
+    assert axis.status(watched.bus.now).error == ''
+
+
+def test_a_heartbeat_that_is_missing_is_missed_at_its_time(watched: Watched) -> None:
+    """The drive is lost, also where the log has no other frame; it is found again."""
+    log = Log()
+    log.cycles(40)
+    last = log.now
+    watched.play(log)
+    watched.bus.advance(last + 5.0)
+    (lost,) = [event for event in watched.events if event.kind is EventKind.HEARTBEAT_LOST]
+    assert 'heartbeat lost' in lost.text
+    (axis,) = watched.bus.axes['joint1']
+    assert not axis.status(watched.bus.now).node.online
+    log.now = last + 6.0
+    log.cycles(20, position=100)
+    watched.play(log)
+    assert axis.status(watched.bus.now).position == 0.1
+
+
+def test_a_restart_of_the_device_ends_what_was_known(watched: Watched) -> None:
+    """Its boot-up message is reported, and it is offline until it is in operation again."""
+    log = Log()
+    log.cycles(20)
+    log.add(0x702, b'\0', 0.008)
+    watched.play(log)
+    (axis,) = watched.bus.axes['joint1']
+    assert 'restarted' in watched.texts(Severity.ERROR)[0]
+    assert not axis.status(watched.bus.now).node.online
+
+
+def test_what_no_pdo_carries_is_taken_from_the_answers_of_the_drive(tmp_path: Path) -> None:
+    """The master had polled it by SDO."""
+    text = LOG_BUS.replace('        - {index: 0x6064}\n', '')
+    watched = Watched(tmp_path, text)
+    log = Log()
+    for position in (700, 800):
+        for _ in range(20):
+            log.now += PERIOD
+            log.add(0x080, b'')
+            log.add(0x182, struct.pack('<Hb', ENABLED, 8), 0.001)
+            log.add(0x282, struct.pack('<i', 0), 0.002)
+        log.add(0x602, struct.pack('<BHB4x', 0x40, 0x6064, 0), 0.003)
+        log.add(0x582, struct.pack('<BHBi', 0x43, 0x6064, 0, position), 0.004)
+    log.cycles(1, silent=True)
+    watched.play(log)
+    (axis,) = watched.bus.axes['joint1']
+    assert axis.status(watched.bus.now).position == 0.8
+
+
+def test_the_masters_own_frames_are_no_other_master(watched: Watched) -> None:
+    """SYNC, heartbeat, SDO requests and NMT commands of the recorded master."""
+    log = Log()
+    log.add(0x000, b'\x01\x00')
+    log.add(0x701, b'\x05')
+    log.add(0x602, struct.pack('<BHB4x', 0x40, 0x1000, 0))
+    log.cycles(20)
+    watched.play(log)
+    assert watched.texts(Severity.WARNING) == []
+    assert watched.bus.network.unknown_frames == 0
+
+
+def test_axes_with_the_scales_of_their_drive_are_named(tmp_path: Path) -> None:
+    """A log without the boot does not have them."""
+    scaled = BUS.replace(
+        '  dcf: drive.eds\n', '  dcf: drive.eds\n  scale_from_factor_group: true\n'
+    )
+    (tmp_path / 'a').mkdir()
+    assert unknown_scales(load_text(tmp_path / 'a', BUS)) == []
+    assert unknown_scales(load_text(tmp_path, scaled)) == ['joint1']
+
+
+def player(bus: BusReplay, log: Log, *, rate: float = 100.0, start: float = 0.0) -> LogPlayer:
+    """Return a player of the frames of a log."""
+
+    def read() -> Iterator[Frame]:
+        yield from sorted(log.frames, key=lambda frame: frame.timestamp)
+
+    return LogPlayer(bus, read, rate=rate, start=start)
+
+
+def test_a_log_is_played_in_time_and_its_beginning_is_skipped(watched: Watched) -> None:
+    """What is before the start is taken at once; the rest needs the time that the rate makes."""
+    log = Log()
+    log.cycles(1000, position=200)
+    playing = player(watched.bus, log, start=4.0)
+    sought: list[bool] = []
+    watched.bus.network.on_feedback = lambda sync_time: sought.append(playing.seeking)
+    ticks: list[float] = []
+    playing.on_tick = lambda: ticks.append(watched.bus.now)
+    playing.play(threading.Event(), loop=False)
+    assert sum(sought) == pytest.approx(400, abs=3)
+    assert sum(not each for each in sought) == pytest.approx(600, abs=3)
+    assert ticks[0] >= 3.9
+    assert playing.steady(9.99) - playing.steady(4.0) == pytest.approx(0.0599)
+
+
+def test_a_log_that_is_repeated_goes_on_in_time(watched: Watched) -> None:
+    """Each turn begins with unknown drives; nothing is missed between two turns."""
+    log = Log()
+    log.cycles(100, position=300)
+    stop = threading.Event()
+    playing = player(watched.bus, log)
+    operational: list[Event] = []
+
+    def note(sync_time: float) -> None:
+        operational[:] = [event for event in watched.events if event.kind is EventKind.BOOT]
+        if len(operational) == 3:
+            stop.set()
+
+    watched.bus.network.on_feedback = note
+    playing.play(stop, loop=True)
+    assert len(operational) == 3
+    assert watched.texts(Severity.ERROR) == []
+
+
+@pytest.mark.parametrize(
+    ('cycles', 'start', 'reason'), [(0, 0.0, 'no frames'), (10, 9.0, '0.1 s')]
+)
+def test_a_log_with_nothing_to_play_is_refused(
+    watched: Watched, cycles: int, start: float, reason: str
+) -> None:
+    """An empty file, or a start behind its end."""
+    log = Log()
+    log.cycles(cycles)
+    with pytest.raises(CanopenError, match=reason):
+        player(watched.bus, log, start=start).play(threading.Event(), loop=False)
