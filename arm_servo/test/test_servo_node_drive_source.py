@@ -171,6 +171,21 @@ def test_a_drive_that_was_faulted_follows_again_when_it_can() -> None:
     assert drives.gateway.snapshot.source is Source.NONE
 
 
+def test_a_drive_that_is_slower_than_its_limits_is_not_led() -> None:
+    """It would refuse the path half-way, and stop beside it; the others are not led alone."""
+    drives = Drives()
+    drives.axes[2] = replace(drives.axes[2], speed_limit=0.767)
+    drives.attach()
+    command = swing(drives, 0.01)
+    assert drives.run(3) == [None] * 7
+    allowed = f'{drives.gateway.model.limits.velocity[2]:.4g}'
+    words = f'panda_joint3 is limited to 0.767 per second by 0x607F, .* allows {allowed}; lower'
+    with pytest.raises(NotReadyError, match=words):
+        command.future.result(0.0)
+    drives.axes[2] = replace(drives.axes[2], speed_limit=drives.gateway.model.limits.velocity[2])
+    assert None not in drives.run()
+
+
 def test_a_command_that_waited_too_long_is_refused() -> None:
     """After a pause of the cycle an old command moves nothing."""
     drives = attached()

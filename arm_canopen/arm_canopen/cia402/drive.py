@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 from ..config.model.drive import DriveConfig
 from ..exceptions import CanopenError, SdoError
@@ -121,6 +122,7 @@ class Drive:
             followable=refusal is None or self._is_led_to_rest(),
             refusal=refusal,
             age=self.view.age,
+            speed_limit=self.view.parameters.speed_limit or math.inf,
         )
 
     def read(self) -> None:

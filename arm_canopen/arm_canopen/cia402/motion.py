@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import math
 from typing import Protocol
 
 from ..standard.drive import DriveState
@@ -31,6 +32,8 @@ class AxisFeedback:
             moves and has stopped to send its TPDOs is followable for another second in spite of
             it, so that the source can bring the whole arm to rest on its path; then it is halted.
         age: Age of the oldest of these values in [s]; infinite while they are unknown.
+        speed_limit: Greatest velocity that the drive takes (0x607F) in user units per second;
+            infinite where it has none.
     """
 
     name: str
@@ -43,6 +46,7 @@ class AxisFeedback:
     followable: bool
     refusal: Refusal | None = None
     age: float = 0.0
+    speed_limit: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import math
 
 from arm_canopen import AxisFeedback, Refusal, RefusalCause
+from arm_model import Array
 from arm_trajectory import GoalCode
 
 POWER = 'look after its power and its cable'
@@ -37,7 +38,14 @@ REMEDIES: Mapping[RefusalCause, str] = {
 SILENT_AGE_FACTOR = 0.5
 """Share of the age of a silent drive from which on another one counts as silent, too."""
 
-PLURAL = {'is': 'are', 'has': 'have', 'was': 'were', 'does': 'do', 'moves': 'move'}
+PLURAL = {
+    'is': 'are',
+    'has': 'have',
+    'was': 'were',
+    'does': 'do',
+    'moves': 'move',
+    'takes': 'take',
+}
 """Words with which reasons begin, as they are said of several drives."""
 
 OBJECTS = {' its ': ' their ', 'takes it': 'takes them', 'it stands': 'they stand'}
@@ -57,6 +65,28 @@ def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
     return _sentence(
         (axis.name, axis.refusal or released.get(axis.name)) for axis in feedback
     ) or _sentence((axis.name, UNKNOWN) for axis in feedback if not axis.followable)
+
+
+def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
+    """Return which joints may be faster than their drives; empty when none may.
+
+    A path that is faster is refused by the drive half-way, and ends in a stop beside the path.
+
+    Args:
+        feedback: State of each drive.
+        velocities: Greatest speeds of the joints in [rad/s].
+    """
+    remedy = 'lower max_velocity there, or raise 0x607F in the sdo list of bus.yml'
+    pairs = zip(feedback, velocities, strict=True)
+    return _sentence(
+        (axis.name, f'is limited to {_rates(axis.speed_limit, velocity)}; {remedy}')
+        for axis, velocity in pairs
+        if velocity > axis.speed_limit
+    )
+
+
+def _rates(limit: float, velocity: float) -> str:
+    return f'{limit:.4g} per second by 0x607F, and limits.yaml allows {velocity:.4g}'
 
 
 def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple[str, GoalCode]:

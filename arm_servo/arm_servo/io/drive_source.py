@@ -14,7 +14,7 @@ from arm_model import frozen, RobotState
 
 from ..core.gateway import CommandGateway
 from ..core.set_point import Source
-from .drive_reasons import COMMAND, taken_away, what_happened, why_not
+from .drive_reasons import COMMAND, taken_away, too_fast, what_happened, why_not
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
@@ -113,6 +113,8 @@ class DriveSource:
     ) -> Sequence[Setpoint | None]:
         measured, ages = measured_state(feedback), frozen([axis.age for axis in feedback])
         blocked = why_not(feedback, self._released)
+        if not self._following and not blocked:
+            blocked = too_fast(feedback, self._gateway.model.limits.velocity)
         if not self._following and not blocked:
             self._take_over(feedback)
         if not self._following or measured is None:
