@@ -56,6 +56,8 @@ def test_objects_are_read_and_written_by_name(isolation: Isolation) -> None:
 
         for refused, words in (
             (read(arm, 'Contrlword'), '0x6040:00 Controlword'),
+            (read(arm, str(0x6041)), "object: '0x6041'"),  # what YAML makes of { object: 0x6041 }
+            (write(arm, str(0x6081), '1'), "object: '0x6081'"),
             (write(arm, 'Profile velocity', 'fast'), "'fast'"),
             (write(arm, 'Statusword', '1'), 'read'),
             (write(arm, 'Controlword', '15'), 'written by its driver'),

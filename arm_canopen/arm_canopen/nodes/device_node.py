@@ -94,11 +94,11 @@ class DeviceNode(Node):
         def admitted(request: Any) -> Future[Any]:  # noqa: ANN401
             try:
                 self.admit()
+                return handler(request)
             except CanopenError as error:
                 refused: Future[Any] = Future()
                 refused.set_exception(error)
                 return refused
-            return handler(request)
 
         self._deferred.create(self, service_type, name, admitted, respond)
 

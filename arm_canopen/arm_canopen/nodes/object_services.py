@@ -12,7 +12,7 @@ from typing import Any, Protocol
 from arm_msgs.srv import ReadObject, WriteObject
 
 from ..config.read.object_text import bytes_from_text, text_from_bytes
-from ..exceptions import CanopenError
+from ..exceptions import CanopenError, ObjectError
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..standard.dictionary import object_address, ObjectEntry
@@ -57,6 +57,7 @@ class ObjectServices:
         node.offer(WriteObject, '~/write_object', self._write, self._answer_write)
 
     def _read(self, request: ReadObject.Request) -> Future[Transfer]:
+        _require_clear(request.object)
         return self._thread.run_coroutine(partial(self._objects.upload, request.object))
 
     def _answer_read(self, response: ReadObject.Response, future: Future[Transfer]) -> None:
@@ -71,6 +72,8 @@ class ObjectServices:
             response.success = True
 
     def _write(self, request: WriteObject.Request) -> Future[Transfer]:
+        _require_clear(request.object)
+
         def to_bytes(entry: ObjectEntry) -> bytes:
             data = bytes(request.data) or bytes_from_text(entry.data_type, request.value)
             text_from_bytes(entry.data_type, data)  # refuses raw bytes that are no such value
@@ -91,3 +94,14 @@ class ObjectServices:
         address = object_address(entry.index, entry.subindex)
         response.success = True
         response.message = f'{address} {object_path(entry)} = {written}'
+
+
+def _require_clear(path: str) -> None:
+    """Refuse decimal digits: where 0x2003 is not quoted, YAML makes 8195 of it."""
+    digits = path.strip().partition(':')[0]
+    if digits.isdecimal():
+        number = f'0x{int(digits):X}'
+        raise ObjectError(
+            f'object {path!r} is 0x{digits}, or {number}, of which YAML makes {digits} without '
+            f"quotes; write the one that is meant, in quotes: object: '{number}'"
+        )
