@@ -11,6 +11,7 @@ from setuptools import find_packages, setup
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
+    'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',
     'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
     'web_viewer = robot_viewer.nodes.web_viewer:main',
 ]
@@ -43,7 +44,8 @@ setup(
     extras_require={
         'test': ['pytest'],
         'page': ['numpy', 'trimesh', 'viser', 'websockets'],
-        'ros': [sibling('libraries/node_runner')],
+        'foxglove': ['foxglove-sdk>=0.30'],
+        'ros': [sibling('libraries/message_definitions'), sibling('libraries/node_runner')],
     },
     zip_safe=True,
     maintainer='The arm and quad developers',

@@ -35,6 +35,7 @@ INSTALLED = (
     'quad_teleop',
     'robot_viewer',
     'arm_bringup[motion]',
+    'libraries/message_definitions',
     'libraries/rosbag_files',
 )
 """Packages that nothing else requires; they bring all others."""
@@ -48,6 +49,7 @@ IMPORTED = [
     'canopen_sim',
     'canopen_tools',
     'demo_runner',
+    'message_definitions',
     'operator_input',
     'process_supervisor',
     'quad_bringup',

@@ -15,7 +15,6 @@ import hmac
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from inspect import isawaitable
-import ipaddress
 import secrets
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -24,22 +23,10 @@ import websockets.asyncio.server as websocket_server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from ..loopback import is_loopback, LOOPBACK_NAMES
 from .overlay import Overlay, text_response
 
 COOKIE = 'robot_viewer_token'
-LOOPBACK_NAMES = frozenset({'localhost', '127.0.0.1', '::1'})
-
-
-def is_loopback(host: str) -> bool:
-    """Whether a host is reached from this computer only.
-
-    Args:
-        host: A name or an address, as the page is to be bound to.
-    """
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host in LOOPBACK_NAMES
 
 
 class Gate:

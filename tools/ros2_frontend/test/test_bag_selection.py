@@ -14,7 +14,6 @@ from ros2_frontend.bag.files import BagMetadata, OfferedQos, Topic
 from ros2_frontend.bag.info_text import info_text, size_text
 from ros2_frontend.bag.losses import LossCounter
 from ros2_frontend.bag.selection import TopicFilter
-from ros2_frontend.index.definition import concatenated
 from ros2_frontend.ros.bag_qos import for_playing, for_recording, is_compatible
 from rosbag_files import BagFile, TopicCount
 
@@ -119,20 +118,6 @@ def test_info_has_the_form_of_rosbag2() -> None:
 def test_sizes(size: int, text: str) -> None:
     """In the unit that suits them."""
     assert size_text(size) == text
-
-
-def test_definitions_are_concatenated() -> None:
-    """Each nested type once, below its name; of the same package or another."""
-    texts = {
-        'a/msg/Top': 'Nested one\nb/Other[] others\nuint8 X=1 # Nested\n',
-        'a/msg/Nested': 'b/Other other\n',
-        'b/msg/Other': 'float64 x\n',
-    }
-    line = '=' * 80
-    assert concatenated('a/msg/Top', texts.__getitem__) == (
-        f'{texts["a/msg/Top"]}\n{line}\nMSG: a/msg/Nested\n{texts["a/msg/Nested"]}\n'
-        f'{line}\nMSG: b/msg/Other\n{texts["b/msg/Other"]}'
-    )
 
 
 RELIABLE, LATCHED = OfferedQos(), OfferedQos(durability='transient_local')

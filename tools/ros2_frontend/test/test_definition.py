@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from ros2_frontend.index.definition import Comments, expand, nested_type, strip_comment
+from ros2_frontend.index.definition import Comments, expand, strip_comment
 
 FILES = {
     'demo/msg/Outer': '# Top\nInner inner # the inner\n\nother/Leaf[] leaves\nuint8 A=1 # one\n',
@@ -49,25 +47,6 @@ def test_no_comments() -> None:
     lines = shown(Comments(top=False, nested=False))
     assert lines[0] == 'Inner inner'
     assert not any('#' in line or not line for line in lines)
-
-
-@pytest.mark.parametrize(
-    ('line', 'expected'),
-    [
-        ('Point[3] points', 'demo/msg/Point'),
-        ('geometry_msgs/Point point', 'geometry_msgs/msg/Point'),
-        ('builtin_interfaces/Time[<=5] stamps # many', 'builtin_interfaces/msg/Time'),
-        ('float64 x', None),
-        ('string<=10 name', None),
-        ('uint8 KIND=1', None),
-        ('# Point p', None),
-        ('---', None),
-        ('', None),
-    ],
-)
-def test_nested_type(line: str, expected: str | None) -> None:
-    """Only fields of message types have definitions of their own."""
-    assert nested_type(line, 'demo') == expected
 
 
 def test_strip_comment() -> None:

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Definitions of installed packages: `share/<package>/msg/<Name>.msg` below ament's prefixes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import os
+from pathlib import Path
+
+from .concatenation import concatenated
+
+_SEPARATOR = '---'  # between request and response of a service
+
+
+class DefinitionError(LookupError):
+    """A type that is not installed, or defined in IDL only."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceDefinitions:
+    """Both halves of a service, each with the messages in it.
+
+    Attributes:
+        request: What a client sends.
+        response: What it gets.
+    """
+
+    request: str
+    response: str
+
+
+def message_definition(name: str) -> str:
+    """Return the definition of an installed message with those of all messages in it.
+
+    Args:
+        name: `package/msg/Name`.
+
+    Raises:
+        DefinitionError: It, or one in it, is not installed, or has no .msg file.
+    """
+    return concatenated(name, _read)
+
+
+def service_definitions(name: str) -> ServiceDefinitions:
+    """Return the definitions of request and response of an installed service.
+
+    Args:
+        name: `package/srv/Name`.
+
+    Raises:
+        DefinitionError: It, or a message in it, is not installed, or has no .srv or .msg file.
+    """
+    lines = _read(name).splitlines()
+    middle = next((i for i, line in enumerate(lines) if line.strip() == _SEPARATOR), None)
+    if middle is None:
+        raise DefinitionError(f'{name}: no line {_SEPARATOR} in its .srv file')
+
+    def half(text: str) -> str:
+        return concatenated(name, lambda each: text if each == name else _read(each))
+
+    return ServiceDefinitions(
+        half('\n'.join(lines[:middle])), half('\n'.join(lines[middle + 1 :]))
+    )
+
+
+def _read(name: str) -> str:
+    parts = name.split('/')
+    if len(parts) != 3 or parts[1] not in {'msg', 'srv'}:
+        raise DefinitionError(f'{name}: write package/msg/Name or package/srv/Name')
+    package, folder, base = parts
+    prefixes = filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep))
+    for prefix in prefixes:
+        path = Path(prefix, 'share', package, folder, f'{base}.{folder}')
+        if path.is_file():
+            return path.read_text(encoding='utf-8')
+    raise DefinitionError(f'{name}: no {base}.{folder} of {package} is installed')

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Definitions with all that is in them, from texts and from installed packages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from message_definitions import (
+    concatenated,
+    DefinitionError,
+    message_definition,
+    nested_type,
+    service_definitions,
+)
+
+LINE = '=' * 80
+
+
+@pytest.mark.parametrize(
+    ('line', 'expected'),
+    [
+        ('Point[3] points', 'demo/msg/Point'),
+        ('geometry_msgs/Point point', 'geometry_msgs/msg/Point'),
+        ('builtin_interfaces/Time[<=5] stamps # many', 'builtin_interfaces/msg/Time'),
+        ('float64 x', None),
+        ('uint8 POINT=1', None),
+        ('# Point point', None),
+        ('string<=5 name', None),
+        ('', None),
+    ],
+)
+def test_types_of_fields(line: str, expected: str | None) -> None:
+    """Of the same package and others, arrays or not; never a primitive or a comment."""
+    assert nested_type(line, 'demo') == expected
+
+
+def test_definitions_are_concatenated() -> None:
+    """Each nested type once, below its name; of the same package or another."""
+    texts = {
+        'a/msg/Top': 'Nested one\nb/Other[] others\nuint8 X=1 # Nested\n',
+        'a/msg/Nested': 'b/Other other\n',
+        'b/msg/Other': 'float64 x\n',
+    }
+    assert concatenated('a/msg/Top', texts.__getitem__) == (
+        f'{texts["a/msg/Top"]}\n{LINE}\nMSG: a/msg/Nested\n{texts["a/msg/Nested"]}\n'
+        f'{LINE}\nMSG: b/msg/Other\n{texts["b/msg/Other"]}'
+    )
+
+
+@pytest.fixture
+def prefix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Install a package in the second of two prefixes."""
+    share = tmp_path / 'second' / 'share' / 'demo'
+    (share / 'msg').mkdir(parents=True)
+    (share / 'srv').mkdir()
+    (share / 'msg' / 'Leaf.msg').write_text('int32 value\n')
+    (share / 'srv' / 'Grow.srv').write_text('Leaf leaf # --- no\n---\nLeaf[] leaves\nbool ok\n')
+    (share / 'srv' / 'Half.srv').write_text('bool ok\n')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'{tmp_path / "first"}:{tmp_path / "second"}')
+    return share
+
+
+def test_a_service_has_two_definitions(prefix: Path) -> None:
+    """Each with the messages of its own fields."""
+    assert prefix.is_dir()
+    found = service_definitions('demo/srv/Grow')
+    assert found.request == f'Leaf leaf # --- no\n{LINE}\nMSG: demo/msg/Leaf\nint32 value\n'
+    assert found.response == f'Leaf[] leaves\nbool ok\n{LINE}\nMSG: demo/msg/Leaf\nint32 value\n'
+
+
+@pytest.mark.parametrize(
+    ('name', 'reason'),
+    [
+        ('demo/msg/Tree', 'no Tree.msg of demo is installed'),
+        ('nobody/msg/Leaf', 'no Leaf.msg of nobody is installed'),
+        ('demo/Leaf', 'write package/msg/Name'),
+        ('demo/action/Leaf', 'write package/msg/Name'),
+    ],
+)
+def test_what_is_not_installed_is_named(prefix: Path, name: str, reason: str) -> None:
+    """With what was looked for."""
+    assert prefix.is_dir()
+    with pytest.raises(DefinitionError, match=reason):
+        message_definition(name)
+
+
+def test_half_a_service_is_refused(prefix: Path) -> None:
+    """Nobody could call it."""
+    assert prefix.is_dir()
+    with pytest.raises(DefinitionError, match='no line ---'):
+        service_definitions('demo/srv/Half')
+
+
+def test_definitions_of_ros() -> None:
+    """The Header has a time of another package in it."""
+    text = message_definition('std_msgs/msg/Header')
+    assert 'MSG: builtin_interfaces/msg/Time' in text
+    assert 'string frame_id' in text
+    found = service_definitions('std_srvs/srv/SetBool')
+    assert 'bool data' in found.request
+    assert 'bool success' in found.response
+    assert 'bool success' not in found.request

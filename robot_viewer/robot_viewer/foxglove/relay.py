@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The port of the bridge: admits a connection, then passes its bytes on to the server behind it.
+
+The server of foxglove-sdk asks nobody who connects. So it is bound to a loopback address that
+nobody can guess, and stands behind this.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from contextlib import suppress
+from http import HTTPStatus
+import secrets
+import ssl
+import threading
+
+from .admission import Admission
+
+HEAD_TIMEOUT = 5.0
+"""Time for the head of a request in [s]."""
+MAX_HEAD = 16 * 1024
+"""Its greatest size in [byte]."""
+CHUNK = 64 * 1024
+
+
+def hidden_address() -> str:
+    """Return one of the 16 million addresses of the loopback interface, by chance."""
+    return '127.' + '.'.join(str(1 + secrets.randbelow(254)) for _ in range(3))
+
+
+class Relay:
+    """Listens in a thread of its own.
+
+    Attributes:
+        port: What it is bound to.
+    """
+
+    def __init__(
+        self,
+        address: tuple[str, int],
+        behind: tuple[str, int],
+        admission: Admission,
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        """Bind, and serve from now on.
+
+        Args:
+            address: Host and port; port 0 for a free one.
+            behind: Host and port of the server behind.
+            admission: Looks at each request.
+            tls: Certificate and key, where connections are encrypted.
+
+        Raises:
+            OSError: The address cannot be bound.
+        """
+        self._behind, self._admission, self._tls = behind, admission, tls
+        self._loop = asyncio.new_event_loop()
+        self._connections: set[asyncio.Task[None]] = set()
+        try:
+            self._server = self._loop.run_until_complete(
+                asyncio.start_server(self._admit, *address, ssl=tls, limit=MAX_HEAD)
+            )
+        except BaseException:
+            self._loop.close()
+            raise
+        self.port: int = self._server.sockets[0].getsockname()[1]
+        self._thread = threading.Thread(target=self._loop.run_forever, name='relay', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Close the port and every connection."""
+        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    async def _close(self) -> None:
+        self._server.close()
+        for task in self._connections:
+            task.cancel()
+        await asyncio.gather(*self._connections, return_exceptions=True)
+
+    async def _admit(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        if task is None:
+            return
+        self._connections.add(task)
+        try:
+            with suppress(OSError, asyncio.TimeoutError, asyncio.IncompleteReadError):
+                await self._serve(reader, writer)
+        except asyncio.LimitOverrunError:
+            pass  # a head that does not end
+        except asyncio.CancelledError:
+            pass  # the relay is being closed
+        finally:
+            self._connections.discard(task)
+            writer.close()
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        head = await asyncio.wait_for(reader.readuntil(b'\r\n\r\n'), HEAD_TIMEOUT)
+        refusal = self._admission.refusal(head)
+        if refusal is not None:
+            writer.write(_forbidden(refusal))
+            await writer.drain()
+            return
+        inner_reader, inner_writer = await asyncio.open_connection(*self._behind)
+        try:
+            inner_writer.write(head)
+            there = asyncio.create_task(_pass(reader, inner_writer))
+            back = asyncio.create_task(_pass(inner_reader, writer))
+            try:
+                await asyncio.wait((there, back), return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                there.cancel()
+                back.cancel()
+                await asyncio.gather(there, back, return_exceptions=True)
+        finally:
+            inner_writer.close()
+
+
+async def _pass(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while data := await reader.read(CHUNK):
+        writer.write(data)
+        await writer.drain()
+
+
+def _forbidden(reason: str) -> bytes:
+    status, body = HTTPStatus.FORBIDDEN, f'{reason}\n'.encode()
+    head = (
+        f'HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: text/plain; charset=utf-8\r\n'
+        f'Content-Length: {len(body)}\r\nConnection: close\r\n\r\n'
+    )
+    return head.encode() + body

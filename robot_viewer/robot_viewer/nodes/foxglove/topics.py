@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Topics as Foxglove sees them: offered all, subscribed while a client wants them, as bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from foxglove import Channel, Context, Schema
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+from message_definitions import DefinitionError, message_definition
+
+from ...foxglove.names import is_hidden, NameFilter
+
+UNKNOWN_DEPTH = 10
+"""Depth for a publisher whose depth is unknown: DDS does not report it."""
+
+
+@dataclass(frozen=True, slots=True)
+class TopicChoice:
+    """Which topics are offered, and how they are subscribed to.
+
+    Attributes:
+        shown: Names of topics.
+        hidden: Whether names that ROS hides are among them.
+        best_effort: Names of topics of which messages may be lost.
+        depth: Smallest and greatest depth of a subscription.
+    """
+
+    shown: NameFilter
+    hidden: bool
+    best_effort: NameFilter
+    depth: tuple[int, int]
+
+
+@dataclass(slots=True)
+class _Offered:
+    """A topic on the server.
+
+    Attributes:
+        type: Name of its type.
+        kind: Class of its messages.
+        channel: Its channel on the server.
+        clients: Numbers of the clients that want it, once for each of their subscriptions.
+        subscription: There while a client wants it.
+        qos: Of the subscription.
+    """
+
+    type: str
+    kind: Any
+    channel: Channel
+    clients: list[int] = field(default_factory=list)
+    subscription: Subscription | None = None
+    qos: QoSProfile | None = None
+
+
+class Topics:
+    """Offers topics, and passes their messages on; used in the thread of the node only."""
+
+    def __init__(
+        self, node: Node, context: Context, choice: TopicChoice, warn: Callable[[str], None]
+    ) -> None:
+        """Offer nothing yet.
+
+        Args:
+            node: Whose subscriptions they are.
+            context: What the server publishes.
+            choice: Which topics.
+            warn: Takes what cannot be shown, in words.
+        """
+        self._node, self._context, self._choice, self._warn = node, context, choice, warn
+        self._offered: dict[str, _Offered] = {}
+        self._refused: set[tuple[str, str]] = set()
+
+    def look(self, topics: Iterable[tuple[str, Sequence[str]]]) -> None:
+        """Offer what has appeared, and withdraw what has gone.
+
+        Args:
+            topics: Names and types of all topics in the graph.
+        """
+        choice = self._choice
+        wanted = {
+            name: types[0]
+            for name, types in topics
+            if choice.shown.accepts(name) and (choice.hidden or not is_hidden(name))
+        }
+        for name, offered in list(self._offered.items()):
+            if wanted.get(name) != offered.type:
+                self._unsubscribe(offered)
+                offered.channel.close()
+                del self._offered[name]
+        for name, kind in wanted.items():
+            if name not in self._offered:
+                self._offer(name, kind)
+        for name, offered in self._offered.items():
+            if offered.clients and offered.qos != self._qos(name):
+                self._subscribe(name, offered)  # a publisher came or went
+
+    def want(self, client: int, topic: str) -> None:
+        """Subscribe for a client; it gets what publishers keep, too."""
+        offered = self._offered.get(topic)
+        if offered is None:
+            return
+        offered.clients.append(client)
+        latched = offered.qos and offered.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        if offered.subscription is None or latched:
+            self._subscribe(topic, offered)
+
+    def leave(self, client: int, topic: str) -> None:
+        """End a client's subscription."""
+        offered = self._offered.get(topic)
+        if offered is None or client not in offered.clients:
+            return
+        offered.clients.remove(client)
+        if not offered.clients:
+            self._unsubscribe(offered)
+
+    def _offer(self, name: str, type_: str) -> None:
+        if (name, type_) in self._refused:
+            return
+        try:
+            kind = class_of(type_)
+            definition = message_definition(type_)
+        except (DefinitionError, LookupError) as error:
+            self._refused.add((name, type_))
+            self._warn(f'{name} is not shown: {error}')
+            return
+        schema = Schema(name=type_, encoding='ros2msg', data=definition.encode())
+        channel = Channel(name, schema=schema, message_encoding='cdr', context=self._context)
+        self._offered[name] = _Offered(type_, kind, channel)
+
+    def _subscribe(self, name: str, offered: _Offered) -> None:
+        self._unsubscribe(offered)
+        offered.qos = self._qos(name)
+        offered.subscription = self._node.create_subscription(
+            offered.kind, name, partial(self._pass, offered.channel), offered.qos, raw=True
+        )
+
+    def _unsubscribe(self, offered: _Offered) -> None:
+        if offered.subscription is not None:
+            self._node.destroy_subscription(offered.subscription)
+            offered.subscription = offered.qos = None
+
+    def _pass(self, channel: Channel, data: bytes) -> None:
+        channel.log(data, log_time=self._node.get_clock().now().nanoseconds)
+
+    def _qos(self, name: str) -> QoSProfile:
+        """Return what connects to all publishers, and gets what they keep where all keep it."""
+        offers = [each.qos_profile for each in self._node.get_publishers_info_by_topic(name)]
+        reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in offers)
+        latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
+        lowest, highest = self._choice.depth
+        depth = sum(each.depth or UNKNOWN_DEPTH for each in offers)
+        return QoSProfile(
+            depth=min(max(depth, lowest), highest),
+            reliability=ReliabilityPolicy.RELIABLE
+            if reliable and not self._choice.best_effort.accepts(name)
+            else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL
+            if latched and offers
+            else DurabilityPolicy.VOLATILE,
+        )
+
+
+def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
+    """Return the class of a message or service.
+
+    Args:
+        name: `package/msg/Name` or `package/srv/Name`.
+
+    Raises:
+        LookupError: It is not installed.
+    """
+    try:
+        package, folder, base = name.split('/')
+        return getattr(import_module(f'{package}.{folder}'), base)
+    except (AttributeError, ImportError, ValueError):
+        raise LookupError(f'type {name} is not installed') from None

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A client of Foxglove's protocol that shares nothing with the server: websockets and rosbags.
+
+https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md has operations and binary forms.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Callable
+import itertools
+import json
+import socket
+import struct
+import time
+from typing import Any
+
+from mcap_ros2._dynamic import generate_dynamic
+from rosbags.typesys import get_typestore, Stores
+from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
+
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+TIMEOUT = 60.0  # [s]
+PROTOCOL = Subprotocol('foxglove.sdk.v1')
+
+Decoder = Callable[[bytes], Any]
+
+
+def encoded(kind: str, **fields: Any) -> bytes:
+    """Make a message of a public type in CDR."""
+    return bytes(TYPES.serialize_cdr(TYPES.types[kind](**fields), kind))
+
+
+class FoxgloveClient:
+    """Connects, and keeps what the server sends.
+
+    Attributes:
+        info: The first message of the server.
+        channels: Offered channels by topic.
+        services: Offered services by name.
+        parameters: Values as they were last sent.
+        statuses: Texts of the server for people.
+        graph: All updates of the connection graph.
+    """
+
+    def __init__(self, url: str, origin: str | None = None) -> None:
+        """Connect.
+
+        Args:
+            url: Of the server.
+            origin: Site of the page, as a browser names it.
+        """
+        self._socket = connect(
+            url,
+            subprotocols=[PROTOCOL],
+            origin=None if origin is None else Origin(origin),
+            open_timeout=TIMEOUT,
+            close_timeout=0.0,
+            max_size=None,
+        )
+        assert self._socket.subprotocol == PROTOCOL
+        self._numbers = itertools.count(1)
+        self._subscribed: dict[int, str] = {}
+        self._received: dict[str, deque[bytes]] = defaultdict(deque)
+        self._answers: dict[int, bytes | str] = {}
+        self._sets: dict[str, dict[str, Any]] = {}
+        self.channels: dict[str, dict[str, Any]] = {}
+        self.services: dict[str, dict[str, Any]] = {}
+        self.parameters: dict[str, Any] = {}
+        self.statuses: list[str] = []
+        self.graph: list[dict[str, Any]] = []
+        self.info: dict[str, Any] = {}
+        self.until(lambda: bool(self.info), 'serverInfo')
+
+    def close(self) -> None:
+        """End the connection."""
+        self._socket.close()
+
+    def abort(self) -> None:
+        """End it as a browser does that is killed."""
+        self._socket.socket.shutdown(socket.SHUT_RDWR)
+
+    # -- what is done
+
+    def subscribe(self, topic: str) -> None:
+        """Subscribe to a topic that is or will be offered."""
+        self.until(lambda: topic in self.channels, f'channel {topic}')
+        number = next(self._numbers)
+        self._subscribed[number] = topic
+        wanted = {'id': number, 'channelId': self.channels[topic]['id']}
+        self._send('subscribe', subscriptions=[wanted])
+
+    def next_message(self, topic: str) -> Any:
+        """Return the next message of a topic, decoded by the definition that the server sent."""
+        self.until(lambda: bool(self._received[topic]), f'message of {topic}')
+        channel = self.channels[topic]
+        assert channel['encoding'] == 'cdr'
+        assert channel['schemaEncoding'] == 'ros2msg'
+        return decoder(channel['schemaName'], channel['schema'])(self._received[topic].popleft())
+
+    def advertise(self, topic: str, kind: str) -> int:
+        """Announce a channel of its own; return its number."""
+        number = next(self._numbers)
+        channel = {'id': number, 'topic': topic, 'encoding': 'cdr', 'schemaName': kind}
+        self._send('advertise', channels=[channel])
+        return number
+
+    def publish(self, channel: int, data: bytes) -> None:
+        """Send a message on a channel of its own."""
+        self._socket.send(struct.pack('<BI', 1, channel) + data)
+
+    def start_call(self, service: str, data: bytes) -> int:
+        """Call a service; return the number of the call."""
+        self.until(lambda: service in self.services, f'service {service}')
+        number = next(self._numbers)
+        head = struct.pack('<BIII', 2, self.services[service]['id'], number, 3)
+        self._socket.send(head + b'cdr' + data)
+        return number
+
+    def answered(self, call: int) -> bool:
+        """Whether an answer has come."""
+        return call in self._answers
+
+    def call(self, service: str, data: bytes) -> Any:
+        """Call a service; return the response, or the text of the failure."""
+        number = self.start_call(service, data)
+        self.until(lambda: self.answered(number), f'answer of {service}')
+        answer = self._answers[number]
+        if isinstance(answer, str):
+            return answer
+        schema = self.services[service]['response']
+        return decoder(schema['schemaName'], schema['schema'])(answer)
+
+    def get_parameters(self, *names: str) -> dict[str, Any]:
+        """Ask for parameters, all when no name is given."""
+        number = str(next(self._numbers))
+        self._send('getParameters', parameterNames=list(names), id=number)
+        self.until(lambda: number in self._sets, 'parameters')
+        return self._sets[number]
+
+    def set_parameter(self, name: str, value: object, kind: str | None = None) -> dict[str, Any]:
+        """Set a parameter; return the answer."""
+        number = str(next(self._numbers))
+        parameter = {'name': name, 'value': value} | ({'type': kind} if kind else {})
+        self._send('setParameters', parameters=[parameter], id=number)
+        self.until(lambda: number in self._sets, 'answer to setParameters')
+        return self._sets[number]
+
+    def watch_parameters(self, *names: str) -> None:
+        """Subscribe to changes."""
+        self._send('subscribeParameterUpdates', parameterNames=list(names))
+
+    def watch_graph(self) -> None:
+        """Subscribe to the connection graph."""
+        self._send('subscribeConnectionGraph')
+
+    def fetch(self, uri: str) -> bytes | str:
+        """Fetch a file; return its bytes, or the text of the failure."""
+        number = next(self._numbers)
+        self._send('fetchAsset', uri=uri, requestId=number)
+        self.until(lambda: number in self._answers, f'file {uri}')
+        return self._answers[number]
+
+    # -- what comes
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Take what comes until something is true."""
+        deadline = time.monotonic() + TIMEOUT
+        while not condition():
+            left = deadline - time.monotonic()
+            assert left > 0.0, f'no {what}; statuses: {self.statuses}'
+            try:
+                data = self._socket.recv(min(left, 0.2))
+            except TimeoutError:
+                continue
+            if isinstance(data, str):
+                self._take(json.loads(data))
+            else:
+                self._take_binary(data)
+
+    def _take(self, message: dict[str, Any]) -> None:
+        operation = message['op']
+        if operation == 'serverInfo':
+            self.info = message
+        elif operation == 'advertise':
+            self.channels.update({each['topic']: each for each in message['channels']})
+        elif operation == 'unadvertise':
+            gone = set(message['channelIds'])
+            self.channels = {t: c for t, c in self.channels.items() if c['id'] not in gone}
+        elif operation == 'advertiseServices':
+            self.services.update({each['name']: each for each in message['services']})
+        elif operation == 'unadvertiseServices':
+            gone = set(message['serviceIds'])
+            self.services = {n: s for n, s in self.services.items() if s['id'] not in gone}
+        elif operation == 'parameterValues':
+            values = {each['name']: each.get('value') for each in message['parameters']}
+            self.parameters.update(values)
+            self._sets[message.get('id', '')] = values
+        elif operation == 'serviceCallFailure':
+            self._answers[message['callId']] = message['message']
+        elif operation == 'connectionGraphUpdate':
+            self.graph.append(message)
+        elif operation == 'status':
+            self.statuses.append(message['message'])
+
+    def _take_binary(self, data: bytes) -> None:
+        kind = data[0]
+        if kind == 1:
+            number, _ = struct.unpack_from('<IQ', data, 1)
+            self._received[self._subscribed[number]].append(data[13:])
+        elif kind == 3:
+            _, call, length = struct.unpack_from('<III', data, 1)
+            self._answers[call] = data[13 + length :]
+        elif kind == 4:
+            request, status, length = struct.unpack_from('<IBI', data, 1)
+            rest = data[10:]
+            self._answers[request] = rest[:length].decode() if status else rest[length:]
+
+    def _send(self, operation: str, **values: object) -> None:
+        self._socket.send(json.dumps({'op': operation, **values}))
+
+
+def decoder(name: str, definition: str) -> Decoder:
+    """Make a decoder of a definition."""
+    found: Decoder = generate_dynamic(name, definition)[name]
+    return found

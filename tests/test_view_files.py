@@ -1,0 +1,302 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Layouts of Foxglove and files of RViz name what is there: frames, topics, fields, services."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import import_module
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from isolation import Isolation
+from moving_arm import goal_to, GoalRun
+from processes import RunningProcess
+import pytest
+from ros_client import RosClient
+from sensor_msgs.msg import JointState
+from simulated_arm import JOINTS
+from tf2_msgs.msg import TFMessage
+from urdf_reader import read_urdf
+import yaml
+
+from arm_bringup.description import read_description, read_semantic
+from arm_bringup.robots import find_robot
+from node_runner import LATCHED
+
+CHECKOUT = Path(__file__).parents[1]
+ROBOTS = CHECKOUT / 'arm_bringup' / 'robots'
+ARMS = ('panda', 'prbt', 'gp110')
+DOG = CHECKOUT / 'quad_bringup' / 'view'
+LAYOUTS = [*(ROBOTS / name / 'foxglove.json' for name in ARMS), DOG / 'foxglove.json']
+RVIZ = [ROBOTS / name / file for name in ARMS for file in (f'{name}.rviz', 'moveit.rviz')]
+RVIZ.append(DOG / 'quad.rviz')
+STARTING = 120.0
+"""Longest time in [s] until all is ready on a busy machine."""
+
+PANELS = {
+    '3D',
+    'CallService',
+    'DiagnosticSummary',
+    'Plot',
+    'RosOut',
+    'StateTransitions',
+    'Teleop',
+}
+"""Of Foxglove and Lichtblick alike: packages/suite-base/src/panels of the latter."""
+CLASSES = {
+    # rviz_common, src/rviz_common/visualization_frame.cpp and panel_factory.cpp
+    *(f'rviz_common/{name}' for name in ('Displays', 'Tool Properties', 'Views')),
+    # rviz_default_plugins, plugins_description.xml
+    *(f'rviz_default_plugins/{name}' for name in ('Grid', 'Odometry', 'RobotModel', 'TF')),
+    *(f'rviz_default_plugins/{name}' for name in ('FocusCamera', 'Interact', 'Measure')),
+    *(f'rviz_default_plugins/{name}' for name in ('MoveCamera', 'Orbit', 'Select')),
+    # moveit_ros_visualization, motion_planning_rviz_plugin_description.xml
+    'moveit_rviz_plugin/MotionPlanning',
+}
+"""Names of classes that RViz of Jazzy loads."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a file names.
+
+    Attributes:
+        frames: Frames of TF.
+        topics: Topics.
+        fields: Fields of messages, each behind its topic.
+        services: Services, each with its request.
+    """
+
+    frames: frozenset[str]
+    topics: frozenset[str]
+    fields: frozenset[tuple[str, str]]
+    services: frozenset[tuple[str, str]]
+
+
+def entries(value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield each key of a document with its value, however deep."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield key, each
+            yield from entries(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from entries(each)
+
+
+def layout(file: Path) -> Named:
+    """Read a layout."""
+    document = json.loads(file.read_text('utf-8'))
+    found = list(entries(document['configById']))
+    paths = [each['value'] for key, values in found if key == 'paths' for each in values]
+    fields = frozenset((path.partition('.')[0], path.partition('.')[2]) for path in paths)
+    keys = {'topic', 'topicToRender'}
+    topics = {value for key, value in found if key in keys} | {topic for topic, _ in fields}
+    panels = document['configById'].values()
+    calls = {(p['serviceName'], p['requestPayload']) for p in panels if 'serviceName' in p}
+    frames = {value for key, value in found if key in {'followTf', 'frameId'}}
+    return Named(frozenset(frames), frozenset(topics), fields, frozenset(calls))
+
+
+def rviz(file: Path) -> Named:
+    """Read a configuration of RViz."""
+    found = list(entries(yaml.safe_load(file.read_text('utf-8'))))
+    keys = {'Planning Scene Topic', 'Trajectory Topic'}
+    topics = {value for key, value in found if key in keys}
+    topics |= {v['Value'] for k, v in found if k in {'Topic', 'Description Topic'}}
+    keys = {'Fixed Frame', 'Reference Frame', 'Target Frame'}
+    frames = {value for key, value in found if key in keys} - {'<Fixed Frame>'}
+    return Named(frozenset(frames), frozenset(topics), frozenset(), frozenset())
+
+
+def links(name: str) -> set[str]:
+    """Return the links of an arm."""
+    tree = read_urdf(read_description(find_robot(name, ROBOTS)))
+    return set(tree.links)
+
+
+@pytest.mark.parametrize('file', LAYOUTS, ids=str)
+def test_a_layout_shows_each_panel_once(file: Path) -> None:
+    """All are of known kinds, and each has its place."""
+    document = json.loads(file.read_text('utf-8'))
+    placed: list[str] = []
+
+    def walk(node: str | dict[str, Any]) -> None:
+        if isinstance(node, str):
+            placed.append(node)
+            return
+        assert node['direction'] in {'row', 'column'}
+        assert 0 < node['splitPercentage'] < 100
+        walk(node['first'])
+        walk(node['second'])
+
+    walk(document['layout'])
+    assert sorted(placed) == sorted(document['configById'])
+    assert {name.partition('!')[0] for name in placed} <= PANELS
+    assert any(name.startswith('3D!') for name in placed)
+    stops = [p for p in document['configById'].values() if 'STOP' in p.get('buttonText', '')]
+    assert len(stops) == 1
+
+
+@pytest.mark.parametrize('file', RVIZ, ids=str)
+def test_rviz_loads_known_classes(file: Path) -> None:
+    """A class that there is not would be an error on the screen."""
+    document = yaml.safe_load(file.read_text('utf-8'))
+    classes = {value for key, value in entries(document) if key == 'Class'} - {''}
+    assert classes <= CLASSES
+    shown = [each['Class'] for each in document['Visualization Manager']['Displays']]
+    expected = 'MotionPlanning' if file.name == 'moveit.rviz' else 'RobotModel'
+    assert any(each.endswith(expected) for each in shown)
+
+
+@pytest.mark.parametrize('name', ARMS)
+def test_frames_and_groups_of_arms_are_there(name: str) -> None:
+    """In the description of each arm; what all arms have is compared with the Panda's."""
+    files = [layout(ROBOTS / name / 'foxglove.json')]
+    files += [rviz(ROBOTS / name / file) for file in (f'{name}.rviz', 'moveit.rviz')]
+    for file in files:
+        assert file.frames
+        assert file.frames <= links(name)
+    document = yaml.safe_load((ROBOTS / name / 'moveit.rviz').read_text('utf-8'))
+    group = next(value for key, value in entries(document) if key == 'Planning Group')
+    assert f'<group name="{group}">' in read_semantic(find_robot(name, ROBOTS))
+    assert files[1].topics == rviz(ROBOTS / 'panda' / 'panda.rviz').topics
+    assert files[2].topics == rviz(ROBOTS / 'panda' / 'moveit.rviz').topics
+
+
+@pytest.mark.parametrize('name', ARMS)
+def test_plots_of_arms_show_all_joints(name: str) -> None:
+    """Each index is a joint that moves, with its name; the controller is the robot's own."""
+    robot = find_robot(name, ROBOTS)
+    document = json.loads((ROBOTS / name / 'foxglove.json').read_text('utf-8'))
+    joints = list(read_urdf(read_description(robot)).ranges())
+    controllers = yaml.safe_load((ROBOTS / name / 'controllers.yaml').read_text('utf-8'))
+    controller = controllers['controller_manager']['ros__parameters']['controller_name']
+    error = document['configById']['Plot!error']['paths']
+    assert [each['label'] for each in error] == joints
+    assert [each['value'] for each in error] == [
+        f'/{controller}/controller_state.error.positions[{i}]' for i in range(len(joints))
+    ]
+    assert layout(ROBOTS / name / 'foxglove.json').services == {(f'/{joints[0]}/halt', '{}')}
+
+
+def type_of(kind: Any, path: str) -> str:
+    """Return the type of a field of a message.
+
+    Raises:
+        KeyError: There is none.
+    """
+    name, _, rest = path.partition('.')
+    field, indexed = re.fullmatch(r'(\w+)(\[\d+\])?', name).groups()  # type: ignore[union-attr]
+    found = str(kind.get_fields_and_field_types()[field])
+    element = re.sub(r'sequence<([^,>]+)(, \d+)?>|\[\d*\]', r'\1', found)
+    assert bool(indexed) == (element != found), f'{path}: {found}'
+    return type_of(class_of(element, 'msg'), rest) if rest else element
+
+
+def class_of(name: str, folder: str) -> Any:
+    """Return the class of a type, `package/Name` or `package/folder/Name`."""
+    parts = name.split('/')
+    return getattr(import_module(f'{parts[0]}.{folder}'), parts[-1])
+
+
+def missing(client: RosClient, named: Named, frames: set[str]) -> list[str]:
+    """Return what a file names and the running robot has not."""
+    topics = dict(client.node.get_topic_names_and_types())
+    services = dict(client.node.get_service_names_and_types())
+    lacking = [f'topic {name}' for name in named.topics if name not in topics]
+    lacking += [f'frame {name}' for name in named.frames if name not in frames]
+    for topic, path in named.fields:
+        if topic in topics:
+            assert type_of(class_of(topics[topic][0], 'msg'), path), f'{topic}.{path}'
+    for service, request in named.services:
+        if service not in services:
+            lacking.append(f'service {service}')
+            continue
+        kind = class_of(services[service][0], 'srv')
+        fields = kind.Request.get_fields_and_field_types()
+        assert json.loads(request).keys() == fields.keys(), service
+    return lacking
+
+
+def check(client: RosClient, files: list[Named]) -> None:
+    """Wait until all that files name is there."""
+    frames: set[str] = set()
+    moving = client.listen(TFMessage, '/tf', 100)
+    static = client.listen(TFMessage, '/tf_static', LATCHED)
+
+    def all_there() -> bool:
+        for message in (*moving, *static):
+            for each in message.transforms:
+                frames.update((each.header.frame_id, each.child_frame_id))
+        return not any(missing(client, named, frames) for named in files)
+
+    wait_until(client, all_there, lambda: str([missing(client, f, frames) for f in files]))
+
+
+def wait_until(client: RosClient, condition: Callable[[], bool], what: Callable[[], str]) -> None:
+    """Wait, and say at the end what is missing."""
+    try:
+        client.spin_until(condition, STARTING, '')
+    except AssertionError:
+        raise AssertionError(what()) from None
+
+
+@pytest.mark.scenario
+@pytest.mark.timeout(400)
+def test_a_running_arm_has_all_and_its_stop_stops_it(isolation: Isolation) -> None:
+    """STOP of the layout is one service; it ends the motion of all joints."""
+    robot = ROBOTS / 'panda'
+    command = [
+        'ros2',
+        'run',
+        'arm_bringup',
+        'bringup',
+        'panda',
+        '--simulate',
+        '--enable',
+        '--plan',
+    ]
+    command += ['--timeout', str(STARTING), '--can', isolation.bus]
+    with (
+        RunningProcess(command, isolation.env) as bringup,
+        RosClient(isolation.domain_id) as client,
+    ):
+        bringup.wait_for('all is ready', STARTING)
+        shown = layout(robot / 'foxglove.json')
+        check(client, [shown, rviz(robot / 'panda.rviz'), rviz(robot / 'moveit.rviz')])
+        states = client.listen(JointState, '/joint_states')
+        client.spin_until(lambda: bool(states), STARTING, 'joint states')
+        here = dict(zip(states[-1].name, states[-1].position, strict=True))
+        goal = GoalRun(client, goal_to([here[joint] + 0.5 for joint in JOINTS], 60.0))
+
+        def moved() -> bool:
+            there = dict(zip(states[-1].name, states[-1].position, strict=True))
+            return all(abs(there[joint] - here[joint]) > 0.005 for joint in JOINTS)
+
+        client.spin_until(moved, STARTING, 'motion of all joints')
+        [(service, _)] = shown.services
+        assert client.trigger(service).success
+        goal.wait()
+        client.spin_until(
+            lambda: all(abs(v) < 1e-3 for v in states[-1].velocity), STARTING, 'rest of all joints'
+        )
+        stopped = dict(zip(states[-1].name, states[-1].position, strict=True))
+        assert all(abs(stopped[joint] - here[joint]) < 0.4 for joint in JOINTS), 'all of the way'
+
+
+@pytest.mark.scenario
+@pytest.mark.timeout(300)
+def test_a_running_quadruped_has_all(isolation: Isolation) -> None:
+    """Topics, services, fields and frames."""
+    command = ['ros2', 'run', 'quad_bringup', 'bringup', '--simulate']
+    with (
+        RunningProcess(command, isolation.env) as bringup,
+        RosClient(isolation.domain_id) as client,
+    ):
+        bringup.wait_for('all is ready', STARTING)
+        check(client, [layout(DOG / 'foxglove.json'), rviz(DOG / 'quad.rviz')])
