@@ -31,8 +31,8 @@ SHOWN = ('state', 'statusword', 'error_code', 'mode', 'nmt_state', 'emergency')
 
 
 @dataclass
-class Heard:
-    """What somebody heard of the moved drive.
+class Received:
+    """What was received of the moved drive.
 
     Attributes:
         states: Its joint states.
@@ -45,7 +45,7 @@ class Heard:
     diagnostics: list[DiagnosticArray] = field(default_factory=list)
 
     @classmethod
-    def by(cls, client: RosClient) -> Heard:
+    def by(cls, client: RosClient) -> Received:
         """Listen."""
         return cls(
             client.listen(JointState, f'/{MOVED}/joint_states', 100),
@@ -82,7 +82,7 @@ def test_a_recorded_fault_is_seen_as_when_it_happened(
     arguments = ['robot_joint_states:=true', f'black_box_folder:={tmp_path}']
     words = [word for each in arguments for word in ('-p', each)]
     with SimulatedArm(isolation, master_arguments=words) as arm:
-        live = Heard.by(arm.client)
+        live = Received.by(arm.client)
         arm.init_all()
         assert arm.client.trigger(f'/{MOVED}/position_mode').success
         request = COTargetDouble.Request(target=1.0)
@@ -106,7 +106,7 @@ def test_a_recorded_fault_is_seen_as_when_it_happened(
         RosClient(isolation.domain_id, 'second_client') as client,
         RunningProcess(looped, isolation.env) as player,
     ):
-        again = Heard.by(client)
+        again = Received.by(client)
         client.spin_until(
             lambda: bool(again.faulted()) and len(again.positions & live.positions) > 25,
             60.0,
@@ -122,7 +122,7 @@ def test_a_recorded_fault_is_seen_as_when_it_happened(
 
 
 def test_a_replay_ends_when_the_master_comes(isolation: Isolation, tmp_path: Path) -> None:
-    """Nobody hears both; a damaged log is an error with its place."""
+    """Nobody receives both; a damaged log is an error with its place."""
     log = tmp_path / 'bus.log'
     log.write_text('(1.000000) can0 080#\n(2.000000) can0 080#\n(3.0) can0 nonsense\n')
     with RunningProcess(replay(log, '-p', 'rate:=100.0'), isolation.env) as damaged:

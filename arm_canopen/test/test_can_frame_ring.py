@@ -31,7 +31,7 @@ error_frames = st.tuples(st.integers(1, 0x1FFF_FFFF), st.binary(max_size=8)).map
 
 def contents(ring: FrameRing) -> list[tuple[Frame, bool]]:
     """Return all that a ring has."""
-    return [tuple(recorded) for chunk in ring.chunks() for recorded in chunk]
+    return [(frame, sent) for chunk in ring.chunks() for frame, sent in chunk]
 
 
 @given(st.lists(st.tuples(st.one_of(frames(), error_frames), st.booleans()), max_size=200))

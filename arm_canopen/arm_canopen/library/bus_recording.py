@@ -98,9 +98,12 @@ class BusRecording:
         return path
 
     def usage(self, path: Path) -> str:
-        """Return the command that shows the log."""
+        """Return the commands that show the log."""
         config = self._config.file
-        return f'ros2 run canopen_tools candump --read {path} --bus-config {config}'
+        return (
+            f'ros2 run canopen_tools candump --read {path} --bus-config {config}\n'
+            f'ros2 run arm_canopen replay --ros-args -p log:={path} -p bus_config:={config}'
+        )
 
 
 def _sorted(chunks: Iterator[list[RecordedFrame]]) -> Iterator[list[RecordedFrame]]:

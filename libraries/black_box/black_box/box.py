@@ -13,6 +13,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 import re
 import shutil
+from textwrap import indent
 import threading
 import time
 from typing import Protocol, TypeAlias
@@ -53,7 +54,7 @@ class Contents(Protocol):
         """
 
     def usage(self, path: Path) -> str:
-        """Return the command that shows the file that people want to open first."""
+        """Return the command, or commands in lines, that show that file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +202,7 @@ class BlackBox:
         lines += [_line(fault, offset) for fault in faults]
         lines += ['', 'reported:']
         lines += [_line(note, offset) for note in tuple(self._notes) if note.time >= begin]
-        lines += ['', 'to look at it:', f'  {self._contents.usage(opened)}', '']
+        lines += ['', 'to look at it:', indent(self._contents.usage(opened), '  '), '']
         return '\n'.join(lines)
 
     def _remove_old(self, newest: Path) -> None:
