@@ -317,6 +317,8 @@ def test_corrected_scales() -> None:
         'offset_pos_from_dev': -0.125,
     }
     assert 'scale_eff_to_dev' not in corrected(DriveConfig(), 1, 2.0)
+    odd = DriveConfig(scale_pos_to_dev=-1000.0, scale_pos_from_dev=-0.001)
+    assert 'scale_eff_to_dev' not in corrected(odd, -1, 1.0)
 
 
 @pytest.mark.parametrize('device', ['shoulder', 'elbow', 'wrist'])

@@ -35,10 +35,11 @@ def corrected(axis: DriveConfig, sign: int, factor: float) -> dict[str, float | 
         'scale_vel_to_dev': velocity,
         'scale_vel_from_dev': 1.0 / velocity,
     }
-    if sign < 0:
+    effort = math.copysign(axis.scale_eff_to_dev, to_dev)  # torque turns with the position
+    if sign < 0 and effort != axis.scale_eff_to_dev:
         values |= {
-            'scale_eff_to_dev': -axis.scale_eff_to_dev,
-            'scale_eff_from_dev': -axis.scale_eff_from_dev,
+            'scale_eff_to_dev': effort,
+            'scale_eff_from_dev': math.copysign(axis.scale_eff_from_dev, to_dev),
         }
     if axis.offset_pos_from_dev:  # the place of the zero stays
         values['offset_pos_from_dev'] = axis.offset_pos_from_dev / change
