@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 from dataclasses import dataclass
 import ipaddress
 import os
@@ -14,11 +14,13 @@ import shutil
 import subprocess
 import uuid
 
+from network_link import Link
 from processes import RunningProcess
 import pytest
 
 # each host has its own shared memory, as machines have
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
+_MARK = 8  # characters that make the names of a test its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +39,12 @@ class Host:
 
     def run(self, arguments: Sequence[str], env: Mapping[str, str]) -> RunningProcess:
         """Start a program on this host; it shares memory with what it starts."""
+        return RunningProcess(self.command(arguments), env)
+
+    def command(self, arguments: Sequence[str]) -> list[str]:
+        """Return the command that runs a program on this host."""
         inside = ['sh', '-c', _OWN_MEMORY, 'sh', *arguments]
-        return RunningProcess(['ip', 'netns', 'exec', self.namespace, *inside], env)
+        return ['ip', 'netns', 'exec', self.namespace, *inside]
 
     def set_link(self, state: str) -> None:
         """Set its end of the cable ``up`` or ``down``."""
@@ -62,19 +68,38 @@ class Host:
 @contextmanager
 def two_hosts() -> Iterator[tuple[Host, Host]]:
     """Make the hosts and remove them; skips where that is not possible."""
+    with _two_namespaces() as (robot, desk):
+        ends = ['type', 'veth', 'peer', 'name', desk.interface, 'netns', desk.namespace]
+        with _possible():
+            _ip('-n', robot.namespace, 'link', 'add', robot.interface, *ends)
+            _configure(robot, desk)
+        yield robot, desk
+
+
+@contextmanager
+def two_linked_hosts() -> Iterator[tuple[Host, Host, Link]]:
+    """Make the hosts with a link that has faults on request; skips where that is not possible."""
+    with _two_namespaces() as (robot, desk), ExitStack() as stack:
+        with _possible():
+            link = stack.enter_context(Link(robot.namespace[-_MARK:]))
+            for host, name in zip((robot, desk), link.names, strict=True):
+                _ip('link', 'set', name, 'netns', host.namespace, 'name', host.interface)
+            _configure(robot, desk)
+        yield robot, desk, link
+
+
+@contextmanager
+def _two_namespaces() -> Iterator[tuple[Host, Host]]:
     if shutil.which('ip') is None or os.geteuid() != 0:
         pytest.skip('network namespaces want root and iproute2')
-    mark = uuid.uuid4().hex[:8]
+    mark = uuid.uuid4().hex[:_MARK]
     robot = Host(f'robot-{mark}', 'cable0', '10.77.0.1')
     desk = Host(f'desk-{mark}', 'cable1', '10.77.0.2')
     hosts = robot, desk
     try:
-        try:
+        with _possible():
             for host in hosts:
                 _ip('netns', 'add', host.namespace)
-            _join(*hosts)
-        except subprocess.CalledProcessError as error:
-            pytest.skip(f'no network namespaces here: {error.stderr}')
         yield hosts
     finally:
         for host in hosts:
@@ -82,10 +107,19 @@ def two_hosts() -> Iterator[tuple[Host, Host]]:
                 _ip('netns', 'del', host.namespace)
 
 
-def _join(one: Host, other: Host) -> None:
-    ends = ['type', 'veth', 'peer', 'name', other.interface, 'netns', other.namespace]
-    _ip('-n', one.namespace, 'link', 'add', one.interface, *ends)
-    for host in (one, other):
+@contextmanager
+def _possible() -> Iterator[None]:
+    """Skip the test where this machine does not allow what is done."""
+    try:
+        yield
+    except subprocess.CalledProcessError as error:
+        pytest.skip(f'no network namespaces here: {error.stderr}')
+    except OSError as error:
+        pytest.skip(f'no tap devices here: {error}')
+
+
+def _configure(*hosts: Host) -> None:
+    for host in hosts:
         _ip('-n', host.namespace, 'link', 'set', 'lo', 'up')
         _ip('-n', host.namespace, 'addr', 'add', f'{host.address}/24', 'dev', host.interface)
         host.set_link('up')

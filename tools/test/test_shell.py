@@ -77,6 +77,7 @@ def test_discovery_stays_on_this_host_by_default(checkout: Path) -> None:
         {},
         {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'},
         {'ROS_STATIC_PEERS': '10.0.0.1'},
+        {'ROS_DISCOVERY_SERVER': '10.0.0.1:11811'},
         {'DDS_NETWORK': 'localhost'},
     ):
         done = shell('bash', '. ./env.sh; env', checkout, **outer)

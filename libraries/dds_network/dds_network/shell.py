@@ -18,6 +18,7 @@ from .environment import (
     PEERS_VARIABLE,
     RANGE_VARIABLE,
     selected_reach,
+    SERVER_VARIABLE,
 )
 from .exceptions import NetworkChoiceError
 from .reach import Reach
@@ -39,6 +40,7 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
         f'{name}={environ[name]}'
         for name, effective in (
             (PEERS_VARIABLE, bool(environ.get(PEERS_VARIABLE))),
+            (SERVER_VARIABLE, _is_elsewhere(environ.get(SERVER_VARIABLE, ''))),
             (RANGE_VARIABLE, environ.get(RANGE_VARIABLE, '').upper() == _SUBNET),
         )
         if effective and environ.get(LOCALHOST_ONLY_VARIABLE) != '1'
@@ -48,6 +50,12 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
             f'{" and ".join(without_effect)} has no effect, DDS stays on this host; to open it: '
             f'export {NETWORK_VARIABLE}=INTERFACE or a peer, and source env.sh again'
         )
+
+
+def _is_elsewhere(servers: str) -> bool:
+    """Whether a list of discovery servers, ADDRESS[:PORT] each, has one off loopback."""
+    addresses = (each.strip() for each in servers.split(';'))
+    return any(each and not each.startswith(('127.', 'localhost')) for each in addresses)
 
 
 def main(environ: Mapping[str, str] = os.environ) -> int:
