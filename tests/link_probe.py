@@ -33,15 +33,15 @@ def echo(address: str) -> None:
             own.sendto(text, sender)
 
 
-def ask(address: str, target: str, count: int, patience: float) -> None:
+def ask(address: str, target: str, count: int, timeout: float) -> None:
     """Ask, and print what came back."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
         own.setsockopt(socket.SOL_IP, socket.IP_MULTICAST_IF, socket.inet_aton(address))
-        own.settimeout(patience)
+        own.settimeout(timeout)
         for _ in range(count):
             own.sendto(repr(time.monotonic()).encode(), (target, PORT))
             time.sleep(GAP)
-        times = []
+        times: list[float] = []
         try:
             while len(times) < count:
                 sent = float(own.recv(64))

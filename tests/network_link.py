@@ -86,8 +86,8 @@ class Link:
         last = dict.fromkeys(self._ends, 0.0)  # [s] when the last frame of an end is due
         count = 0
         while True:
-            patience = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
-            ready, _, _ = select.select([*self._ends, self._wake], [], [], patience)
+            timeout = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
+            ready, _, _ = select.select([*self._ends, self._wake], [], [], timeout)
             if self._wake in ready:
                 return
             now = time.monotonic()

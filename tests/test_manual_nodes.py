@@ -21,7 +21,7 @@ pytestmark = pytest.mark.scenario
 
 PAGE = CHECKOUT / 'docs' / 'reference' / 'nodes.md'
 RECORDER = Path(__file__).with_name('node_recorder')
-PATIENCE = 90.0  # [s] until all is declared, on a busy machine
+TIMEOUT = 90.0  # [s] until all is declared, on a busy machine
 QUIET = 10.0  # [s] after which nothing more is declared
 WRITE = bool(os.environ.get('WRITE_PAGES'))
 
@@ -101,7 +101,7 @@ def test_the_page_has_what_nodes_declare(isolation: Isolation, tmp_path: Path, n
             if title.partition(': ')[0] in run.programs
         }
         assert shown
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while (found := recorded(tmp_path, run)) != shown and time.monotonic() < deadline:
             time.sleep(0.2)
     assert found == shown, f'{PAGE.name} is stale: WRITE_PAGES=1 pytest {Path(__file__).name}'

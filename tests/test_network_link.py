@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The link between two hosts does to frames what it is told."""
+"""The link between two hosts does to frames what its condition says."""
 
 from __future__ import annotations
 

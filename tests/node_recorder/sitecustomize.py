@@ -53,6 +53,12 @@ def words_of(qos: Any) -> str:  # rclpy is not imported here
     return ', '.join(words)
 
 
+def kind_of(types: Any, value: Any) -> str:
+    """Return the type of a parameter, declared with a value or with a type alone."""
+    kind = value if isinstance(value, types) else types.from_parameter_value(value)
+    return str(kind.name).lower().replace('_', ' ')
+
+
 def range_of(descriptor: Any) -> str:
     """Return the values that a parameter may have; empty for all."""
     for limits in (*descriptor.floating_point_range, *descriptor.integer_range):
@@ -88,15 +94,14 @@ def install() -> None:
         for name, *rest in listed:
             value = rest[0] if rest else None
             descriptor = rest[1] if len(rest) > 1 else None
-            is_type = isinstance(value, Parameter.Type)
-            kind = value if is_type else Parameter.Type.from_parameter_value(value)
-            value = defaults.pop((id(node), name), None if is_type else value)
+            kind = kind_of(Parameter.Type, value)
+            value = defaults.pop((id(node), name), value)
             write(
                 node,
                 'parameter',
                 f'{namespace}.{name}' if namespace else name,
-                kind.name.lower().replace('_', ' '),
-                default=value,
+                kind,
+                default=None if isinstance(value, Parameter.Type) else value,
                 range=range_of(descriptor) if descriptor else '',
                 about=descriptor.description if descriptor else '',
                 fixed=bool(descriptor and descriptor.read_only),
