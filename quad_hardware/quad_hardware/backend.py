@@ -10,15 +10,40 @@ import logging
 import threading
 import time
 
-from quad_description import Backend, RobotState
+from quad_description import Backend, movable_joints, RobotState
 
+from .estimation import EstimatorSettings, ImuMounting
 from .exceptions import CommandError, NoAnswerError
-from .link import LinkState, STALE_TIME
+from .joints import JointMap, servo_of
+from .link import LinkOptions, LinkState, STALE_TIME
+from .protocol import Protocol, PROTOCOLS
 from .serial_robot import RobotSettings, SerialRobot
 
 CONNECT_TIME = 10.0  # [s] in which the robot has to be found
 
 _log = logging.getLogger(__name__)
+
+
+def robot_at(
+    port: str, urdf: str, protocols: Sequence[Protocol] = PROTOCOLS, *, imu_checked: bool = False
+) -> SerialBackend:
+    """Return the back end of a robot that is as its URDF says.
+
+    Args:
+        port: Device file.
+        urdf: What it is.
+        protocols: What to try, in this order.
+        imu_checked: Its IMU is mounted as in the URDF, and somebody has made sure of it; a
+            simulated one is.
+
+    Raises:
+        CommandError: The legs of the URDF cannot be read.
+    """
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    mounting = ImuMounting(checked=imu_checked, rates_checked=imu_checked)
+    link = LinkOptions(port, tuple(protocols))
+    estimator = EstimatorSettings(mounting=mounting)
+    return SerialBackend(RobotSettings(link, urdf, joints, estimator=estimator))
 
 
 class SerialBackend(Backend):
@@ -108,7 +133,11 @@ class SerialBackend(Backend):
     def _take(self, state: RobotState) -> None:
         odometry = self._robot.update_odometry(state)
         if odometry is not None:
-            state = replace(state, position=(odometry.x, odometry.y, odometry.height))
+            state = replace(
+                state,
+                position=(odometry.x, odometry.y, odometry.height),
+                linear_velocity=odometry.velocity_in_base,
+            )
         with self._arrived:
             self._state, self._count = state, self._count + 1
             self._arrived.notify_all()

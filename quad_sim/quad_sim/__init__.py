@@ -14,14 +14,19 @@ Physics in virtual time, without ROS, threads or a serial port (needs MuJoCo)::
 """
 
 from .exceptions import SetupError, SimulationError, TargetError
+from .line.command_times import CommandTiming
 from .plant.servo import ServoModel, ServoParameters
 from .plant.terrain import Terrain
+from .served import ServedRobot, Watched
 
 __all__ = [
+    'CommandTiming',
+    'ServedRobot',
     'ServoModel',
     'ServoParameters',
     'SetupError',
     'SimulationError',
     'TargetError',
     'Terrain',
+    'Watched',
 ]

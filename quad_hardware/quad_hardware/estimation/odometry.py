@@ -93,6 +93,12 @@ class OdometryState:
     standing: tuple[bool, ...]
 
     @property
+    def velocity_in_base(self) -> Vector:
+        """Velocity over the ground in base_link [m/s]."""
+        level = multiply(about_z(-yaw_of(self.rotation)), self.rotation)
+        return rotate(conjugate(level), (self.velocity_x, self.velocity_y, 0.0))
+
+    @property
     def position_variance(self) -> float:
         """Variance of x and y [m²], which grows with the way."""
         return MIN_VARIANCE + (DRIFT * self.distance) ** 2

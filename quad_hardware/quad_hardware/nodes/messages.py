@@ -168,13 +168,13 @@ def odometry_template(imu: ImuSample, deviations: Deviations, frames: Frames) ->
 def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Numbers:
     """Return what :class:`OdometryTemplate` takes."""
     rotation, height = state.rotation, state.height
-    velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
     rate = imu.angular_velocity or _ZERO  # in the body
     if frames.footprint_is_parent:
+        velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
         rate = rotate(_level(rotation), rate)
         rotation, height = about_z(yaw_of(rotation)), 0.0
     else:
-        velocity = rotate(conjugate(_level(rotation)), velocity)
+        velocity = state.velocity_in_base
     return (state.x, state.y, height, *rotation, *velocity, *rate, state.position_variance)
 
 

@@ -24,10 +24,10 @@ from quad_description import (
     robot_urdf,
     RobotState,
 )
-from quad_description.rotations import down_in_body, from_roll_pitch_yaw, Vector
+from quad_description.rotations import down_in_body, Vector
 
 from ..exceptions import SetupError, TargetError
-from ..physics import Robot
+from ..physics import ImuBias, Robot
 from ..plant.servo import ServoModel, ServoParameters
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
 from .rewards import Moved, RewardWeights
@@ -235,8 +235,8 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         random, ranges = self.np_random, self._randomization
         self.robot.reset(seed=int(random.integers(2**31)), variation=ranges.variation(random))
         self._delay = float(random.uniform(*ranges.delay))
-        self._gyro_bias = random.uniform(*ranges.gyro_bias, 3)
-        self._level_bias = random.uniform(*ranges.level_bias, 2).tolist()
+        x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
+        self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
         self._is_command_lasting = command is not None
         self.command = command or self._commands.draw(random)
         self._steps = 0
@@ -247,18 +247,16 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
 
     def _sense(self) -> RobotState:
         measured = self.robot.measure()
-        roll, pitch, yaw = measured.imu.roll_pitch_yaw
-        orientation = from_roll_pitch_yaw(
-            roll + self._level_bias[0], pitch + self._level_bias[1], yaw
-        )
-        x, y, z = (np.array(measured.imu.angular_velocity) + self._gyro_bias).tolist()
+        imu = measured.imu
+        orientation = self._bias.orientation(*imu.roll_pitch_yaw)
+        rates = self._bias.rates(imu.angular_velocity)
         return RobotState(
             JointSample(
                 tuple(measured.positions.tolist()),
                 tuple(measured.velocities.tolist()),
                 self.robot.time,
             ),
-            ImuSample(orientation, (x, y, z), measured.imu.specific_force),
+            ImuSample(orientation, rates, imu.specific_force),
             time=self.robot.time,
         )
 

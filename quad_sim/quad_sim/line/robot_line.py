@@ -8,15 +8,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-from quad_hardware.protocol import Frame, HOST_KINDS, Protocol, StreamParser, V1, V2
+from quad_hardware.protocol import Code, Frame, HOST_KINDS, Protocol, StreamParser, V1, V2
 
 from ..board.board import Board
 from ..board.functions import Functions
 from ..board.registers import Registers
+from .command_times import CommandTimes
 from .faults import Fault, FaultKind, FaultPlan
 from .wire import Arrival, Wire
 
 LATE = 0.05  # [s] after which a state that was due is one of now
+JOINT_COMMANDS = {Code.SERVO, Code.SERVOS}
 QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
 
 
@@ -43,6 +45,7 @@ class RobotLine:
         statistics: What the robot has received.
         to_robot: The wire from the host.
         to_host: The wire to the host.
+        command_times: When joint commands of protocol v2 came.
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class RobotLine:
         """
         self.faults = faults or FaultPlan()
         self.statistics = LineStatistics()
+        self.command_times = CommandTimes()
         self.to_robot = Wire(self.faults, FaultKind.DEAF, seed, slow=False)
         self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
         self._board = board
@@ -118,7 +122,10 @@ class RobotLine:
         self._board.advance(now)
         if now - self._received_at > QUIET:
             self._give_up_waiting(now)
-        return b''.join(arrived.data for arrived in self.to_host.take(now))
+        out = b''.join(arrived.data for arrived in self.to_host.take(now))
+        if out:
+            self.command_times.sent(now)
+        return out
 
     @property
     def next_event(self) -> float:
@@ -167,6 +174,8 @@ class RobotLine:
             self.statistics.hurried += 1
             return
         self.statistics.frames += 1
+        if protocol is V2 and frame.address in JOINT_COMMANDS:
+            self.command_times.commanded(begin)
         handler = self._functions if protocol is V2 else self._registers
         for answer in handler.handle(frame, now):
             self._send(answer, protocol, now)

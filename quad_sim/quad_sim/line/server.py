@@ -49,13 +49,20 @@ class Server:
         unread: Bytes for the host that nobody has read.
     """
 
-    def __init__(self, plant: Plant, line: RobotLine, terminal: PseudoTerminal) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        line: RobotLine,
+        terminal: PseudoTerminal,
+        watch: Callable[[], None] = lambda: None,
+    ) -> None:
         """Connect robot and terminal.
 
         Args:
             plant: The robot.
             line: Its board and serial line.
             terminal: Where programs find it; closing it is up to the caller.
+            watch: Is called every 20 ms, between two turns of the loop.
         """
         self._plant, self._line, self._terminal = plant, line, terminal
         self._actions: deque[tuple[Future[object], Callable[[], object]]] = deque()
@@ -64,6 +71,7 @@ class Server:
         self._stop = threading.Event()
         self._start = time.monotonic()
         self.unread = 0
+        self._watch = watch
         self._look()
 
     def run(self) -> None:
@@ -137,3 +145,4 @@ class Server:
         self._looked_at = self.now
         plant = self._plant
         self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity)
+        self._watch()

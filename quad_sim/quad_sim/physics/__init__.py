@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot in MuJoCo; the only part of the simulation that needs it."""
 
-from .backend import PhysicsBackend
+from .backend import ImuBias, PhysicsBackend
+from .meter import Meter, Metered
 from .robot import Robot
 from .variation import Variation
 
-__all__ = ['PhysicsBackend', 'Robot', 'Variation']
+__all__ = ['ImuBias', 'Meter', 'Metered', 'PhysicsBackend', 'Robot', 'Variation']

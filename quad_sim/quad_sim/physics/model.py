@@ -19,15 +19,24 @@ from quad_description.urdf import JointKind, parse
 
 from ..exceptions import SetupError
 from ..plant.servo import JAW, ServoParameters
+from ..plant.state import Array
 from ..plant.terrain import Terrain
 
 BASE: Final = 'base_link'
 IMU: Final = 'imu_link'
-FLOOR: Final = 'floor'
+FLOOR, BUMPS = 'floor', 'bumps'
 ACCELEROMETER, GYRO = 'accelerometer', 'gyro'
 
 FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
 _TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
+
+_ALL, _FEET_ONLY = 1, 2
+"""Bits of what touches what: shapes of whole links on bumps would cost six times the rest."""
+
+_BUMP_CELL = 0.05  # [m] between two heights of rough ground
+_BUMP_CELLS = 240  # along each side: 6 m to every side of the start
+_SMOOTH_RADIUS = 0.3  # [m] around the start, larger than the robot
+_SUNK = 0.005  # [m] ground without bumps lies below the plane, or two floors would carry a foot
 
 
 def _pass_over(_text: str) -> None:
@@ -123,20 +132,45 @@ def _body(spec: mujoco.MjSpec, name: str) -> mujoco.MjsBody:
 def _add_base(spec: mujoco.MjSpec) -> None:
     _body(spec, BASE).add_freejoint(name='base')
     for geom in spec.geoms:
-        geom.contype, geom.conaffinity = 0, 1
+        geom.contype, geom.conaffinity = 0, _ALL
 
 
 def _add_floor(spec: mujoco.MjSpec, terrain: Terrain) -> None:
-    spec.worldbody.add_geom(
-        name=FLOOR,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0, 0, 1],
-        quat=np.roll(terrain.orientation, 1),  # MuJoCo has w first
-        friction=[terrain.friction, 0.005, 0.0001],  # sliding, MuJoCo's own torsion and rolling
-        priority=1,  # the friction is the floor's, whatever touches it
-        contype=1,
-        conaffinity=0,
-    )
+    ground = {
+        'quat': np.roll(terrain.orientation, 1),  # MuJoCo has w first
+        'friction': [terrain.friction, 0.005, 0.0001],  # sliding, MuJoCo's torsion and rolling
+        'priority': 1,  # the friction is the floor's, whatever touches it
+        'conaffinity': 0,
+    }
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name=FLOOR, type=plane, size=[0, 0, 1], contype=_ALL, **ground)
+    if terrain.roughness:
+        half = 0.5 * _BUMP_CELL * (_BUMP_CELLS - 1)
+        spec.add_hfield(
+            name=BUMPS,
+            nrow=_BUMP_CELLS,
+            ncol=_BUMP_CELLS,
+            size=[half, half, terrain.roughness + _SUNK, 0.01],
+            userdata=_bumps(terrain).ravel(),
+        )
+        spec.worldbody.add_geom(
+            name=BUMPS,
+            type=mujoco.mjtGeom.mjGEOM_HFIELD,
+            hfieldname=BUMPS,
+            pos=[-_SUNK * each for each in terrain.normal],
+            contype=_FEET_ONLY,
+            **ground,
+        )
+
+
+def _bumps(terrain: Terrain) -> Array:
+    """Return heights from 0, which is below the plane, to 1; flat around the start."""
+    heights = np.random.default_rng(terrain.seed).random((_BUMP_CELLS, _BUMP_CELLS))
+    heights /= heights.max()
+    places = _BUMP_CELL * (np.arange(_BUMP_CELLS) - 0.5 * (_BUMP_CELLS - 1))
+    near = np.hypot(*np.meshgrid(places, places)) < _SMOOTH_RADIUS
+    bumps: Array = np.where(near, 0.0, heights)
+    return bumps
 
 
 def _add_servo(spec: mujoco.MjSpec, joint: Joint, servo: ServoParameters) -> None:
@@ -180,6 +214,7 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
     for foot in FEET:
         body = _body(spec, foot)
         body.geoms[0].name = foot
+        body.geoms[0].conaffinity = _ALL | _FEET_ONLY
         radius = float(body.geoms[0].size[0]) + _TOUCH_MARGIN
         body.add_site(name=foot, size=[radius] * 3)
         spec.add_sensor(

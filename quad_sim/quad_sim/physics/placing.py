@@ -14,7 +14,7 @@ from quad_description import Pose, pose_positions
 from ..exceptions import SetupError
 from ..plant.state import Array
 from ..plant.terrain import Terrain
-from .model import FLOOR
+from .model import BUMPS, FLOOR
 
 _FAR = 10.0  # [m] farther than any part of a robot is from the floor at the start
 
@@ -51,7 +51,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, terrain: Terrain) -> None:
     gap = min(
         mujoco.mj_geomDistance(model, data, geom, floor, _FAR, points)
         for geom in range(model.ngeom)
-        if geom != floor
+        if model.geom(geom).name not in {FLOOR, BUMPS}  # there are no bumps at the start
     )
     data.qpos[:3] -= gap * normal
 

@@ -10,7 +10,7 @@ import math
 import mujoco
 
 from ..exceptions import SetupError
-from .model import BASE, FLOOR
+from .model import BASE, BUMPS, FLOOR
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,11 @@ class VariedModel:
             model: Is varied in place.
         """
         self._model = model
-        self._floor, self._base = int(model.geom(FLOOR).id), int(model.body(BASE).id)
-        self._friction = float(model.geom_friction[self._floor, 0])
+        self._base = int(model.body(BASE).id)
+        self._ground = [
+            geom for geom in range(model.ngeom) if model.geom(geom).name in {FLOOR, BUMPS}
+        ]
+        self._friction = float(model.geom_friction[self._ground[0], 0])
         self._mass = float(model.body_mass[self._base])
         self._inertia = model.body_inertia[self._base].copy()
         self._damping = model.dof_damping.copy()
@@ -76,7 +79,7 @@ class VariedModel:
             return
         self._present = variation
         friction = self._friction if variation.friction is None else variation.friction
-        model.geom_friction[self._floor, 0] = friction
+        model.geom_friction[self._ground, 0] = friction
         model.body_mass[self._base] = self._mass * variation.trunk_mass
         model.body_inertia[self._base] = self._inertia * variation.trunk_mass
         model.dof_damping[:] = self._damping * variation.damping

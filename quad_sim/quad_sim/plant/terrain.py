@@ -12,21 +12,27 @@ from quad_description.rotations import about, Quaternion, Vector
 from ..exceptions import SetupError
 
 MAX_SLOPE = math.radians(45.0)  # [rad] steeper than any foot holds
+MAX_ROUGHNESS = 0.1  # [m] higher than the hips of the robot
 
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """A plane, level or tilted.
+    """A plane, level or tilted, with bumps on it or without.
 
     Attributes:
         angle: How steep it is [rad].
         direction: Where it rises to, from the world's x axis counter-clockwise [rad].
         friction: Coefficient of friction under the feet.
+        roughness: Height of the highest bumps above the plane [m]; 0 for none. There are none
+            where the robot is put down, and only its feet touch them.
+        seed: Of the bumps.
     """
 
     angle: float = 0.0
     direction: float = 0.0
     friction: float = 0.8
+    roughness: float = 0.0
+    seed: int = 0
 
     def __post_init__(self) -> None:
         """Refuse ground that nothing stands on."""
@@ -38,6 +44,8 @@ class Terrain:
             raise SetupError(f'slope direction {self.direction} is not an angle')
         if not 0.0 < self.friction < 10.0:
             raise SetupError(f'friction {self.friction}: give more than 0 and less than 10')
+        if not 0.0 <= self.roughness <= MAX_ROUGHNESS:
+            raise SetupError(f'roughness of {self.roughness} m: give 0 to {MAX_ROUGHNESS:g}')
 
     @classmethod
     def slope(cls, angle: float, direction: float = 0.0) -> Terrain:

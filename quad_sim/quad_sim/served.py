@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A robot in physics behind a serial port, in a process of its own, that is watched from here.
+
+What runs against it goes the whole way: servos, board, serial line, and clocks that do not wait.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from enum import Enum
+import multiprocessing
+from multiprocessing.connection import Connection
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import tempfile
+from types import TracebackType
+from typing import Any, cast, TYPE_CHECKING
+
+from quad_description import Pose, pose_positions, robot_urdf
+
+from .exceptions import SetupError, SimulationError
+from .line.command_times import CommandTiming
+from .line.pseudo_terminal import PseudoTerminal
+from .line.server import Server
+from .options import build, parse_arguments, Simulation
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+    from .physics.meter import Metered
+
+START_TIME = 120.0  # [s] in which the process has to be there, on a machine that has much to do
+ANSWER_TIME = 40.0  # [s]
+
+
+class _Request(Enum):
+    STAND = 'stand'
+    KICK = 'kick'
+    BEGIN = 'begin'
+    READ = 'read'
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """What was seen of a robot since :meth:`ServedRobot.begin`.
+
+    Attributes:
+        metered: Where it went, and what that cost.
+        timing: When its commands came.
+    """
+
+    metered: Metered
+    timing: CommandTiming
+
+
+class ServedRobot:
+    """Makes a robot that lives in real time, for a ``with`` block.
+
+    Attributes:
+        port: Path of its serial port.
+    """
+
+    def __init__(self, *arguments: str) -> None:
+        """Prepare; the robot stands as soon as the block begins.
+
+        Args:
+            arguments: Of fake_xgo, but for ``--link`` and ``--start``.
+        """
+        self._arguments = arguments
+        self.port = ''
+
+    def __enter__(self) -> Self:
+        """Start the process.
+
+        Raises:
+            SimulationError: It did not start; the message has the reason.
+        """
+        self._folder = tempfile.TemporaryDirectory(prefix='quad_sim-')
+        self.port = str(Path(self._folder.name) / 'xgo')
+        self._pipe, theirs = multiprocessing.Pipe()
+        argv = ['--link', self.port, '--start', Pose.STAND.value, *self._arguments]
+        number = theirs.fileno()
+        # not multiprocessing's: that runs the main module of this process again
+        program = [sys.executable, '-c', f'import {__name__} as m; m.serve()', str(number), *argv]
+        self._process = subprocess.Popen(program, pass_fds=[number])
+        theirs.close()
+        try:
+            self._answer(START_TIME)
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """End the process."""
+        self._pipe.close()  # which it takes as the end
+        try:
+            self._process.wait(ANSWER_TIME)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+    def stand(self) -> None:
+        """Put the robot on its feet where it began, whatever it did before."""
+        self._ask(_Request.STAND)
+
+    def kick(self, x: float, y: float) -> None:
+        """Change its velocity at once, ahead and to the left [m/s]."""
+        self._ask(_Request.KICK, (x, y, 0.0))
+
+    def begin(self) -> None:
+        """Begin to watch it anew."""
+        self._ask(_Request.BEGIN)
+
+    def read(self) -> Watched:
+        """Return what was seen since."""
+        return cast('Watched', self._ask(_Request.READ))
+
+    def _ask(self, request: _Request, argument: object = None) -> object:
+        try:
+            self._pipe.send((request, argument))
+        except OSError as error:
+            raise SimulationError(f'the simulated robot is gone: {error}') from error
+        return self._answer(ANSWER_TIME)
+
+    def _answer(self, timeout: float) -> object:
+        try:
+            if not self._pipe.poll(timeout):
+                raise SimulationError(f'the simulated robot did not answer within {timeout:g} s')
+            answer = self._pipe.recv()
+        except EOFError as error:
+            raise SimulationError('the process of the simulated robot has ended') from error
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+
+def serve() -> None:
+    """Let a robot live until the pipe is closed whose number is the first argument."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever asked ends by it, and closes the pipe
+    number, *argv = sys.argv[1:]
+    with Connection(int(number)) as pipe:
+        try:
+            simulation = build(parse_arguments(argv))
+            with PseudoTerminal(Path(argv[1])) as terminal:
+                _Watch(simulation, argv, terminal).answer(pipe)
+        except SimulationError as error:
+            pipe.send(error)
+
+
+class _Watch:
+    """Does to a robot what is asked for."""
+
+    def __init__(
+        self, simulation: Simulation, argv: Sequence[str], terminal: PseudoTerminal
+    ) -> None:
+        from .physics import Meter, Robot
+
+        robot = simulation.plant
+        if not isinstance(robot, Robot):
+            raise SetupError('a robot without physics goes nowhere; leave out --physics none')
+        options = parse_arguments(argv)
+        urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
+        self._robot, self._line = robot, simulation.line
+        self._meter = Meter(robot, urdf)
+        self._pose = pose_positions(Pose.STAND, options.arm)
+        self._server = Server(robot, simulation.line, terminal, self._meter.sample)
+        self._actions: dict[_Request, Callable[[Any], object]] = {
+            _Request.STAND: lambda _: self._stand(),
+            _Request.KICK: robot.kick,
+            _Request.BEGIN: lambda _: self._begin(),
+            _Request.READ: lambda _: Watched(
+                self._meter.read(), self._line.command_times.timing()
+            ),
+        }
+
+    def answer(self, pipe: Connection) -> None:
+        """Carry requests out until there will be no more."""
+        with closing(self._server), ThreadPoolExecutor(1) as pool:
+            life = pool.submit(self._server.run)
+            try:
+                pipe.send(None)
+                while True:
+                    request, argument = pipe.recv()
+                    pipe.send(self._do(request, argument))
+            except (EOFError, OSError):  # whoever asked is gone
+                pass
+            finally:
+                self._server.stop()
+            life.result()
+
+    def _do(self, request: _Request, argument: object) -> object:
+        action = self._actions[request]
+        try:
+            return self._server.submit(lambda: action(argument)).result(ANSWER_TIME / 2)
+        except (SimulationError, TimeoutError) as error:
+            return SimulationError(f'{request.value}: {error}')
+
+    def _stand(self) -> None:
+        self._robot.reset(pose=self._pose)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._meter.begin()
+        self._line.command_times.clear()
