@@ -40,3 +40,10 @@ class PolicyError(QuadControllerError, ValueError):
         """Keep the reason beside the message, whose first line it is by default."""
         self.reason = reason or message.partition('\n')[0]
         super().__init__(message)
+
+
+class CheckError(QuadControllerError):
+    """A policy could not be tried; it says nothing about the policy.
+
+    Scenarios: no MuJoCo, the simulated robot was lost on a machine that is far too busy.
+    """

@@ -12,7 +12,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-from comparison import best, Figures, Ground, table, Walker
+from comparison import best, compare, table
 from contract_env import practice_env, TaughtEnv, values_for
 from gait_teacher import GaitTeacher
 import numpy as np
@@ -32,6 +32,8 @@ from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy_check.conditions import Conditions
+from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.states.controller import Controller
 from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
@@ -160,24 +162,27 @@ def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
 
 def test_figures_distinguish_a_walker_that_falls() -> None:
     """On the same way with the same pushes."""
-    pushed = Ground('pushed', push=0.5)
-    walked = Walker(None, pushed, seed=1).figures([Velocity(0.2)], 6.0)
-    assert walked.falls == 0.0
-    assert walked.off < 0.05
-    toppled = Walker(None, Ground('hit', push=4.0), seed=1).figures([Velocity(0.2)], 6.0)
-    assert toppled.falls > 0.0
-    assert math.isfinite(toppled.falls)
-    text = table({'gait': {'pushed': walked, 'hit': toppled}})
-    assert f'{toppled.falls:.1f}' in text
+    grounds = {'pushed': Conditions(push=0.5), 'hit': Conditions(push=4.0)}
+    compared = compare({'gait': None}, 6.0, grounds=grounds, commands=(Velocity(0.2),))
+    walked, toppled = compared['gait'].values()
+    assert walked.falls == 0
+    assert walked.error < 0.05
+    assert toppled.falls > 0
+    assert f'{toppled.falls_per_minute:.1f}' in table(compared)
 
 
 def test_the_better_one_falls_less_often_and_then_is_less_off() -> None:
     """A fall in a minute, or a quarter of them, more or less is chance."""
-    near, far = Figures(0.01, 0.1, 7.5), Figures(0.03, 0.0, 6.0)
-    clumsy = Figures(0.0, 0.0, 12.0)
+    near, far, clumsy = figures(0.01, 15), figures(0.03, 12), figures(0.0, 24)
     compared = {'clumsy': {'a': clumsy}, 'far': {'a': far}, 'near': {'a': near}}
     assert best(compared) == 'near'
     assert best({name: compared[name] for name in ('clumsy', 'far')}) == 'far'
+
+
+def figures(off: float, falls: int) -> CourseFigures:
+    """What somebody came to in two minutes."""
+    passage = Passage(Velocity(0.2), Velocity(0.2 + off), 120.0, falls, 0.1, 0.0, 0.0, 0.0, 1.0)
+    return CourseFigures((passage,))
 
 
 def test_progress_is_seen_in_a_log_and_in_a_terminal() -> None:

@@ -177,7 +177,7 @@ def _servo(read: ParameterReader) -> ServoModel | None:
 
 def _policy_options(read: ParameterReader) -> PolicyOptions:
     default = PolicyOptions()
-    values = {
+    values: dict[str, Any] = {
         name: read.number(f'policy_{name}', getattr(default, name), OPTION_RANGES[name], meaning)
         for name, meaning in POLICY_MEANINGS.items()
     }

@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
@@ -16,8 +14,10 @@ from .contract.declared import Declared
 from .contract.document import ContractDocument
 from .contract.mjlab import VENDOR
 from .contract.model import PolicyContract
+from .gains import gain_rows, ServoResponse
 from .network import FLOAT, Floats, Network, observation_ports
 from .observation import observed_places
+from .report import Row, Verdict
 
 MAX_POSE_DISTANCE = 0.8  # [rad] of the default pose from where the gait stands
 MAX_SCALE = 1.0  # [rad] an action of one may move a joint by
@@ -30,64 +30,6 @@ PROBES, PROBE = 20, 0.1  # changes of an observation, and their deviation
 MIN_NEWEST = 0.1  # share of what the oldest step of a history does that the newest must do
 
 
-class Verdict(Enum):
-    """What follows from a row."""
-
-    OK = 'ok'
-    WARN = 'warn'
-    REFUSE = 'REFUSE'
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One thing that was looked at.
-
-    Attributes:
-        subject: What.
-        expected: What it should be.
-        found: What it is.
-        verdict: What follows.
-    """
-
-    subject: str
-    expected: str
-    found: str
-    verdict: Verdict
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """All rows."""
-
-    rows: tuple[Row, ...]
-
-    @property
-    def refused(self) -> bool:
-        """Whether the policy must not be followed."""
-        return any(row.verdict is Verdict.REFUSE for row in self.rows)
-
-    @property
-    def reason(self) -> str:
-        """What the policy is refused for, in one line."""
-        return '; '.join(
-            f'{row.subject}: {row.found} instead of {row.expected}'
-            for row in self.rows
-            if row.verdict is Verdict.REFUSE
-        )
-
-    def __str__(self) -> str:
-        """Return a table for people."""
-        cells = [('check', 'expected', 'found', '')]
-        cells += [(row.subject, row.expected, row.found, row.verdict.value) for row in self.rows]
-        widths = [max(len(line[column]) for line in cells) for column in range(3)]
-        return '\n'.join(
-            '  '.join(
-                [*(cell.ljust(size) for cell, size in zip(line, widths, strict=False)), line[3]]
-            )
-            for line in cells
-        )
-
-
 def check_contract(
     network: Network,
     contract: PolicyContract,
@@ -98,6 +40,7 @@ def check_contract(
     declared: Declared,
     hold_missing: bool,
     period: float,
+    servo: ServoResponse | None = None,
 ) -> Iterator[Row]:
     """Compare what a policy declares with the robot; yields a row for each.
 
@@ -110,6 +53,7 @@ def check_contract(
         declared: What its file says of sizes and rate besides.
         hold_missing: Joints that the robot lacks count as being at their default.
         period: Time between two steps of the control loop in [s].
+        servo: How the servos of the robot follow; None when nobody knows.
     """
     count = len(contract.joint_names)
     inputs, outputs = observation_ports(network, contract.recurrence)
@@ -128,7 +72,8 @@ def check_contract(
     largest = max((abs(scale) for scale in contract.action.scale), default=0.0)
     fits = all(0.0 < abs(scale) <= MAX_SCALE for scale in contract.action.scale)
     yield _row('action.scale', f'up to {MAX_SCALE:g} rad, not 0', f'{largest:g}', fits)
-    yield from _training(contract)
+    yield from gain_rows(contract.gains, servo, period)
+    yield from _commands(contract)
     if declared.unknown:
         unknown = ', '.join(f'{key} = {value}' for key, value in declared.unknown.items())
         yield Row('keys', 'understood', f'not understood: {unknown}', Verdict.WARN)
@@ -275,16 +220,9 @@ def _rates(
         yield _row('loop_rate', f'{expected}, or several times that', found, fits)
 
 
-def _training(contract: PolicyContract) -> Iterator[Row]:
-    """Yield what the policy was trained with, for people to compare."""
-    gains, commands = contract.gains, contract.commands
-    if gains is not None:
-        spring, damper = (
-            f'{min(each):g}' if min(each) == max(each) else f'{min(each):g} to {max(each):g}'
-            for each in (gains.stiffness, gains.damping)
-        )
-        found = f'{spring} N m/rad, {damper} N m s/rad'
-        yield Row('gains of the training', "near the servos'", found, Verdict.OK)
+def _commands(contract: PolicyContract) -> Iterator[Row]:
+    """Yield what the policy was commanded in training, for people to compare."""
+    commands = contract.commands
     if commands is not None:
         found = ', '.join(
             f'{axis} {low:g} to {high:g}'

@@ -13,7 +13,7 @@ from quad_description import ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
-from .check import check_answers, check_contract, Report, Row
+from .check import check_answers, check_contract
 from .contract.build import build_contract
 from .contract.declared import read_declared
 from .contract.document import ContractDocument, document_of
@@ -23,6 +23,7 @@ from .contract.model import PolicyContract, Source
 from .interface import PolicyInputs
 from .network import Floats, Network, OnnxNetwork
 from .options import ImuFrame, PolicyOptions
+from .report import Report, Row
 from .runner import PolicyRunner
 
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
@@ -155,6 +156,7 @@ def validate_policy(
         declared=read_declared(network.metadata),
         hold_missing=options.hold_missing,
         period=period,
+        servo=options.servo,
     )
     checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
     network.recur(contract.recurrence)

@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 from ..exceptions import ParameterError
+from .gains import ServoResponse
 
 
 class GravitySource(Enum):
@@ -43,6 +44,8 @@ class PolicyOptions:
         hold_missing: Joints of the policy that the robot lacks count as being at their default.
         soft_limits: Share of a joint's range that targets may use.
         low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
+        servo: How the servos of the robot follow, to be compared with those of the training; None
+            when nobody knows.
     """
 
     contract: Path | None = None
@@ -52,6 +55,7 @@ class PolicyOptions:
     hold_missing: bool = False
     soft_limits: float = 0.9
     low_pass: float = 0.0
+    servo: ServoResponse | None = None
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.

@@ -5,7 +5,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+import logging
 import math
 from pathlib import Path
 import signal
@@ -13,14 +16,27 @@ import sys
 
 from quad_description import Backend, DescriptionError, PRESETS, quadruped, robot_urdf
 
-from ..exceptions import QuadControllerError
+from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
-from ..policy.load import load_policy
+from ..policy.load import load_policy, LoadedPolicy
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
 from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
+from .conditions import SWEEPS
+from .course import course_for
+from .findings import (
+    Compared,
+    figures_table,
+    Findings,
+    sweep_table,
+    Swept,
+    text_of,
+    tracking_table,
+)
+from .html_report import html_report
+from .judgement import against_gait, astray, is_too_late, timing_notes, velocity_text
 from .walk import walk
 
 SERVOS = ('firm', 'vendor_rl')
@@ -28,70 +44,203 @@ SERVOS = ('firm', 'vendor_rl')
 
 MIN_DURATION, MAX_DURATION = 0.5, 600.0
 """Times of a walk in [s]."""
-MAX_LACK, MAX_EXCESS = 0.5, 0.2
-"""Shares of what is commanded along an axis that may be missing, and be too much."""
-MAX_DRIFT = Velocity(0.04, 0.04, 0.1)
-"""What a policy may be off along an axis in any case in [m/s] and [rad/s]."""
+WALK_DURATION, COMPARE_DURATION, SWEEP_DURATION = 10.0, 4.0, 3.0
+"""Of each command in virtual time in [s]."""
+MINUTES, MIN_MINUTES, MAX_MINUTES = 2.0, 0.7, 120.0
+"""Of the chain, in real time."""
+SWEEP_COMMANDS = (Velocity(0.2, 0.0, 0.3), Velocity(-0.15), Velocity(0.0, 0.1))
+
+
+class ExitCode(IntEnum):
+    """What the command ends with."""
+
+    STANDS_UP = 0
+    DOES_NOT = 1
+    WRONG_USE = 2
+    NOT_TRIED = 3
+
+
+@dataclass(slots=True)
+class _Found:
+    """What comes together while a policy is tried."""
+
+    courses: list[Compared] = field(default_factory=list)
+    sweeps: list[Swept] = field(default_factory=list)
+    walks: list[str] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def add_course(self, compared: Compared) -> None:
+        """Take and print what policy and gait came to on a course."""
+        self.courses.append(compared)
+        reasons = list(against_gait(compared.policy, compared.gait))
+        self.notes += timing_notes(compared.policy)
+        _print(f'\nbeside the gait, {compared.title}')
+        _print(f'{text_of(tracking_table(compared))}\n\n{text_of(figures_table(compared))}')
+        if reasons and is_too_late(compared.policy, StateParameters().period):
+            late = '; '.join(timing_notes(compared.policy))
+            raise CheckError(f'{late}; try again when the machine has less to do')
+        self.reasons += reasons
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Check a policy and print what was found; return 0 when it may be followed."""
+    """Check a policy and print what was found; return an :class:`ExitCode`."""
     options = _parser().parse_args(arguments)
-    urdf = robot_urdf(options.preset, arm=options.arm)
-    robot = quadruped(urdf)
+    found, loaded, refusal = _Found(), None, ''
     try:
-        loaded = load_policy(
-            find_policy(options.policy),
-            robot,
-            GaitGenerator(robot, GaitParameters()).stand_targets,
-            PolicyOptions(
-                contract=options.contract,
-                phase_period=options.phase_period,
-                imu_frame=ImuFrame(options.imu_frame),
-                gravity_source=GravitySource(options.gravity_source),
-                hold_missing=options.hold_missing,
-            ),
-            StateParameters().period,
-        )
+        loaded = _load(options)
         _print(str(loaded))
-        if options.walk is None:
-            return 0
-        velocity = Velocity(*options.walk)
-        with _physics(urdf, options.servo) as backend:
-            walked = walk(backend, robot, loaded.runner, velocity, options.duration)
+        _try_out(options, loaded, found)
+    except CheckError as error:
+        _print(f'it could not be tried: {error}')
+        return ExitCode.NOT_TRIED
     except (QuadControllerError, DescriptionError) as error:
-        _print(str(error))
-        return 1
-    _print(
-        f'walked with {options.servo} servos for {options.duration:g} s: commanded '
-        f'{_text(velocity)}, went {_text(walked.velocity)}, '
-        f'tilt at most {math.degrees(walked.tilt):.1f} deg'
+        refusal = str(error)
+        found.reasons.append(error.reason if isinstance(error, PolicyError) else refusal)
+        _print(refusal)
+    findings = Findings(
+        name=str(options.policy),
+        setting=f'{options.preset}{" with arm" if options.arm else ""}, servos {options.servo}',
+        loaded=loaded,
+        refusal=refusal,
+        courses=tuple(found.courses),
+        sweeps=tuple(found.sweeps),
+        walks=tuple(found.walks),
+        reasons=tuple(found.reasons),
+        notes=tuple(found.notes),
     )
-    trouble = walked.trouble or '; '.join(_astray(walked.velocity, velocity))
-    if trouble:
-        _print(f'it did not go well: {trouble}')
-    return 1 if trouble else 0
+    for note in found.notes:
+        _print(f'note: {note}')
+    if found.courses or found.sweeps:
+        _print(_verdict(findings))
+    if options.report is not None:
+        options.report.write_text(html_report(findings), encoding='utf-8')
+        _print(f'report: {options.report}')
+    return ExitCode.STANDS_UP if findings.stands_up else ExitCode.DOES_NOT
 
 
 def main() -> None:
     """Entry point."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run(sys.argv[1:]))
-
-
-def _physics(urdf: str, servo: str) -> Backend:
+    # the driver's remarks on a robot that was put on its feet are no trouble of the policy
+    logging.getLogger('quad_hardware').setLevel(logging.CRITICAL)
     try:
-        from quad_sim import ServoModel
-        from quad_sim.physics import PhysicsBackend, Robot
+        sys.exit(run(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _load(options: argparse.Namespace) -> LoadedPolicy:
+    robot = quadruped(robot_urdf(options.preset, arm=options.arm))
+    return load_policy(
+        find_policy(options.policy),
+        robot,
+        GaitGenerator(robot, GaitParameters()).stand_targets,
+        _policy_options(options),
+        StateParameters().period,
+    )
+
+
+def _policy_options(options: argparse.Namespace) -> PolicyOptions:
+    plain = PolicyOptions(
+        contract=options.contract,
+        phase_period=options.phase_period,
+        imu_frame=ImuFrame(options.imu_frame),
+        gravity_source=GravitySource(options.gravity_source),
+        hold_missing=options.hold_missing,
+    )
+    try:
+        from .arenas import servo_response
+    except ImportError:  # the table alone needs no simulator
+        return plain
+    return replace(plain, servo=servo_response(options.servo))
+
+
+def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: _Found) -> None:
+    """Let a policy walk in all ways that the command line asks for."""
+    compare = options.compare or (options.report and not (options.walk or options.chain))
+    if not (options.walk or compare or options.chain or options.sweep):
+        return
+    try:
+        from .arenas import PhysicsArena, RobotChoice
+        from .trial import Candidate, chain_duration, run_chain, run_trials, Trial
     except ImportError as error:
-        raise QuadControllerError(f'a walk needs quad_sim and MuJoCo: {error}') from error
-    return PhysicsBackend(Robot(urdf, ServoModel(servo)))
+        raise CheckError(f'a walk needs quad_sim and MuJoCo: {error}') from error
+    choice = RobotChoice(options.preset, options.arm, options.servo)
+    policy = Candidate(find_policy(options.policy), _policy_options(options), choice)
+    both = policy, Candidate(robot=choice)
+    if options.walk is not None:
+        backend = PhysicsArena(choice).backend
+        _walk(options, loaded, backend, found)
+    commands = course_for(loaded.contract.commands)
+    if compare:
+        duration = options.duration or COMPARE_DURATION
+        mine, other = run_trials([Trial(who, commands, duration) for who in both])
+        found.add_course(Compared('in physics with ideal sensors, in virtual time', mine, other))
+    if options.sweep:
+        trials = [
+            Trial(who, SWEEP_COMMANDS, options.duration or SWEEP_DURATION, sweep.conditions(value))
+            for sweep in SWEEPS
+            for value in sweep.values
+            for who in both
+        ]
+        figures = iter(run_trials(trials))
+        for sweep in SWEEPS:
+            pairs = [(sweep.text(value), next(figures), next(figures)) for value in sweep.values]
+            swept = Swept(sweep, tuple(Compared(*pair) for pair in pairs))
+            found.sweeps.append(swept)
+            _print(f'\n{text_of(sweep_table(swept))}')
+        found.notes += [note for swept in found.sweeps for note in _weaker(swept)]
+    if options.chain:
+        duration = chain_duration(options.minutes, len(both), len(commands))
+        title = (
+            f'behind the serial line in real time, {options.minutes:g} minutes: servos, board, '
+            'line, estimator, clocks'
+        )
+        mine, other = run_chain(both, commands, duration)
+        found.add_course(Compared(title, mine, other))
+
+
+def _walk(
+    options: argparse.Namespace, loaded: LoadedPolicy, backend: Backend, found: _Found
+) -> None:
+    velocity, duration = Velocity(*options.walk), options.duration or WALK_DURATION
+    robot = quadruped(robot_urdf(options.preset, arm=options.arm))
+    walked = walk(backend, robot, loaded.runner, velocity, duration)
+    found.walks.append(
+        f'walked with {options.servo} servos for {duration:g} s: commanded '
+        f'{velocity_text(velocity)}, went {velocity_text(walked.velocity)}, '
+        f'tilt at most {math.degrees(walked.tilt):.1f} deg'
+    )
+    _print(found.walks[-1])
+    if trouble := walked.trouble or '; '.join(astray(walked.velocity, velocity)):
+        found.reasons.append(trouble)
+        _print(f'it did not go well: {trouble}')
+
+
+def _weaker(swept: Swept) -> list[str]:
+    """Return where the policy falls and the gait does not."""
+    where = [each.title for each in swept.results if each.policy.falls and not each.gait.falls]
+    unit = f' {swept.sweep.unit}' if swept.sweep.unit else ''
+    return (
+        [f'{swept.sweep.title} of {", ".join(where)}{unit}: it falls, the gait does not']
+        if where
+        else []
+    )
+
+
+def _verdict(findings: Findings) -> str:
+    if findings.stands_up:
+        return f'\n{findings.name} stands up'
+    reasons = '\n'.join(f'  - {reason}' for reason in findings.reasons)
+    return f'\n{findings.name} does not stand up:\n{reasons}'
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description='Compare an ONNX policy with the robot, and let it walk in physics.',
+        epilog='exit code: 0 it stands up, 1 it does not, 2 wrong use, 3 it could not be tried',
         allow_abbrev=False,
     )
     parser.add_argument('policy', help='ONNX file, or the name of one that is shipped')
@@ -118,12 +267,50 @@ def _parser() -> argparse.ArgumentParser:
         action='store_true',
         help='accept a robot without some joints of the policy',
     )
-    parser.add_argument(
+    parser.add_argument('--servo', choices=SERVOS, default=SERVOS[0], help='of the simulation')
+    ways = parser.add_argument_group('ways to try it, beside the gait but for the first')
+    ways.add_argument(
         '--walk', nargs=3, type=_finite, metavar=('X', 'Y', 'YAW'), help='[m/s], [m/s], [rad/s]'
     )
-    parser.add_argument('--servo', choices=SERVOS, default=SERVOS[0], help='of the simulation')
-    parser.add_argument('--duration', type=_duration, default=10.0, help='of the walk [s]')
+    ways.add_argument(
+        '--duration',
+        type=_duration,
+        help=f'of --walk ({WALK_DURATION:g}), of each command of --compare '
+        f'({COMPARE_DURATION:g}) and of --sweep ({SWEEP_DURATION:g}) [s]',
+    )
+    ways.add_argument(
+        '--compare', action='store_true', help='three speeds of each axis, in virtual time'
+    )
+    ways.add_argument(
+        '--chain',
+        action='store_true',
+        help='the same through servos, board, serial line and estimator, in real time',
+    )
+    ways.add_argument(
+        '--minutes', type=_minutes, default=MINUTES, help='of --chain (default: %(default)g)'
+    )
+    ways.add_argument(
+        '--sweep',
+        action='store_true',
+        help='mass, friction, delay, biases of the IMU, pushes, rough ground: one at a time',
+    )
+    parser.add_argument(
+        '--report',
+        type=_report_file,
+        metavar='FILE',
+        help='write what was found as HTML with plots; alone, it means --compare, too',
+    )
     return parser
+
+
+def _report_file(text: str) -> Path:
+    """Take a path that can be written, before a walk takes its time."""
+    path = Path(text)
+    try:
+        with path.open('a', encoding='utf-8'):
+            return path
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f'{text}: {error.strerror}') from error
 
 
 def _finite(text: str) -> float:
@@ -149,28 +336,18 @@ def _duration(text: str) -> float:
     return value
 
 
-def _astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
-    """Yield along which axes it went otherwise than commanded, and what that hints at."""
-    for axis in ('x', 'y', 'yaw'):
-        got, want, drift = (getattr(each, axis) for each in (went, commanded, MAX_DRIFT))
-        most = MAX_EXCESS if got * want > want**2 else MAX_LACK
-        if abs(got - want) <= max(most * abs(want), drift):
-            continue
-        if got * want < 0.0:
-            hint = 'the other way: look at the order of its joints, and at signs (scales below 0)'
-        elif abs(got) < abs(want):
-            hint = 'too slow: is it made for other servos (--servo), or a smaller scale?'
-        else:
-            hint = 'too far: look at its scales, and at the frame of the IMU'
-        yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
-
-
-def _text(velocity: Velocity) -> str:
-    return f'{velocity.x:+.3f} {velocity.y:+.3f} m/s {velocity.yaw:+.2f} rad/s'
+def _minutes(text: str) -> float:
+    value = _finite(text)
+    if not MIN_MINUTES <= value <= MAX_MINUTES:
+        raise argparse.ArgumentTypeError(
+            f'{text} is not a time [min]: it must be {MIN_MINUTES:g} to {MAX_MINUTES:g}'
+        )
+    return value
 
 
 def _print(text: str) -> None:
     sys.stdout.write(f'{text}\n')
+    sys.stdout.flush()
 
 
 if __name__ == '__main__':

@@ -7,8 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 import math
 
+import numpy as np
+
 from quad_description import Backend, Quadruped, RobotState
 
+from ..exceptions import QuadControllerError
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy
@@ -17,7 +20,9 @@ from ..states.modes import State
 from ..states.parameters import StateParameters
 
 STAND_TIME = 2.5  # [s] to stand up, and for the policy to take over
+STAND_TIMEOUT = 8.0  # [s]
 SETTLE_TIME = 1.5  # [s] to take up speed
+FALLEN = math.radians(60.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,19 +49,80 @@ class WalkingRobot:
         travelled: Way and turning so far, in the robot's own frame, in [m] and [rad].
     """
 
-    def __init__(self, backend: Backend, robot: Quadruped, policy: Policy) -> None:
-        """Put the robot on the ground.
+    def __init__(
+        self, backend: Backend, robot: Quadruped, policy: Policy | None, state: RobotState
+    ) -> None:
+        """Begin with a robot on the ground.
 
         Args:
-            backend: Where the robot is; it has to know its position.
+            backend: Where the robot is; for the way, it has to know its position.
             robot: The model of the robot.
-            policy: What the mode ``policy`` follows.
+            policy: What walks; None for the gait.
+            state: What was observed last.
         """
-        self._backend, self._state = backend, backend.reset()
-        states = StateParameters(period=backend.period)
-        self.controller = Controller(robot, GaitParameters(), states, policy=policy)
+        self._backend, self._robot, self._policy = backend, robot, policy
+        self.restart(state)
+
+    def restart(self, state: RobotState) -> None:
+        """Begin anew, with a new controller.
+
+        Args:
+            state: What was observed last.
+        """
+        self._state, self._dt = state, self._backend.period
+        states = StateParameters(period=self._backend.period)
+        self.controller = Controller(self._robot, GaitParameters(), states, policy=self._policy)
+        self.forget()
+
+    def forget(self) -> None:
+        """Count way, tilt and targets from now on."""
         self.tilt = 0.0
         self.travelled = REST
+        self._targets: list[np.ndarray] = []
+        self._bends, self._bend_count = 0.0, 0
+
+    @property
+    def smoothness(self) -> float:
+        """How much targets bend: root mean square of their second difference in [rad]."""
+        return math.sqrt(self._bends / self._bend_count) if self._bend_count else 0.0
+
+    @property
+    def mode(self) -> State:
+        """The state in which it walks."""
+        return State.WALK if self._policy is None else State.POLICY
+
+    @property
+    def is_down(self) -> bool:
+        """Whether it fell, or does not walk any more."""
+        imu = self._state.imu
+        fallen = imu is not None and imu.tilt > FALLEN
+        return fallen or self.controller.status.state is not self.mode
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not walk; empty when it does."""
+        status = self.controller.status
+        if status.faults:
+            return '; '.join(status.faults)
+        if status.state is not self.mode:
+            return f'{self.mode.value} was left for {status.title}'
+        return ''
+
+    def stand_up(self) -> None:
+        """Stand, ready to walk.
+
+        Raises:
+            QuadControllerError: It does not come to that; the message has the reason.
+        """
+        self.step(REST)  # modes are refused before the robot is known
+        answer = self.controller.set_mode(self.mode.value)
+        self.run(STAND_TIME, REST)
+        for _ in range(round((STAND_TIMEOUT - STAND_TIME) / self._backend.period)):
+            if not self.trouble:
+                return
+            self.step(REST)
+        if self.trouble:
+            raise QuadControllerError(self.trouble if answer.accepted else answer.message)
 
     def run(self, duration: float, velocity: Velocity) -> None:
         """Pass some time [s] with a velocity that is commanded."""
@@ -66,9 +132,20 @@ class WalkingRobot:
     def step(self, velocity: Velocity) -> None:
         """Pass one period with a velocity that is commanded."""
         self.controller.set_velocity(velocity)
-        output = self.controller.step(self._state, self._backend.period)
+        output = self.controller.step(self._state, self._dt)
         before, self._state = self._state, self._backend.step(output.targets)
+        passed = self._state.time - before.time  # a report may have been lost
+        self._dt = passed if passed > 0.0 else self._backend.period
         self._add_way(before, self._state)
+        if output.targets is not None:
+            self._add_targets(np.array(output.targets))
+
+    def _add_targets(self, targets: np.ndarray) -> None:
+        self._targets = [*self._targets[-2:], targets]
+        if len(self._targets) == 3:
+            first, second, third = self._targets
+            self._bends += float(np.mean((third - 2.0 * second + first) ** 2))
+            self._bend_count += 1
 
     def _add_way(self, before: RobotState, after: RobotState) -> None:
         if before.imu is None or after.imu is None or not before.position or not after.position:
@@ -95,15 +172,12 @@ def walk(
         velocity: What is commanded.
         duration: How long in [s].
     """
-    walker = WalkingRobot(backend, robot, policy)
-    walker.step(REST)  # modes are refused before the robot is known
-    walker.controller.set_mode(State.POLICY.value)
-    walker.run(STAND_TIME, REST)
+    walker = WalkingRobot(backend, robot, policy, backend.reset())
+    try:
+        walker.stand_up()
+    except QuadControllerError as error:
+        return Walked(REST, walker.tilt, str(error))
     walker.run(SETTLE_TIME, velocity)
     walker.travelled = REST
     walker.run(duration, velocity)
-    status = walker.controller.status
-    trouble = '; '.join(status.faults)
-    if not trouble and status.state is not State.POLICY:
-        trouble = f'the policy was left for {status.state.value}'
-    return Walked(walker.travelled.scaled(1.0 / duration), walker.tilt, trouble)
+    return Walked(walker.travelled.scaled(1.0 / duration), walker.tilt, walker.trouble)

@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How the gait and the shipped policies walk: three speeds of each axis, on several grounds.
+
+The grounds are tried in virtual time on all cores; `--chain-minutes` adds the course over the
+serial line of a robot in real time, with the timing of its commands. The goals stand beside the
+figures; none is judged here: `check_policy` does that.
+
+    python bench_walking.py --duration 30 --chain-minutes 5     # for figures that are steadier
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from quad_controller.exceptions import CheckError
+from quad_controller.policy.shipped import shipped_policies
+from quad_controller.policy_check.conditions import AS_MADE, Conditions
+from quad_controller.policy_check.course import course_for, CourseFigures
+from quad_controller.policy_check.findings import Table, text_of
+from quad_controller.policy_check.trial import (
+    Candidate,
+    chain_duration,
+    run_chain,
+    run_trials,
+    Trial,
+)
+
+PUSH = 1.3  # [m/s] four of ten such pushes tip the gait
+GROUNDS = {
+    'level': AS_MADE,
+    f'pushed by {PUSH:g} m/s': Conditions(push=PUSH),
+    'rough, 2 cm': Conditions(roughness=0.02),
+    '20 % heavier': Conditions(trunk_mass=1.2),
+    'wire of 20 ms': Conditions(delay=0.02),
+    'rough and pushed': Conditions(roughness=0.02, push=PUSH),
+}
+HEADINGS = (
+    *('', 'ground', 'forward [m/s]', 'lateral [m/s]', 'turn [rad/s]'),
+    *('falls/min', 'success', 'transport'),
+)
+
+
+def row(who: str, ground: str, figures: CourseFigures) -> tuple[str, ...]:
+    """Return the figures of a walker on a ground; success: commands that had no fall."""
+    upright = sum(not each.falls for each in figures.passages) / len(figures.passages)
+    return (
+        who,
+        ground,
+        *(f'{figures.mean("error", axis):.3f}' for axis in ('forward', 'lateral')),
+        f'{figures.mean("turning_error", "turn"):.3f}',
+        f'{figures.falls_per_minute:.1f}',
+        f'{upright:.0%}',
+        f'{figures.mean("cost_of_transport"):.2f}',
+    )
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--duration', type=float, default=4.0, help='of each command [s]')
+    parser.add_argument('--chain-minutes', type=float, default=0.8, help='0: leave it out')
+    options = parser.parse_args()
+    walkers = {'gait': Candidate()}
+    walkers |= {name: Candidate(path) for name, path in shipped_policies().items()}
+    commands = course_for(None)
+    trials = {
+        (name, title): Trial(who, commands, options.duration, ground)
+        for title, ground in GROUNDS.items()
+        for name, who in walkers.items()
+    }
+    figures = run_trials(list(trials.values()))
+    table: Table = [HEADINGS]
+    table += [row(*key, each) for key, each in zip(trials, figures, strict=True)]
+    print(f'off by, falls, commands without one; {len(commands)} commands of {options.duration} s')
+    print(text_of(table))
+    if options.chain_minutes:
+        chain(walkers, options.chain_minutes)
+
+
+def chain(walkers: dict[str, Candidate], minutes: float) -> None:
+    """Print the figures over the serial line."""
+    commands = course_for(None)
+    duration = chain_duration(minutes, len(walkers), len(commands))
+    table: Table = [(*HEADINGS, 'p50 [ms]', 'p99 [ms]', 'jitter p99 [ms]')]
+    try:
+        found = run_chain(list(walkers.values()), commands, duration)
+    except CheckError as error:
+        print(f'\nover the serial line: {error}')
+        return
+    for name, each in zip(walkers, found, strict=True):
+        timing = each.timing
+        if timing is not None:
+            times = timing.latency(0.5), timing.latency(0.99), timing.jitter(0.99)
+            table.append((*row(name, 'serial line', each), *(f'{1e3 * t:.1f}' for t in times)))
+    print(f'\nover the serial line in real time, {len(commands)} commands of {duration:.1f} s')
+    print('goals with real-time priority: p50 below 3 ms, jitter p99 below 2 ms')
+    print(text_of(table))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a check of a policy found: a table with a row for each thing that must agree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Verdict(Enum):
+    """What follows from a row."""
+
+    OK = 'ok'
+    WARN = 'warn'
+    REFUSE = 'REFUSE'
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One thing that was looked at.
+
+    Attributes:
+        subject: What.
+        expected: What it should be.
+        found: What it is.
+        verdict: What follows.
+    """
+
+    subject: str
+    expected: str
+    found: str
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """All rows."""
+
+    rows: tuple[Row, ...]
+
+    @property
+    def refused(self) -> bool:
+        """Whether the policy must not be followed."""
+        return any(row.verdict is Verdict.REFUSE for row in self.rows)
+
+    @property
+    def reason(self) -> str:
+        """What the policy is refused for, in one line."""
+        return '; '.join(
+            f'{row.subject}: {row.found} instead of {row.expected}'
+            for row in self.rows
+            if row.verdict is Verdict.REFUSE
+        )
+
+    def __str__(self) -> str:
+        """Return a table for people."""
+        cells = [('check', 'expected', 'found', '')]
+        cells += [(row.subject, row.expected, row.found, row.verdict.value) for row in self.rows]
+        widths = [max(len(line[column]) for line in cells) for column in range(3)]
+        return '\n'.join(
+            '  '.join(
+                [*(cell.ljust(size) for cell, size in zip(line, widths, strict=False)), line[3]]
+            )
+            for line in cells
+        )

@@ -1,0 +1,327 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A course of commanded velocities, and the figures of who walked it: a policy or the gait."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import functools
+import math
+import operator
+from typing import Protocol, TYPE_CHECKING
+
+import numpy as np
+
+from quad_description import Backend, Quadruped, RobotState
+
+from ..exceptions import CheckError, QuadControllerError
+from ..gait.velocity import REST, Velocity
+from ..policy.contract.model import CommandRanges
+from ..policy.interface import Policy
+from .walk import WalkingRobot
+
+if TYPE_CHECKING:
+    from quad_sim import CommandTiming
+    from quad_sim.physics import Metered
+
+SETTLE_TIME = 1.0  # [s] to take up speed
+REST_TIME = 1.0  # [s] at the end, to come to rest on all feet
+PUSH_INTERVAL = 2.0  # [s]
+MAX_INTERRUPTIONS = 8
+MAX_FALLS = 4  # on the way of one command, without those of pushes; it is left after them
+AXES = {'forward': 'x', 'lateral': 'y', 'turn': 'yaw'}
+TOP = Velocity(0.3, 0.15, 1.5)
+"""Fastest commands of the course: those of the gait."""
+SPEEDS = 3
+
+
+class Arena(Protocol):
+    """Where a robot walks and is watched.
+
+    Attributes:
+        backend: The robot.
+    """
+
+    backend: Backend
+
+    def stand(self) -> RobotState:
+        """Put the robot on its feet, whatever it did before."""
+        ...
+
+    def kick(self, x: float, y: float) -> None:
+        """Change its velocity at once [m/s]."""
+        ...
+
+    def watch(self) -> None:
+        """Look at it, after each step."""
+        ...
+
+    def begin(self) -> None:
+        """Measure from now on."""
+        ...
+
+    def read(self) -> tuple[Metered, CommandTiming | None]:
+        """Return what was measured, and the timing where there are real clocks."""
+        ...
+
+    @property
+    def interruption(self) -> str:
+        """What the machine did to the walk since it stood or was measured; empty for nothing."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """What came of one command.
+
+    Attributes:
+        commanded: The command.
+        went: Mean velocity, in the robot's own frame.
+        time: How long it walked in [s].
+        falls: How often it fell, or its watchdogs ended the walk.
+        tilt: Largest tilt in [rad].
+        torque_saturation: Share of the time that a servo is at its largest torque.
+        speed_saturation: Share of the time that a joint is at its largest speed.
+        smoothness: Root mean square of the second difference of the targets in [rad].
+        cost_of_transport: Work of the servos for weight and way; NaN on the spot.
+        timing: Of the commands on the wire; None where there are no real clocks.
+    """
+
+    commanded: Velocity
+    went: Velocity
+    time: float
+    falls: int
+    tilt: float
+    torque_saturation: float
+    speed_saturation: float
+    smoothness: float
+    cost_of_transport: float
+    timing: CommandTiming | None = None
+
+    @property
+    def axis(self) -> str:
+        """Along which axis it goes mainly: a key of :data:`AXES`."""
+        shares = {
+            name: abs(getattr(self.commanded, each)) / getattr(TOP, each)
+            for name, each in AXES.items()
+        }
+        return max(shares, key=lambda name: shares[name])
+
+    @property
+    def error(self) -> float:
+        """Distance of the velocity over the ground from the command in [m/s]."""
+        return math.hypot(self.went.x - self.commanded.x, self.went.y - self.commanded.y)
+
+    @property
+    def turning_error(self) -> float:
+        """The same of the turning in [rad/s]."""
+        return abs(self.went.yaw - self.commanded.yaw)
+
+
+@dataclass(frozen=True, slots=True)
+class CourseFigures:
+    """What came of a course.
+
+    Attributes:
+        passages: Of each command.
+    """
+
+    passages: tuple[Passage, ...]
+
+    @property
+    def falls(self) -> int:
+        """How often it fell."""
+        return sum(each.falls for each in self.passages)
+
+    @property
+    def falls_per_minute(self) -> float:
+        """Falls in a minute of walking."""
+        time = sum(each.time for each in self.passages)
+        return 60.0 * self.falls / time if time > 0.0 else math.inf
+
+    @property
+    def error(self) -> float:
+        """Mean error of the velocity over the ground in [m/s]."""
+        return self.mean('error')
+
+    def mean(self, name: str, axis: str | None = None) -> float:
+        """Return the mean of an attribute of the passages, where there is one; else NaN.
+
+        Args:
+            name: Of an attribute of :class:`Passage`.
+            axis: A key of :data:`AXES`; None for all.
+        """
+        values = [
+            getattr(each, name) for each in self.passages if axis is None or each.axis == axis
+        ]
+        there = [value for value in values if not math.isnan(value)]
+        return float(np.mean(there)) if there else math.nan
+
+    @property
+    def timing(self) -> CommandTiming | None:
+        """When commands came on the wire; None without real clocks."""
+        return _together([each.timing for each in self.passages])
+
+
+def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
+    """Return three speeds of each axis that a policy was trained for.
+
+    Args:
+        ranges: What it is commanded within; None for no limits.
+    """
+    commands = []
+    limits = [most for _, most in ranges.axes] if ranges is not None else [math.inf] * len(AXES)
+    for axis, most in zip(AXES.values(), limits, strict=True):
+        top = min(getattr(TOP, axis), most)
+        if top > 0.0:
+            commands += [
+                Velocity(**{axis: round(top * part / SPEEDS, 4)}) for part in range(1, SPEEDS + 1)
+            ]
+    return tuple(commands)
+
+
+class CourseWalker:
+    """Walks courses in an arena, and stands up again after each fall.
+
+    Attributes:
+        interruptions: Walks that the machine cut off, and not the robot.
+    """
+
+    def __init__(self, arena: Arena, robot: Quadruped, policy: Policy | None) -> None:
+        """Put the robot on its feet.
+
+        Args:
+            arena: Where.
+            robot: The model of the robot.
+            policy: What walks; None for the gait.
+        """
+        self._arena, self.interruptions = arena, 0
+        self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand())
+
+    def walk(
+        self, commands: Sequence[Velocity], duration: float, *, push: float = 0.0, seed: int = 1
+    ) -> CourseFigures:
+        """Walk as commanded.
+
+        Args:
+            commands: One after the other.
+            duration: Of each in [s].
+            push: Change of the velocity at once, to any side, every two seconds, in [m/s].
+            seed: Of the pushes.
+        """
+        random = np.random.default_rng(seed)
+        passages = [self._passage(command, duration, push, random) for command in commands]
+        self._walker.run(REST_TIME, REST)
+        return CourseFigures(tuple(passages))
+
+    def _passage(
+        self, command: Velocity, duration: float, push: float, random: np.random.Generator
+    ) -> Passage:
+        walker, period = self._walker, self._arena.backend.period
+        total, between = round(duration / period), round(PUSH_INTERVAL / period)
+        most = MAX_FALLS + (total // between if push else 0)
+        falls, steps, bends = 0, 0, 0.0
+        parts: list[tuple[Metered, CommandTiming | None]] = []
+        while steps < total and falls < most:
+            ready, began = not walker.is_down or self._stand_again(), steps
+            fell = not ready or not self._settle(command)
+            self._arena.begin()
+            walker.forget()
+            while not fell and steps < total:
+                steps += 1
+                self._step(command)
+                fell = walker.is_down
+                if push and steps % between == 0:
+                    angle = random.uniform(0.0, math.tau)
+                    self._arena.kick(push * math.cos(angle), push * math.sin(angle))
+            if fell and self._excused():
+                steps = began
+                continue
+            if steps > began:
+                parts.append(self._arena.read())
+                bends = max(bends, walker.smoothness)
+            falls += fell
+            if not ready:
+                break
+        return _passage_of(command, parts, falls, bends)
+
+    def _settle(self, command: Velocity) -> bool:
+        """Take up speed; return whether it did not fall."""
+        for _ in range(round(SETTLE_TIME / self._arena.backend.period)):
+            self._step(command)
+            if self._walker.is_down:
+                return False
+        return True
+
+    def _excused(self) -> bool:
+        """Return whether a fall is that of the machine, which paused the controller or the robot.
+
+        Raises:
+            CheckError: That comes too often.
+        """
+        if not self._arena.interruption:
+            return False
+        self.interruptions += 1
+        if self.interruptions > MAX_INTERRUPTIONS:
+            raise CheckError(
+                f'the machine is too busy for real time ({self.interruptions} walks were cut off, '
+                f'the last one by: {self._arena.interruption}); try again when it has less to do'
+            )
+        return True
+
+    def _step(self, command: Velocity) -> None:
+        self._walker.step(command)
+        self._arena.watch()
+
+    def _stand_again(self) -> bool:
+        """Return whether it is ready to walk again."""
+        self._walker.restart(self._arena.stand())
+        try:
+            self._walker.stand_up()
+        except QuadControllerError:  # it falls at once, or its watchdogs do not let it walk
+            return False
+        return True
+
+
+def _passage_of(
+    command: Velocity,
+    parts: Sequence[tuple[Metered, CommandTiming | None]],
+    falls: int,
+    smoothness: float,
+) -> Passage:
+    """Return what came of the parts of a way between two falls."""
+    walked = [metered for metered, _ in parts]
+    time = sum(each.time for each in walked)
+    if not time:
+        nothing = math.nan
+        lost = Velocity(nothing, nothing, nothing)
+        return Passage(command, lost, 0.0, falls, nothing, nothing, nothing, nothing, nothing)
+
+    def mean(name: str) -> float:
+        return float(sum(getattr(each, name) * each.time for each in walked)) / time
+
+    path = sum(each.path for each in walked)
+    over_ground = bool(command.x or command.y)
+    work = sum(each.energy / each.weight for each in walked)
+    return Passage(
+        commanded=command,
+        went=Velocity(
+            sum(each.x for each in walked) / time,
+            sum(each.y for each in walked) / time,
+            sum(each.yaw for each in walked) / time,
+        ),
+        time=time,
+        falls=falls,
+        tilt=max(each.tilt for each in walked),
+        torque_saturation=mean('torque_saturation'),
+        speed_saturation=mean('speed_saturation'),
+        smoothness=smoothness,
+        cost_of_transport=work / path if over_ground and path > 0.0 else math.nan,
+        timing=_together([timing for _, timing in parts]),
+    )
+
+
+def _together(timings: Sequence[CommandTiming | None]) -> CommandTiming | None:
+    there = [timing for timing in timings if timing is not None]
+    return functools.reduce(operator.add, there) if there else None

@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""All that was found of a policy, and its tables for people: on the terminal and in the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+
+from ..gait.velocity import Velocity
+from ..policy.load import LoadedPolicy
+from .conditions import Sweep
+from .course import AXES, CourseFigures, Passage
+
+POLICY, GAIT = 'policy', 'gait'
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """What two came to on the same course.
+
+    Attributes:
+        title: Where that was.
+        policy: What the policy came to.
+        gait: What the gait came to.
+    """
+
+    title: str
+    policy: CourseFigures
+    gait: CourseFigures
+
+
+@dataclass(frozen=True, slots=True)
+class Swept:
+    """What a sweep of one parameter came to.
+
+    Attributes:
+        sweep: What was tried.
+        results: For each of its values.
+    """
+
+    sweep: Sweep
+    results: tuple[Compared, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Findings:
+    """All that was found.
+
+    Attributes:
+        name: Of the policy.
+        setting: Which robot with which servos.
+        loaded: The policy with the table of its contract; None when that refused it.
+        refusal: Why it was refused.
+        courses: Courses that policy and gait walked.
+        sweeps: What was tried besides.
+        walks: What single walks came to, in words.
+        reasons: Why it does not stand up.
+        notes: What else is to be known.
+    """
+
+    name: str
+    setting: str
+    loaded: LoadedPolicy | None = None
+    refusal: str = ''
+    courses: tuple[Compared, ...] = ()
+    sweeps: tuple[Swept, ...] = ()
+    walks: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def stands_up(self) -> bool:
+        """Whether the policy may be followed, by all that was tried."""
+        return self.loaded is not None and not self.reasons
+
+
+Table = list[tuple[str, ...]]
+"""Rows of cells; the first one has the headings."""
+
+
+def tracking_table(compared: Compared) -> Table:
+    """Return what was commanded and what both came to."""
+    table: Table = [('axis', 'commanded', POLICY, 'off by', GAIT, 'off by')]
+    for mine, other in zip(compared.policy.passages, compared.gait.passages, strict=True):
+        axis = mine.axis
+        commanded = _along(axis, mine.commanded)
+        cells = [axis, f'{commanded:+.3f} {"rad/s" if axis == "turn" else "m/s"}']
+        for each in (mine, other):
+            error = each.turning_error if axis == 'turn' else each.error
+            cells += [_number(_along(axis, each.went), '+.3f'), _number(error, '.3f')]
+        table.append(tuple(cells))
+    return table
+
+
+def figures_table(compared: Compared) -> Table:
+    """Return figures of the whole course, a row for each."""
+    pair = compared.policy, compared.gait
+    rows: Table = [('', POLICY, GAIT)]
+    for axis in AXES:
+        name, unit = ('turning_error', 'rad/s') if axis == 'turn' else ('error', 'm/s')
+        cells = [_number(each.mean(name, axis), '.3f') for each in pair]
+        if any(passage.axis == axis for passage in pair[0].passages):
+            rows.append((f'{axis}, off by [{unit}]', *cells))
+    rows.append(('falls in a minute', *(_number(each.falls_per_minute, '.1f') for each in pair)))
+    for title, name, form, factor in (
+        ('largest tilt, mean [deg]', 'tilt', '.1f', 180.0 / math.pi),
+        ('servos at their largest torque [%]', 'torque_saturation', '.1f', 100.0),
+        ('joints at their largest speed [%]', 'speed_saturation', '.1f', 100.0),
+        ('bend of the targets, rms [mrad]', 'smoothness', '.1f', 1e3),
+        ('cost of transport', 'cost_of_transport', '.2f', 1.0),
+    ):
+        rows.append((title, *(_number(factor * each.mean(name), form) for each in pair)))
+    timings = [each.timing for each in pair]
+    if any(timings):
+        for title, share, kind in (
+            ('observation to command, p50 [ms]', 0.5, 'latency'),
+            ('observation to command, p99 [ms]', 0.99, 'latency'),
+            ('jitter of commands, p99 [ms]', 0.99, 'jitter'),
+        ):
+            figures = [
+                math.nan if each is None else getattr(each, kind)(share) for each in timings
+            ]
+            rows.append((title, *(_number(1e3 * each, '.1f') for each in figures)))
+    return rows
+
+
+def sweep_table(swept: Swept) -> Table:
+    """Return falls and errors at each value."""
+    sweep = swept.sweep
+    heading = f'{sweep.title} [{sweep.unit}]' if sweep.unit else sweep.title
+    table: Table = [(heading, f'{POLICY}, falls/min', 'off by [m/s]')]
+    table[0] += (f'{GAIT}, falls/min', 'off by [m/s]')
+    for value, result in zip(sweep.values, swept.results, strict=True):
+        cells = [sweep.text(value)]
+        for each in (result.policy, result.gait):
+            cells += [_number(each.falls_per_minute, '.1f'), _number(each.error, '.3f')]
+        table.append(tuple(cells))
+    return table
+
+
+def text_of(table: Table) -> str:
+    """Return a table for a terminal."""
+    widths = [max(len(row[column]) for row in table) for column in range(len(table[0]))]
+    return '\n'.join(
+        '  '.join(
+            cell.rjust(width) if column else cell.ljust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )
+
+
+def speeds_of(passages: Sequence[Passage], axis: str) -> list[tuple[float, float]]:
+    """Return what was commanded along an axis, and what went, for those that walked."""
+    return [
+        (_along(axis, each.commanded), _along(axis, each.went))
+        for each in passages
+        if each.axis == axis and each.time
+    ]
+
+
+def _along(axis: str, velocity: Velocity) -> float:
+    return float(getattr(velocity, AXES[axis]))
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if math.isfinite(value) else '-'

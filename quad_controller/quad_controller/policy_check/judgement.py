@@ -1,0 +1,84 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a policy stands up: what it did, against what was commanded and what the gait did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..gait.velocity import Velocity
+from .course import CourseFigures
+
+MAX_LACK, MAX_EXCESS = 0.5, 0.2
+"""Shares of what is commanded along an axis that may be missing, and be too much."""
+MAX_DRIFT = Velocity(0.04, 0.04, 0.1)
+"""What a policy may be off along an axis in any case in [m/s] and [rad/s]."""
+MAX_SATURATION = 0.2
+"""Share of the time that servos may be at their limits, where the gait's are not."""
+LATENCY_GOAL, JITTER_GOAL = 0.003, 0.002
+"""Of commands on the wire with real-time priority: median and 99th percentile in [s]."""
+
+
+def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
+    """Yield along which axes it went otherwise than commanded, and what that hints at."""
+    for axis in ('x', 'y', 'yaw'):
+        got, want, drift = (getattr(each, axis) for each in (went, commanded, MAX_DRIFT))
+        most = MAX_EXCESS if got * want > want**2 else MAX_LACK
+        if abs(got - want) <= max(most * abs(want), drift):
+            continue
+        if got * want < 0.0:
+            hint = 'the other way: look at the order of its joints, and at signs (scales below 0)'
+        elif abs(got) < abs(want):
+            hint = 'too slow: is it made for other servos (--servo), or a smaller scale?'
+        else:
+            hint = 'too far: look at its scales, and at the frame of the IMU'
+        yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
+
+
+def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:
+    """Yield why a policy does not stand up on a course that the gait walked, too."""
+    if not any(each.time for each in policy.passages):
+        yield 'it never came to walk'
+        return
+    if policy.falls > gait.falls:
+        yield f'it fell {policy.falls} times, the gait {gait.falls}'
+    for each, other in zip(policy.passages, gait.passages, strict=True):
+        gone_astray = list(astray(each.went, each.commanded)) if each.time else []
+        # what the gait does not manage either is no fault of the policy
+        if gone_astray and not (other.time and list(astray(other.went, other.commanded))):
+            yield f'commanded {velocity_text(each.commanded)}: {"; ".join(gone_astray)}'
+    for name, what in (('torque_saturation', 'torque'), ('speed_saturation', 'speed')):
+        share, others = policy.mean(name), gait.mean(name)
+        if share > MAX_SATURATION and share > 2.0 * others:
+            yield (
+                f'its servos are at their largest {what} for {share:.0%} of the time, '
+                f'those of the gait for {others:.0%}'
+            )
+
+
+def timing_notes(figures: CourseFigures) -> Iterator[str]:
+    """Yield where commands were later on the wire than they shall be; no fault of a policy."""
+    timing = figures.timing
+    if timing is None:
+        return
+    latency, jitter = timing.latency(0.5), timing.jitter(0.99)
+    if latency > LATENCY_GOAL:
+        yield (
+            f'observation to command took {latency * 1e3:.1f} ms (median), '
+            f'goal {LATENCY_GOAL * 1e3:g} ms'
+        )
+    if jitter > JITTER_GOAL:
+        yield (
+            f'commands were {jitter * 1e3:.1f} ms off their rhythm (p99), '
+            f'goal {JITTER_GOAL * 1e3:g} ms: a busy machine, or no real-time priority'
+        )
+
+
+def is_too_late(figures: CourseFigures, period: float) -> bool:
+    """Return whether commands came so late that a walk says nothing of who walked."""
+    return figures.timing is not None and figures.timing.jitter(0.99) > period
+
+
+def velocity_text(velocity: Velocity) -> str:
+    """Return a velocity for people."""
+    return f'{velocity.x:+.3f} {velocity.y:+.3f} m/s {velocity.yaw:+.2f} rad/s'

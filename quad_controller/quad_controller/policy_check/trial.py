@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trials of policies beside the gait: on all cores at once, or through the whole chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+import multiprocessing
+import os
+from pathlib import Path
+
+from quad_description import quadruped
+from quad_sim import SimulationError
+
+from ..exceptions import CheckError
+from ..gait.generator import GaitGenerator
+from ..gait.parameters import GaitParameters
+from ..gait.velocity import Velocity
+from ..policy.load import load_policy, LoadedPolicy
+from ..policy.options import PolicyOptions
+from ..states.parameters import StateParameters
+from .arenas import PhysicsArena, RobotChoice, serial_arena
+from .conditions import AS_MADE, Conditions
+from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME
+from .walk import STAND_TIME
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Who walks.
+
+    Attributes:
+        path: An ONNX file; None for the gait.
+        options: How the policy is run.
+        robot: Which robot walks.
+    """
+
+    path: Path | None = None
+    options: PolicyOptions = field(default_factory=PolicyOptions)
+    robot: RobotChoice = field(default_factory=RobotChoice)
+
+    def load(self) -> LoadedPolicy | None:
+        """Return its policy, checked; None for the gait.
+
+        Raises:
+            PolicyError: It does not fit the robot.
+        """
+        if self.path is None:
+            return None
+        robot = quadruped(self.robot.urdf)
+        stand = GaitGenerator(robot, GaitParameters()).stand_targets
+        return load_policy(self.path, robot, stand, self.options, StateParameters().period)
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A course that somebody walks.
+
+    Attributes:
+        who: Who walks.
+        commands: One after the other.
+        duration: Of each in [s].
+        conditions: What differs.
+        seed: Of the pushes.
+    """
+
+    who: Candidate
+    commands: tuple[Velocity, ...]
+    duration: float
+    conditions: Conditions = AS_MADE
+    seed: int = 1
+
+    def run(self) -> CourseFigures:
+        """Walk it in physics, in virtual time.
+
+        Raises:
+            CheckError: The physics failed.
+            PolicyError: The policy does not fit the robot.
+        """
+        loaded = self.who.load()
+        policy = None if loaded is None else loaded.runner
+        try:
+            arena = PhysicsArena(self.who.robot, self.conditions)
+            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy)
+            push = self.conditions.push
+            return walker.walk(self.commands, self.duration, push=push, seed=self.seed)
+        except SimulationError as error:
+            raise CheckError(f'the physics failed: {error}') from error
+
+
+def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
+    """Run trials on all cores; return their figures in their order.
+
+    Raises:
+        CheckError: The physics failed.
+        PolicyError: A policy does not fit the robot.
+    """
+    # a process that is forked would have locks of threads that it does not have
+    context = multiprocessing.get_context('spawn')
+    workers = min(len(os.sched_getaffinity(0)), len(trials))
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        return list(pool.map(Trial.run, trials))
+
+
+def run_chain(
+    whos: Sequence[Candidate], commands: Sequence[Velocity], duration: float
+) -> list[CourseFigures]:
+    """Have several walk a course in real time, one after the other, behind one serial line.
+
+    Args:
+        whos: Who walk.
+        commands: One after the other.
+        duration: Of each in [s].
+
+    Raises:
+        CheckError: The simulation or the line failed.
+        PolicyError: A policy does not fit the robot.
+    """
+    figures = []
+    for who in whos:
+        loaded = who.load()
+        policy = None if loaded is None else loaded.runner
+        with serial_arena(who.robot) as arena:
+            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy)
+            figures.append(walker.walk(commands, duration))
+    return figures
+
+
+def chain_duration(minutes: float, walkers: int, commands: int) -> float:
+    """Return how long each command may take when a chain shall take some minutes [s]."""
+    each = 60.0 * minutes / walkers - STAND_TIME - REST_TIME
+    return each / commands - SETTLE_TIME

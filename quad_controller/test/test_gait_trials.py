@@ -1,0 +1,391 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Trials of policies beside the gait: courses, what they come to, the chain, and the report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+import re
+import time
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from quad_controller.exceptions import CheckError
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.policy.contract.model import CommandRanges, Gains
+from quad_controller.policy.gains import gain_rows, ServoResponse
+from quad_controller.policy_check.arenas import (
+    PatientBackend,
+    PhysicsArena,
+    RobotChoice,
+    serial_arena,
+    SerialArena,
+    servo_response,
+)
+from quad_controller.policy_check.chart import Line, line_chart
+from quad_controller.policy_check.conditions import Conditions, SWEEPS
+from quad_controller.policy_check.course import (
+    course_for,
+    CourseFigures,
+    CourseWalker,
+    Passage,
+)
+from quad_controller.policy_check.findings import (
+    Compared,
+    figures_table,
+    Findings,
+    Swept,
+    text_of,
+    tracking_table,
+)
+from quad_controller.policy_check.html_report import html_report
+from quad_controller.policy_check.judgement import against_gait, is_too_late, timing_notes
+from quad_controller.policy_check.main import ExitCode, run
+from quad_controller.policy_check.trial import chain_duration
+from quad_controller.policy_check.walk import WalkingRobot
+from quad_description import RecordedBackend, RobotState
+from quad_gait_policies import joined, metadata, write_policy
+from quad_gait_rig import ROBOT
+from quad_hardware.exceptions import NoAnswerError
+from quad_sim import CommandTiming
+from quad_sim.physics import Metered
+
+DEADLINE = 90.0  # [s]
+FAIR = Passage(Velocity(0.2), Velocity(0.19), 10.0, 0, 0.05, 0.02, 0.0, 0.05, 5.0)
+
+
+def course(*passages: Passage) -> CourseFigures:
+    """What somebody came to."""
+    return CourseFigures(passages or (FAIR,))
+
+
+# --- what is walked
+
+
+def test_a_course_has_what_a_policy_was_trained_for() -> None:
+    """Three speeds of each axis, up to what it is commanded; none of an axis that it lacks."""
+    assert len(course_for(None)) == 9
+    ranges = CommandRanges((-0.2, 0.2), (0.0, 0.0), (-9.0, 9.0))
+    assert course_for(ranges)[:3] == (Velocity(0.0667), Velocity(0.1333), Velocity(0.2))
+    assert {axis_of(each) for each in course_for(ranges)} == {'forward', 'turn'}
+
+
+def axis_of(command: Velocity) -> str:
+    """Along which axis a command goes."""
+    return replace(FAIR, commanded=command).axis
+
+
+def test_minutes_are_shared_among_those_who_walk() -> None:
+    """The shortest that the command takes is enough for every command."""
+    assert chain_duration(0.7, 2, 9) > 0.5
+    assert chain_duration(2.0, 2, 9) == pytest.approx((60.0 - 3.5) / 9 - 1.0)
+
+
+@pytest.mark.slow
+def test_falls_are_counted_and_walked_on_after() -> None:
+    """The gait walks one way without a push, and falls when it is hit."""
+    arena = PhysicsArena(RobotChoice())
+    walker = CourseWalker(arena, ROBOT, None)
+    (walked,) = walker.walk([Velocity(0.2)], 3.0).passages
+    assert walked.falls == 0
+    assert walked.time == pytest.approx(3.0)
+    assert walked.error < 0.03
+    assert 1.0 < walked.cost_of_transport < 20.0
+    assert 0.0 < walked.smoothness < 0.5
+    assert walked.timing is None
+    toppled = walker.walk([Velocity(0.2), Velocity(yaw=1.0)], 4.1, push=4.0)
+    assert toppled.falls > 0
+    assert [each.time > 0.0 for each in toppled.passages] == [True, True]
+    assert math.isnan(toppled.passages[1].cost_of_transport)
+
+
+class Interrupted(PhysicsArena):
+    """An arena on a machine that pauses as often as is said, each time with a fall."""
+
+    times = 0
+
+    @property
+    def interruption(self) -> str:
+        """What it did."""
+        self.times -= 1
+        return 'a pause of 0.7 s' if self.times >= 0 else ''
+
+
+@pytest.mark.slow
+def test_what_the_machine_does_is_no_fall_of_the_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A walk that it cut off is walked again; too many of them end the trial."""
+    monkeypatch.setattr('quad_controller.policy_check.course.MAX_INTERRUPTIONS', 2)
+    arena = Interrupted(RobotChoice(), Conditions())
+    arena.times = 1
+    walker = CourseWalker(arena, ROBOT, None)
+    figures = walker.walk([Velocity(0.1)], 3.0, push=5.0)
+    assert walker.interruptions == 1
+    assert figures.falls == 1
+    arena.times = 1000
+    with pytest.raises(CheckError, match=r'too busy .* a pause of 0\.7 s'):
+        walker.walk([Velocity(0.1)] * 2, 3.0, push=5.0)
+
+
+class Silent(RecordedBackend):
+    """A robot that does not report for some steps."""
+
+    def __init__(self, missing: int) -> None:
+        super().__init__(('joint',), [RobotState()])
+        self.missing = missing
+
+    def step(self, targets: object) -> RobotState:
+        """Report, if it is time."""
+        self.missing -= 1
+        if self.missing >= 0:
+            raise NoAnswerError('no report for 0.5 s')
+        return self.observe()
+
+
+def test_a_robot_that_is_silent_for_a_while_is_waited_for() -> None:
+    """And that is noted, as what interrupted the walk."""
+    backend = PatientBackend(Silent(3))
+    assert backend.step([0.0]) == RobotState()
+    assert 'no report' in backend.interruption
+    backend.interruption = ''
+    backend.step([0.0])
+    assert backend.interruption == ''
+
+
+@pytest.mark.slow
+def test_the_gait_walks_through_the_whole_chain() -> None:
+    """Servos, board, line, driver, estimator: it gets on, and its commands are timed."""
+    with serial_arena(RobotChoice()) as arena:
+        walker = WalkingRobot(arena.backend, ROBOT, None, arena.stand())
+        end = time.monotonic() + DEADLINE
+        measured = walk_on(arena, walker, end)
+        while measured[0].x < 0.1:
+            assert time.monotonic() < end, measured
+            measured = walk_on(arena, walker, end)
+        metered, timing = measured
+        assert timing is not None
+        assert metered.energy > 0.0
+        assert 0.0 < timing.latency(0.5) < timing.latency(1.0)
+        walker.run(0.5, REST)
+
+
+def walk_on(
+    arena: SerialArena, walker: WalkingRobot, end: float
+) -> tuple[Metered, CommandTiming | None]:
+    """Walk for a second, from standing where a busy machine has brought the robot down."""
+    if walker.is_down:
+        walker.restart(arena.stand())
+        walker.stand_up()
+        arena.begin()
+    for _ in range(50):
+        if walker.is_down or time.monotonic() > end:
+            break
+        walker.step(Velocity(0.2))
+    return arena.read()
+
+
+# --- what is judged
+
+
+def test_a_policy_that_does_as_the_gait_does_stands_up() -> None:
+    """Also where both are off, and where both fall alike."""
+    slow = replace(FAIR, went=Velocity(0.05), falls=1)
+    assert list(against_gait(course(), course())) == []
+    assert list(against_gait(course(FAIR, slow), course(FAIR, slow))) == []
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'falls': 2}, 'it fell 2 times, the gait 0'),
+        ({'went': Velocity(0.05)}, 'x went \\+0.050 of \\+0.200, too slow'),
+        ({'went': Velocity(-0.2)}, 'the other way'),
+        ({'torque_saturation': 0.4}, 'largest torque for 40% of the time'),
+        ({'speed_saturation': 0.3}, 'largest speed for 30% of the time'),
+        ({'time': 0.0}, 'never came to walk'),
+    ],
+)
+def test_a_policy_that_does_worse_than_the_gait_does_not(
+    changes: dict[str, object], reason: str
+) -> None:
+    """With the reason."""
+    found = list(against_gait(course(replace(FAIR, **changes)), course()))
+    assert len(found) == 1
+    assert re.search(reason, found[0])
+
+
+def test_late_commands_are_named_and_say_nothing_of_a_policy() -> None:
+    """Without clocks there is nothing to name."""
+    late = replace(FAIR, timing=CommandTiming((0.004, 0.005, 0.006), (0.03, 0.03, 0.03)))
+    notes = ' '.join(timing_notes(course(late)))
+    assert '5.0 ms (median), goal 3 ms' in notes
+    assert '30.0 ms off their rhythm' in notes
+    assert is_too_late(course(late), 0.02)
+    fine = replace(FAIR, timing=CommandTiming((0.001,), (0.001,)))
+    assert list(timing_notes(course(fine, fine))) == list(timing_notes(course())) == []
+    assert not is_too_late(course(), 0.02)
+
+
+# --- gains
+
+FIRM = servo_response('firm')
+
+
+def test_the_bandwidth_is_where_a_servo_has_lost_three_decibel() -> None:
+    """By the transfer function itself."""
+    for servo in (FIRM, servo_response('vendor_rl'), ServoResponse(5.0, 0.02, 1e-3)):
+        s = 2j * math.pi * servo.bandwidth
+        answer = servo.stiffness / (servo.inertia * s * s + servo.damping * s + servo.stiffness)
+        assert abs(answer) == pytest.approx(math.sqrt(0.5))
+
+
+@pytest.mark.parametrize(
+    ('stiffness', 'damping', 'words'),
+    [
+        (10.0, 0.3, []),
+        (1.1, 0.05, ['pulls 9.1 times as hard']),
+        (40.0, 0.3, ['sag 4.0 times as far', 'times as slowly']),
+        (10.0, 2.0, ['times as fast']),
+        (0.0, 0.3, ['0 N m/rad']),
+    ],
+)
+def test_other_gains_than_those_of_the_servos_are_named_with_what_they_do(
+    stiffness: float, damping: float, words: list[str]
+) -> None:
+    """A warning for each that is far off, none for those that are near."""
+    gains = Gains((10.0, stiffness), (0.3, damping))
+    warned = [row for row in gain_rows(gains, FIRM, 0.02) if row.verdict.value == 'warn']
+    assert len(warned) == len(words)
+    for row, word in zip(warned, words, strict=True):
+        assert word in row.found
+
+
+def test_a_latency_of_the_servos_counts_by_the_period() -> None:
+    """Half of it is near enough; nobody's gains are not compared."""
+    gains = Gains((10.0,), (0.3,))
+    slow = replace(FIRM, latency=0.03)
+    (late,) = [row for row in gain_rows(gains, slow, 0.02) if row.subject.startswith('latency')]
+    assert late.verdict.value == 'warn'
+    assert '30 ms' in late.found
+    (unstated,) = gain_rows(None, FIRM, 0.02)
+    assert unstated.found == 'not stated'
+    assert list(gain_rows(None, None, 0.02)) == []
+    (shown,) = gain_rows(gains, None, 0.02)
+    assert shown.found == '10 N m/rad, 0.3 N m s/rad'
+
+
+# --- the report
+
+
+def elements_of(page: str) -> list[ET.Element]:
+    """Return the elements of a page that is well-formed."""
+    return list(ET.fromstring(page).iter())  # noqa: S314  # it is ours
+
+
+def findings(**changes: object) -> Findings:
+    """What may be found."""
+    turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
+    pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
+    sweep = SWEEPS[0]
+    one = Compared('80', course(replace(FAIR, falls=3)), course())
+    swept = Swept(sweep, (one,) * len(sweep.values))
+    found = Findings('<walk>', 'lite', courses=(pair,), sweeps=(swept,), refusal='a & b')
+    return replace(found, **changes)
+
+
+def test_the_report_is_whole_and_needs_nothing_else() -> None:
+    """Every element is closed, nothing comes from elsewhere, text is text."""
+    page = html_report(findings(reasons=('it fell',), notes=('slow',)))
+    elements = elements_of(page)
+    assert not any({'src', 'href'} & element.attrib.keys() for element in elements)
+    assert 'http' not in page
+    assert '<walk>' not in page
+    assert 'a &amp; b' in page
+    assert 'does not stand up' in page
+    tags = [element.tag for element in elements]
+    assert tags.count('svg') == 2 + 2
+    assert tags.count('table') == 2 + 1
+    for words in ('falls in a minute', 'cost of transport', 'mass of the trunk'):
+        assert words in page
+
+
+def test_a_chart_draws_what_is_finite() -> None:
+    """As SVG that a reader of XML takes; nothing at all without a point."""
+    lines = [Line('a', [(0.0, 1.0), (1.0, math.inf), (2.0, -3.0)]), Line('b', [(1.0, 2.0)])]
+    chart = ET.fromstring(line_chart('t < u', 'x', 'y', lines))  # noqa: S314  # it is ours
+    (drawn, _) = chart.iter('polyline')
+    assert len(drawn.get('points', '').split()) == 2
+    low, high = 0.0, 230.0
+    for circle in chart.iter('circle'):
+        assert low < float(circle.get('cy', 'nan')) < high
+    assert line_chart('t', 'x', 'y', [Line('a', [(0.0, math.nan)])]) == ''
+
+
+def test_tables_have_a_row_for_each_thing() -> None:
+    """As text: columns stand under each other; what is no number is a dash."""
+    (pair,) = findings().courses
+    lost = replace(FAIR, went=Velocity(math.nan, math.nan, math.nan), time=0.0)
+    assert tracking_table(pair)[1] == (
+        *('forward', '+0.200 m/s'), *('+0.190', '0.010') * 2
+    )  # fmt: skip
+    assert tracking_table(Compared('', course(lost), course()))[1][2:4] == ('-', '-')
+    lines = text_of(figures_table(pair)).splitlines()
+    assert len({len(line) for line in lines}) == 1
+    assert not any('observation' in line for line in lines)
+    timed = course(replace(FAIR, timing=CommandTiming((0.002,), (0.001,))))
+    assert 'observation to command, p50 [ms]' in text_of(figures_table(Compared('', timed, timed)))
+
+
+@pytest.fixture(name='still', scope='module')
+def make_still(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A policy that only stands."""
+    return write_policy(tmp_path_factory.mktemp('policy') / 'still.onnx', metadata())
+
+
+@pytest.mark.slow
+def test_a_policy_that_walks_nowhere_does_not_stand_up_beside_the_gait(
+    still: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The report alone means a course in virtual time; it has the contract and the verdict."""
+    report = tmp_path / 'report.html'
+    assert run([str(still), '--duration', '1', '--report', str(report)]) == ExitCode.DOES_NOT
+    output = capsys.readouterr().out
+    assert 'does not stand up:\n' in output
+    assert 'too slow' in output
+    page = report.read_text(encoding='utf-8')
+    assert elements_of(page)
+    assert 'It does not stand up.' in page
+    assert 'not stated' in page, 'the gains'
+    assert page.count('<svg') == 3
+
+
+def test_a_policy_that_is_refused_has_a_report(tmp_path: Path) -> None:
+    """With the reason and the table, and nothing that was walked."""
+    names = joined(['hip', *ROBOT.names[1:]])
+    path = write_policy(tmp_path / 'other.onnx', metadata(joint_names=names))
+    report = tmp_path / 'report.html'
+    assert run([str(path), '--report', str(report)]) == ExitCode.DOES_NOT
+    page = report.read_text(encoding='utf-8')
+    assert 'REFUSE' in page
+    assert '<svg' not in page
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--report', '/nowhere/at/all.html'], 'No such file'),
+        (['--minutes', '0.1'], 'must be 0.7 to 120'),
+        (['--minutes', 'nan'], 'not a finite number'),
+        (['--servo', 'soft'], 'invalid choice'),
+    ],
+)
+def test_wrong_use_ends_with_two(
+    arguments: list[str], words: str, still: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything takes its time."""
+    with pytest.raises(SystemExit) as ended:
+        run([str(still), *arguments])
+    assert ended.value.code == ExitCode.WRONG_USE
+    assert words in capsys.readouterr().err
