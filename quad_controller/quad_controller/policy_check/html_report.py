@@ -43,8 +43,8 @@ th, td { padding: .2rem .6rem; border-bottom: 1px solid var(--line); vertical-al
 th, td { text-align: right; }
 th:first-child, td:first-child, table.words th, table.words td { text-align: left; }
 table.words { min-width: 34rem; }
-table.words td:first-child { min-width: 8rem; }
-table.words td { overflow-wrap: anywhere; }
+table.words td:nth-child(2) { min-width: 8rem; }
+table.words td + td { overflow-wrap: anywhere; }
 .charts { display: grid; gap: .6rem; margin: .8rem 0; }
 .charts { grid-template-columns: repeat(auto-fit, minmax(min(100%, 17rem), 1fr)); }
 svg { width: 100%; max-width: 30rem; background: var(--soft); }
@@ -111,12 +111,12 @@ def _contract(findings: Findings) -> Iterator[str]:
         return
     yield f'<h2>Contract</h2><p>SHA-256 <code>{escape(loaded.digest)}</code></p>'
     yield '<div class="scroll"><table class="words">'
-    yield '<tr><th>check</th><th>expected</th><th>found</th><th></th></tr>'
+    yield '<tr><th></th><th>check</th><th>expected</th><th>found</th></tr>'
     for row in loaded.report.rows:
         words = (row.subject, row.expected, row.found)
         cells = ''.join(f'<td>{escape(each)}</td>' for each in words)
         verdict = row.verdict.value
-        yield f'<tr>{cells}<td class="{verdict.lower()}">{verdict}</td></tr>'
+        yield f'<tr><td class="{verdict.lower()}">{verdict}</td>{cells}</tr>'
     yield '</table></div><details><summary>Its values, and where each comes from</summary>'
     yield '<div class="scroll"><table class="words">'
     for path, value, origin in loaded.document.rows():

@@ -44,9 +44,10 @@ def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:
         yield f'it fell {policy.falls} times, the gait {gait.falls}'
     for each, other in zip(policy.passages, gait.passages, strict=True):
         gone_astray = list(astray(each.went, each.commanded)) if each.time else []
-        # what the gait does not manage either is no fault of the policy
-        if gone_astray and not (other.time and list(astray(other.went, other.commanded))):
-            yield f'commanded {velocity_text(each.commanded)}: {"; ".join(gone_astray)}'
+        if gone_astray:
+            so_did_the_gait = other.time and any(astray(other.went, other.commanded))
+            alike = ' (so does the gait: look at the servos)' if so_did_the_gait else ''
+            yield f'commanded {velocity_text(each.commanded)}: {"; ".join(gone_astray)}{alike}'
     for name, what in (('torque_saturation', 'torque'), ('speed_saturation', 'speed')):
         share, others = policy.mean(name), gait.mean(name)
         if share > MAX_SATURATION and share > 2.0 * others:
