@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 import re
 import time
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -211,7 +212,7 @@ def test_a_policy_that_goes_as_commanded_and_falls_no_oftener_stands_up() -> Non
     ],
 )
 def test_a_policy_that_does_worse_than_the_gait_does_not(
-    changes: dict[str, object], reason: str
+    changes: dict[str, Any], reason: str
 ) -> None:
     """With the reason."""
     found = list(against_gait(course(replace(FAIR, **changes)), course()))
@@ -287,7 +288,7 @@ def elements_of(page: str) -> list[ET.Element]:
     return list(ET.fromstring(page).iter())  # noqa: S314  # it is ours
 
 
-def findings(**changes: object) -> Findings:
+def findings(**changes: Any) -> Findings:
     """What may be found."""
     turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
     pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))

@@ -105,12 +105,12 @@ def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
 
 
 def run_chain(
-    whos: Sequence[Candidate], commands: Sequence[Velocity], duration: float
+    walkers: Sequence[Candidate], commands: Sequence[Velocity], duration: float
 ) -> list[CourseFigures]:
     """Have several walk a course in real time, one after the other, behind one serial line.
 
     Args:
-        whos: Who walk.
+        walkers: Who walk.
         commands: One after the other.
         duration: Of each in [s].
 
@@ -119,7 +119,7 @@ def run_chain(
         PolicyError: A policy does not fit the robot.
     """
     figures = []
-    for who in whos:
+    for who in walkers:
         loaded = who.load()
         policy = None if loaded is None else loaded.runner
         with serial_arena(who.robot) as arena:
