@@ -53,7 +53,7 @@ setup(
     extras_require={
         'test': ['pytest'],
         'ros': [sibling('libraries/message_templates'), sibling('libraries/node_runner')],
-        'physics': [sibling('quad_sim')],
+        'physics': [sibling('quad_hardware'), sibling('quad_sim')],
     },
     zip_safe=False,  # onnxruntime reads policies from their files
     maintainer='The arm and quad developers',

@@ -107,7 +107,7 @@ def run_trials(trials: Sequence[Trial]) -> list[CourseFigures]:
 def run_chain(
     walkers: Sequence[Candidate], commands: Sequence[Velocity], duration: float
 ) -> list[CourseFigures]:
-    """Have several walk a course in real time, one after the other, behind one serial line.
+    """Have several walk a course in real time, one after the other, each on a line of its own.
 
     Args:
         walkers: Who walk.
