@@ -225,7 +225,7 @@ def test_late_commands_are_named_and_say_nothing_of_a_policy() -> None:
     late = replace(FAIR, timing=CommandTiming((0.004, 0.005, 0.006), (0.03, 0.03, 0.03)))
     notes = ' '.join(timing_notes(course(late)))
     assert '5.0 ms (median), goal 3 ms' in notes
-    assert '30.0 ms off their rhythm' in notes
+    assert '30.0 ms off their period' in notes
     assert is_too_late(course(late), 0.02)
     fine = replace(FAIR, timing=CommandTiming((0.001,), (0.001,)))
     assert list(timing_notes(course(fine, fine))) == list(timing_notes(course())) == []

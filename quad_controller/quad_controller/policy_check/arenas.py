@@ -30,7 +30,7 @@ from ..policy.gains import ServoResponse
 from .conditions import AS_MADE, Conditions
 
 MAX_PAUSE = 0.15  # [s] between two steps, which the controller is not to blame for
-PATIENCE = 20.0  # [s] with a robot that does not report
+SILENCE_TIMEOUT = 20.0  # [s] with a robot that does not report
 FRESH = 3  # reports after which what was observed before the robot was put down is gone
 
 
@@ -155,7 +155,7 @@ class PatientBackend(Backend):
             state = self._backend.step(targets)
         except (NoAnswerError, CommandError) as error:
             self.interruption = str(error)
-            state = self._wait(now + PATIENCE)
+            state = self._wait(now + SILENCE_TIMEOUT)
         self._stepped_at = time.monotonic()
         return state
 

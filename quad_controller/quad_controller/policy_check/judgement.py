@@ -70,7 +70,7 @@ def timing_notes(figures: CourseFigures) -> Iterator[str]:
         )
     if jitter > JITTER_GOAL:
         yield (
-            f'commands were {jitter * 1e3:.1f} ms off their rhythm (p99), '
+            f'commands were {jitter * 1e3:.1f} ms off their period (p99), '
             f'goal {JITTER_GOAL * 1e3:g} ms: a busy machine, or no real-time priority'
         )
 

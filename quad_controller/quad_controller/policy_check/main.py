@@ -123,7 +123,7 @@ def main() -> None:
     """Entry point."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # the driver's remarks on a robot that was put on its feet are no trouble of the policy
+    # the driver's warnings of a robot that was put on its feet are no trouble of the policy
     logging.getLogger('quad_hardware').setLevel(logging.CRITICAL)
     try:
         sys.exit(run(sys.argv[1:]))
