@@ -44,7 +44,6 @@ setup(
         ('share/canopen_tools', ['package.xml']),
     ],
     install_requires=[
-        'python-can>=4.3',
         'PyYAML>=6',
         sibling('arm_canopen'),
     ],
