@@ -30,7 +30,7 @@ from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
 from quad_gait_policies import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
-from quad_msgs.srv import SetMode
+from quad_msgs.srv import LoadPolicy, SetMode
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -105,6 +105,11 @@ class Robot:
     def mode(self, mode: str) -> Any:
         """Ask for a mode."""
         return self.client.call(SetMode, 'set_mode', SetMode.Request(mode=mode))
+
+    def load(self, path: str) -> Any:
+        """Ask for another policy."""
+        request = LoadPolicy.Request(path=path)
+        return self.client.call(LoadPolicy, 'controller_node/load_policy', request)
 
     def tune(self, **values: float) -> Any:
         """Set parameters of the node."""
@@ -208,6 +213,32 @@ def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_pa
         assert 'not in the robot: fl_hip' in robot.mode('policy').message
         assert robot.mode('stand').success
         robot.until_state('stand')
+
+
+def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -> None:
+    """Checked as at the start and refused in the same words; then it takes over, and leaves."""
+    reports = robot.client.listen(String, 'controller_node/policy', LATCHED)
+    robot.begin()
+    robot.until_ready()
+    assert robot.mode('walk').success
+    robot.until_state('walk')
+    assert 'neither a file nor shipped' in robot.load('no_such').message
+    names = joined(['fl_hip', *ROBOT.names[1:]])
+    renamed = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
+    assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
+    answer = robot.load('trot_imitation')
+    assert answer.success, answer.message
+    assert 'from the gait to trot_imitation.onnx' in answer.message
+    refused = robot.load('gait')
+    assert not refused.success
+    assert 'trot_imitation.onnx: ' in refused.message
+    robot.until_state('policy')  # the blend is over
+    assert answer.message.rpartition(' ')[2] in reports[-1].data
+    assert robot.mode('walk').success
+    robot.until_state('walk')
+    assert robot.load('').success
+    robot.client.spin_until(lambda: 'no policy' in reports[-1].data, 20.0, 'the report')
+    assert 'no policy is loaded' in robot.mode('policy').message
 
 
 def test_a_missing_joint_is_a_fault_that_is_cleared_by_its_service(robot: Robot) -> None:

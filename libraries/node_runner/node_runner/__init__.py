@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node's program has to do, once: start, end, and refuse parameters with words."""
 
+from .background_service import create_background_service
 from .black_box_parameters import declare_black_box
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .exceptions import ParameterError
@@ -23,6 +24,7 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
+    'create_background_service',
     'declare_black_box',
     'declare_given',
     'declare_thread_priority',

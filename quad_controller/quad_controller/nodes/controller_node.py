@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 import sys
 import threading
+import time
+from typing import Any
+from weakref import WeakKeyDictionary
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
@@ -25,6 +29,7 @@ from std_srvs.srv import Trigger
 
 from message_templates import FastPublisher, FastReader
 from node_runner import (
+    create_background_service,
     destroyed_when_refused,
     LATCHED,
     notify_ready,
@@ -35,14 +40,14 @@ from node_runner import (
 )
 from quad_description import DescriptionError
 from quad_msgs.msg import JointCommand
-from quad_msgs.srv import SetMode
+from quad_msgs.srv import LoadPolicy, SetMode
 
 from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
-from ..policy.load import load_policy
+from ..policy.load import load_policy, LoadedPolicy
 from ..policy.shipped import find_policy
-from ..states.controller import Controller
+from ..states.controller import Controller, NO_POLICY
 from ..states.faults import Fault
 from ..states.modes import Answer
 from ..states.status import EventKind, Output, Status
@@ -57,6 +62,8 @@ COMMAND_QOS = QoSProfile(
 )
 REQUEST_QOS = 1  # only the newest velocity and pose count
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
+ODOMETRY_WAIT = 1.0  # [s] for the first message, when a policy that needs it is loaded
+GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
@@ -81,7 +88,10 @@ class ControllerNode(Node):
         super().__init__('controller_node')
         self._settings = settings = declare_parameters(self)
         self._report = self.create_publisher(String, '~/policy', LATCHED)
-        policy, refusal = self._load_policy()
+        self._loader = ThreadPoolExecutor(1, thread_name_prefix='load_policy')
+        self._texts: WeakKeyDictionary[Policy, str] = WeakKeyDictionary()
+        policy, refusal = self._load_first_policy()
+        self._reported = policy
         self._controller = Controller(
             settings.robot,
             settings.gait,
@@ -113,11 +123,14 @@ class ControllerNode(Node):
         self._state = self.create_publisher(String, '~/state', LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
+        self._sees_odometry, self._odometry = False, threading.Event()
         if policy is not None and policy.needs_linear_velocity:
-            sensor = qos_profile_sensor_data
-            self.create_subscription(Odometry, 'odom', self._take_odometry, sensor)
+            self._see_odometry()
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
+        create_background_service(
+            self, LoadPolicy, '~/load_policy', self._take_load_request, self._loader
+        )
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
         self.create_timer(settings.diagnostics_period, self._diagnose)
@@ -133,17 +146,32 @@ class ControllerNode(Node):
 
     def end(self) -> None:
         """Stop sending; the servos hold their last targets."""
+        self._loader.shutdown(cancel_futures=True)
         self._loop.stop()
 
-    def _load_policy(self) -> tuple[Policy | None, str]:
+    def _load_first_policy(self) -> tuple[Policy | None, str]:
         """Return the policy, or None and why there is none; the gait does not need it."""
+        if not self._settings.policy:
+            return None, NO_POLICY
+        try:
+            loaded = self._load_policy(self._settings.policy)
+        except PolicyError as error:
+            self._report.publish(String(data=str(error)))
+            return None, f'the policy was refused at the start: {error.reason}'
+        self._report.publish(String(data=str(loaded)))
+        return loaded.runner, ''
+
+    def _load_policy(self, text: str) -> LoadedPolicy:
+        """Load and check a policy; the log has the table in either case.
+
+        Raises:
+            PolicyError: It does not fit.
+        """
         settings = self._settings
-        if not settings.policy:
-            return None, 'no policy is loaded (parameter policy)'
         gait = GaitGenerator(settings.robot, settings.gait)
         try:
             loaded = load_policy(
-                find_policy(settings.policy),
+                find_policy(text),
                 settings.robot,
                 gait.stand_targets,
                 settings.policy_options,
@@ -151,11 +179,24 @@ class ControllerNode(Node):
             )
         except PolicyError as error:
             self.get_logger().error(str(error))
-            self._report.publish(String(data=str(error)))
-            return None, f'the policy was refused at the start: {error.reason}'
+            raise
         self.get_logger().info(str(loaded))
-        self._report.publish(String(data=str(loaded)))
-        return loaded.runner, ''
+        self._texts[loaded.runner] = str(loaded)
+        return loaded
+
+    def _wait_for_odometry(self) -> None:
+        """Wait for a velocity of the body, in another thread; without one, the refusal says so."""
+        if self.executor is None or self._odometry.is_set():
+            return
+        self.executor.create_task(self._see_odometry)
+        if self._odometry.wait(ODOMETRY_WAIT):
+            time.sleep(2.0 * self._settings.states.period)  # the controller takes it with a step
+
+    def _see_odometry(self) -> None:
+        if not self._sees_odometry:
+            self._sees_odometry = True
+            sensor = qos_profile_sensor_data
+            self.create_subscription(Odometry, 'odom', self._take_odometry, sensor)
 
     def _subscribe(self) -> None:
         sensor = qos_profile_sensor_data
@@ -195,6 +236,7 @@ class ControllerNode(Node):
 
     def _take_odometry(self, message: Odometry) -> None:
         self._loop.offer_linear_velocity(messages.linear_velocity(message))
+        self._odometry.set()
 
     def _refuse(self, what: Fault, reason: str) -> None:
         with self._loop.lock:
@@ -228,6 +270,34 @@ class ControllerNode(Node):
         response.success, response.message = answer.accepted, answer.message
         self.get_logger().info(f'mode {request.mode!r}: {answer.message}')
         return response
+
+    def _take_load_request(self, request: Any, response: Any) -> Any:  # noqa: ANN401
+        """Load a policy and follow it; in the thread of the loader."""
+        answer = self._follow(request.path)
+        response.success, response.message = answer.accepted, answer.message
+        self.get_logger().info(f'load_policy {request.path!r}: {answer.message}')
+        return response
+
+    def _follow(self, path: str) -> Answer:
+        if path in GAIT_WORDS:
+            with self._loop.lock:
+                return self._controller.follow(None)
+        with self._loop.lock:
+            if refusal := self._controller.handover_refusal():
+                return Answer(False, refusal)
+        try:
+            loaded = self._load_policy(path)
+        except PolicyError as error:
+            return Answer(False, f'the policy was refused: {error.reason}')
+        policy = loaded.runner
+        if policy.needs_linear_velocity:
+            self._wait_for_odometry()
+        with self._loop.lock:
+            answer = self._controller.follow(policy)
+        if not answer.accepted:
+            del self._texts[policy]
+            return answer
+        return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
 
     def _clear_fault(
         self, _request: Trigger.Request, response: Trigger.Response
@@ -265,6 +335,7 @@ class ControllerNode(Node):
     def _publish(self, output: Output) -> None:
         logger = self.get_logger()
         if output.targets is not None:
+            self._report_policy()
             now = self.get_clock().now().nanoseconds
             self._targets = output.targets
             sent = self._filter.select(output.targets, output.title, self._joints.unreported)
@@ -288,6 +359,16 @@ class ControllerNode(Node):
             self._title = output.title
             self._state.publish(String(data=output.title))
             self._publish_diagnostics(self._status())
+
+    def _report_policy(self) -> None:
+        """Publish the table of another policy, when one is followed."""
+        policy = self._controller.policy
+        if policy is self._reported:
+            return
+        self._reported = policy
+        self._filter.others_move = self._filter.others_move or policy is not None
+        text = NO_POLICY if policy is None else self._texts.get(policy, policy.name)
+        self._report.publish(String(data=text))
 
     def _publish_diagnostics(self, status: Status) -> None:
         name = self.get_name()

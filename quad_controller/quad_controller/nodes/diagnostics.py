@@ -32,6 +32,7 @@ def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
                 'state': status.title,
                 'goal': status.goal.value,
                 'gait': status.gait.value,
+                'policy': status.policy,
                 'velocity': f'{velocity.x:.3f} {velocity.y:.3f} {velocity.yaw:.3f}',
                 'joint_states_age': f'{status.joints_age:.3f}',
                 'imu_age': f'{status.imu_age:.3f}',

@@ -83,7 +83,11 @@ class JointReader:
 
 
 class CommandFilter:
-    """Decides how many joints a command is for: all, or the first ones, which are the legs."""
+    """Decides how many joints a command is for: all, or the first ones, which are the legs.
+
+    Attributes:
+        others_move: Whether joints that are no legs' will be sent elsewhere, ever.
+    """
 
     def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
         """Begin with a robot that has not moved.
@@ -95,7 +99,7 @@ class CommandFilter:
         legs = len(robot.names) - len(robot.others)
         legs_first = all(index >= legs for index in robot.others)
         self._count = legs if legs_first else len(robot.names)
-        self._others_move = others_move
+        self.others_move = others_move
         self._moved = False
 
     def select(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
@@ -107,6 +111,6 @@ class CommandFilter:
             unreported: Joints that nobody measures.
         """
         self._moved = self._moved or title not in STILL_TITLES
-        if unreported and not (self._others_move and self._moved):
+        if unreported and not (self.others_move and self._moved):
             return targets[: self._count]
         return targets

@@ -37,10 +37,14 @@ class PolicyStep:
     Attributes:
         targets: Positions of all joints in [rad]; None when the answer cannot be used.
         reason: Why it cannot be used.
+        saturated: Share of the policy's joints whose targets were cut at their limits.
+        computing: Time that the network took in [s], of this thread alone.
     """
 
     targets: Targets | None
     reason: str = ''
+    saturated: float = 0.0
+    computing: float = 0.0
 
 
 class Policy(Protocol):
@@ -54,6 +58,11 @@ class Policy(Protocol):
     @property
     def needs_linear_velocity(self) -> bool:
         """Whether it sees the linear velocity of the body, which has to be estimated."""
+        ...
+
+    @property
+    def memory(self) -> float:
+        """How far back it sees what was observed in [s]."""
         ...
 
     def missing(self, inputs: PolicyInputs) -> str:

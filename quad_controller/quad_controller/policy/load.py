@@ -117,7 +117,14 @@ def load_policy(
     """
     network = OnnxNetwork(path)
     return validate_policy(
-        path.name, network, robot, stand, options=options, period=period, clock=time.perf_counter
+        path.name,
+        network,
+        robot,
+        stand,
+        options=options,
+        period=period,
+        clock=time.perf_counter,
+        computing_clock=time.thread_time,
     )
 
 
@@ -130,6 +137,7 @@ def validate_policy(
     options: PolicyOptions,
     period: float,
     clock: Callable[[], float],
+    computing_clock: Callable[[], float] = lambda: 0.0,
 ) -> LoadedPolicy:
     """Check a network as a policy.
 
@@ -141,6 +149,7 @@ def validate_policy(
         options: How it shall be run.
         period: Time between two steps in [s].
         clock: A monotonic clock in [s], to see how long it takes.
+        computing_clock: One of the thread alone, by which the time of each answer is taken.
 
     Raises:
         PolicyError: It does not fit; the message has the table.
@@ -160,7 +169,9 @@ def validate_policy(
     )
     checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
     network.recur(contract.recurrence)
-    runner = PolicyRunner(name, network, contract, robot, options=options, period=period)
+    runner = PolicyRunner(
+        name, network, contract, robot, options=options, period=period, clock=computing_clock
+    )
     standing, held = _observed(runner, stand), runner.in_its_order(stand)
     try:
         answers = check_answers(network, standing, contract, held, period=period, clock=clock)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
@@ -57,6 +58,7 @@ class PolicyRunner:
         *,
         options: PolicyOptions,
         period: float,
+        clock: Callable[[], float] = lambda: 0.0,
     ) -> None:
         """Prepare it.
 
@@ -67,6 +69,7 @@ class PolicyRunner:
             robot: The robot.
             options: How to run it.
             period: Of the control loop in [s]; that of the policy is one or several of them.
+            clock: By which the network's time is taken in [s]; without one it counts as none.
 
         Raises:
             PolicyError: Targets are clipped to where a joint may not be.
@@ -83,6 +86,8 @@ class PolicyRunner:
         self._lower, self._upper = self._limits(robot, options.soft_limits)
         self._builder = ObservationBuilder(contract, options.gravity_source)
         self._decimation = max(round(contract.period / period), 1)
+        self._clock = clock
+        self._saturated = 0.0
         self._waits = 0
         self._previous: Floats = np.zeros(self._map.count, np.float32)
         self._positions = self._defaults.copy()
@@ -100,6 +105,13 @@ class PolicyRunner:
     def needs_linear_velocity(self) -> bool:
         """Whether it sees the linear velocity of the body, which has to be estimated."""
         return self._contract.needs(Source.LINEAR_VELOCITY)
+
+    @property
+    def memory(self) -> float:
+        """How far back it sees what was observed in [s]."""
+        return self._contract.period * max(
+            (term.history for term in self._contract.terms), default=1
+        )
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Return what it needs and nobody measures; nothing when all is there."""
@@ -156,17 +168,20 @@ class PolicyRunner:
             return PolicyStep(None, missing)
         if self._waits > 0 and self._wanted is not None:
             self._waits -= 1
-            return PolicyStep(self._targets(self._wanted, dt))
+            return PolicyStep(self._targets(self._wanted, dt), saturated=self._saturated)
         observation = self.observe(inputs)
         if not np.isfinite(observation).all():
             return PolicyStep(None, 'the observation is not finite')
+        begun = self._clock()
         try:
             action = self._network.run(observation)[0]
         except Exception as error:  # noqa: BLE001  # whatever a network fails with, the robot stands
             return PolicyStep(None, f'the network failed: {error}')
         if not np.isfinite(action).all():
             return PolicyStep(None, 'the action is not finite')
-        return PolicyStep(self.act(action, dt))
+        computing = self._clock() - begun
+        targets = self.act(action, dt)
+        return PolicyStep(targets, saturated=self._saturated, computing=computing)
 
     def advance(self, dt: float) -> None:
         """Let the clock of the phase go on by some [s]."""
@@ -185,6 +200,7 @@ class PolicyRunner:
         self._waits = self._decimation - 1
         target = self._offset + self._scale * action
         self._wanted = np.minimum(np.maximum(target, self._lower), self._upper)
+        self._saturated = float(np.count_nonzero(self._wanted != target)) / max(len(target), 1)
         return self._targets(self._wanted, dt)
 
     def _command(self, velocity: Velocity) -> Velocity:

@@ -24,6 +24,7 @@ from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy, PolicyInputs
 from .commands import Commands
 from .faults import Fault, FaultLatch
+from .handover import BLEND_TIME, Handover, Phase, PROBATION_TIME
 from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
@@ -35,6 +36,7 @@ from .shadow import Shadow
 from .status import Event, EventKind, Output, Status
 from .tracking import TrackingMonitor
 from .unseen import UnseenJoints
+from .watchdogs import Watchdogs
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -43,6 +45,8 @@ UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 
 WAYS_DOWN = frozenset({State.LIE, State.RELAX})
 """Modes that no fault keeps a robot from: they need nothing but the last targets."""
+
+NO_POLICY = 'no policy is loaded (parameter policy, or ~/load_policy)'
 
 LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
 """What stops a robot on its way down, if it was in order when the way down was requested."""
@@ -63,7 +67,7 @@ class Controller:
         states: StateParameters,
         *,
         policy: Policy | None = None,
-        policy_refusal: str = 'no policy is loaded (parameter policy)',
+        policy_refusal: str = NO_POLICY,
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
         first_gait: Gait = Gait.TROT,
@@ -99,6 +103,10 @@ class Controller:
         self._robot = robot
         self._policy, self._policy_refusal = policy, policy_refusal
         self._machine = StateMachine(poses, self._generator, states, policy)
+        self._parameters, self._dry_run = states, dry_run
+        self._handover: Handover | None = None
+        self._former_policy: Policy | None = None  # that a handover leads back to
+        self._reported_phase: Phase | None = None
         self._shadow = Shadow(policy) if policy is not None and dry_run else None
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
@@ -151,6 +159,117 @@ class Controller:
         machine.clear()
         return Answer(True, f'cleared; the mode is {machine.state.value}')
 
+    @property
+    def policy(self) -> Policy | None:
+        """What the mode ``policy`` follows."""
+        return self._policy
+
+    def handover_refusal(self) -> str:
+        """Return why no other policy can be taken now, whichever it is; nothing when one can."""
+        if self._handover is not None:
+            return (
+                f'{self._handover_text}; ask again when that is over '
+                '(the mode walk returns to the gait before)'
+            )
+        if self._latch.texts:
+            return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected'
+        machine = self._machine
+        if machine.state is not machine.goal:
+            return f'the robot is on its way to {machine.goal.value}; ask again there'
+        return ''
+
+    def follow(self, policy: Policy | None) -> Answer:
+        """Follow another policy from now on, or the gait.
+
+        A robot that stands or walks goes over to it at once. Otherwise nothing moves: the mode
+        ``policy`` follows it.
+
+        Args:
+            policy: It fits the robot; None for none.
+        """
+        machine, last = self._machine, self._limiter.last
+        moves = machine.can_hand_over and not self._dry_run and last is not None
+        leaves = policy is None and machine.state is not State.POLICY
+        refusal = self.handover_refusal()
+        if moves and not refusal and policy is not None:
+            refusal = self._health_refusal() or self._unmeasured(policy)
+        if refusal:
+            return Answer(False, f'stays with {self._policy_name}: {refusal}')
+        former, self._former_policy = self._policy_name, self._policy
+        self._set_policy(policy)
+        if not moves or leaves or last is None:
+            return Answer(True, self._installed(policy))
+        watchdogs = self._watchdogs() if policy is not None else None
+        self._handover = machine.hand_over(policy, last, watchdogs)
+        self._reported_phase = None
+        if policy is None:
+            return Answer(True, f'from {former} to the gait, within {BLEND_TIME:g} s')
+        return Answer(
+            True,
+            f'from {former} to {policy.name} within {BLEND_TIME:g} s, after it has watched for '
+            f'{self._handover.warm_up:g} s; then it is on probation for {PROBATION_TIME:g} s',
+        )
+
+    def _installed(self, policy: Policy | None) -> str:
+        if policy is None:
+            return 'no policy is loaded any more'
+        if self._dry_run:
+            return f'{policy.name} is watched (parameter policy_dry_run)'
+        return f'the mode policy follows {policy.name}'
+
+    def _set_policy(self, policy: Policy | None) -> None:
+        self._policy = policy
+        if policy is None:
+            self._policy_refusal = NO_POLICY
+        self._machine.set_policy(policy)
+        self._shadow = Shadow(policy) if policy is not None and self._dry_run else None
+
+    def _watchdogs(self) -> Watchdogs:
+        speeds = [limits.velocity for limits in self._robot.limits]
+        return Watchdogs(self._parameters.max_tilt, speeds, self._parameters.period)
+
+    @property
+    def _policy_name(self) -> str:
+        """What moves the robot, or would in the mode policy."""
+        followed = self._machine.state is State.POLICY or self._machine.state not in GAIT_STATES
+        return self._policy.name if self._policy is not None and followed else 'the gait'
+
+    @property
+    def _handover_text(self) -> str:
+        """How far a handover is."""
+        name = self._policy.name if self._policy is not None else 'the gait'
+        phase = self._handover.phase.value if self._handover is not None else ''
+        return f'{name}: {phase}' if phase else name
+
+    def _follow_handover(self, events: list[Event]) -> None:
+        """Report how far a handover is, and end it; one that a fault ended is undone."""
+        handover = self._handover
+        if handover is None:
+            return
+        name = self._policy.name if self._policy is not None else 'the gait'
+        former = self._former_policy.name if self._former_policy is not None else 'the gait'
+        faulted = self._machine.state is State.FAULT
+        if self._machine.motion is not handover:
+            self._handover = None
+            if faulted or handover.reason:
+                self._set_policy(self._former_policy)
+                text = f'{name} was given up for {former}, which the mode policy follows'
+                events.append(Event(EventKind.TROUBLE, text))
+            return
+        if handover.phase is not self._reported_phase:
+            self._reported_phase = handover.phase
+            if handover.phase is Phase.RETURN:
+                text = f'{name} was given up: {handover.reason}; back to {former}'
+                events.append(Event(EventKind.TROUBLE, text))
+            elif not handover.over:
+                events.append(Event(EventKind.NEWS, f'{name}: {handover.phase.value}'))
+        if handover.over:
+            self._handover = None
+            self._machine.conclude(handover)
+            if handover.phase is Phase.RETURNED:
+                self._set_policy(self._former_policy)
+            events.append(Event(EventKind.NEWS, f'{name}: {handover.phase.value}'))
+
     def retune(self, gait: GaitParameters) -> Answer:
         """Walk with another tuning from now on; only while the robot is not on its legs.
 
@@ -193,6 +312,7 @@ class Controller:
             refused=health.refused + self._commands.refused,
             limited=self._limiter.limited,
             unreachable=self._unreachable,
+            policy=self._handover_text if self._policy or self._handover else '',
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
@@ -221,6 +341,7 @@ class Controller:
             return Output(None, None, self._machine.title, False, tuple(events))
         self._latch_faults(last, events)
         self._advance_state(last, events)
+        self._follow_handover(events)
         self._report_conditions(events)
         if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
             return Output(None, None, self._machine.title, self._health.complete, tuple(events))
@@ -394,18 +515,24 @@ class Controller:
             return self._policy_refusal
         if request.state is State.POLICY and self._shadow is not None:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
-        if present := next(self._health.faults(), None):
-            fault, reason = present
-            return f'{fault.value}: {reason}'
-        return self._unmeasured() if request.state is State.POLICY else ''
+        if reason := self._health_refusal():
+            return reason
+        if request.state is State.POLICY and self._policy is not None:
+            return self._unmeasured(self._policy)
+        return ''
 
-    def _unmeasured(self) -> str:
+    def _health_refusal(self) -> str:
+        """Return what keeps the robot from moving its legs."""
+        present = next(self._health.faults(), None)
+        return f'{present[0].value}: {present[1]}' if present else ''
+
+    def _unmeasured(self, policy: Policy) -> str:
         """Return what a policy would need and nobody measures."""
         health = self._health
         if health.joints is None or health.imu is None:
             return 'a policy needs joint states and an attitude; there are none yet'
-        if health.uncertainty or self._policy is None:
+        if health.uncertainty:
             return health.uncertainty
-        return self._policy.missing(
+        return policy.missing(
             PolicyInputs(health.joints, health.imu, REST, health.linear_velocity)
         )

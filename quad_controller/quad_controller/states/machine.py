@@ -6,6 +6,7 @@
 
     RELAX <-> LIE <-> STAND <-> WALK, TURN      (the gait comes to rest before it is left)
                         ^-----> POLICY          (eased in; winds down, or fails, back to STAND)
+    STAND, WALK, TURN, POLICY <-> POLICY        (handed over while they go on, see handover.py)
     any of STAND, WALK, TURN, POLICY -> FAULT   (then RELAX, LIE or STAND when it is cleared)
     FAULT -> LIE -> RELAX                       (a way down is possible with any fault)
 
@@ -22,10 +23,12 @@ from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from .faults import Reaction
+from .handover import Handover
 from .modes import GAIT_STATES, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
 from .policy_motion import PolicyMotion
+from .watchdogs import Watchdogs
 
 EASE_TIME = 0.7  # [s] over which a policy takes over
 
@@ -94,6 +97,7 @@ class StateMachine:
         self._walk = Walk(generator)
         self._lie_down: Blend | None = None
         self._reaction: Reaction | None = None
+        self._gait_state = State.STAND  # that a policy was handed over from
         self.state = self.goal = State.RELAX
         self.motion: Motion = self._walk
 
@@ -135,6 +139,47 @@ class StateMachine:
         self.goal = goal
         self._reaction = None
 
+    @property
+    def can_hand_over(self) -> bool:
+        """Whether another motion may take over as it is: walking or standing, on no other way."""
+        walks = self.motion is self._walk or isinstance(self.motion, PolicyMotion)
+        return walks and self.state is self.goal and self.state is not State.FAULT
+
+    def hand_over(
+        self, policy: Policy | None, last: Targets, watchdogs: Watchdogs | None
+    ) -> Handover:
+        """Go over to another policy, or to the gait; for when that is possible.
+
+        Args:
+            policy: Which one; None for the gait.
+            last: The last targets of all joints in [rad].
+            watchdogs: What ends the policy.
+        """
+        after: Motion = self._walk
+        if policy is not None:
+            after = PolicyMotion(policy, last, ease_time=0.0)
+        else:
+            self._generator.others = last
+            self._generator.reset()
+        memory = policy.memory if policy is not None else 0.0
+        if self.state is not State.POLICY:
+            self._gait_state = self.state
+        self.motion = handover = Handover(self.motion, after, last, watchdogs, memory)
+        self.state = self.goal = State.WALK if policy is None else State.POLICY
+        return handover
+
+    def conclude(self, handover: Handover) -> None:
+        """Go on with what a handover has ended with."""
+        self.motion = handover.current
+        if self.motion is self._walk and self.state is State.POLICY:
+            if self.goal is State.POLICY:
+                self.goal = self._gait_state
+            self.state = self._gait_state
+
+    def set_policy(self, policy: Policy | None) -> None:
+        """Follow another policy when POLICY is entered next."""
+        self._policy = policy
+
     def react(self, reaction: Reaction, last: Targets) -> None:
         """Go into FAULT, or to a stronger reaction there.
 
@@ -171,7 +216,7 @@ class StateMachine:
         Returns:
             Why the policy was given up; empty as a rule.
         """
-        failure = self.motion.failure if isinstance(self.motion, PolicyMotion) else ''
+        failure = self.motion.failure
         if self.state is State.FAULT and self.goal is State.FAULT:
             self._advance_fault(last)
             return failure
@@ -218,7 +263,7 @@ class StateMachine:
             if self.motion is not self._lie_down and self.motion.settled:
                 self._lie(last)
         elif self._reaction is Reaction.STAND:
-            if isinstance(self.motion, PolicyMotion):
+            if isinstance(self.motion, (PolicyMotion, Handover)):
                 self._stand(last)
             self._stand_after_blend()
 

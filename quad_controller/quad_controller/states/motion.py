@@ -60,6 +60,11 @@ class Motion(ABC):
         """Whether it has come to where it leads."""
         return True
 
+    @property
+    def failure(self) -> str:
+        """Why it is of no use any more; empty while it works."""
+        return ''
+
     @abstractmethod
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets of all joints in [rad].

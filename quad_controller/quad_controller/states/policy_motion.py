@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from quad_description import Targets
 
-from ..policy.interface import Policy
+from ..policy.interface import Policy, PolicyStep
 from .motion import Motion, Situation
 
 MAX_BAD_STEPS = 3  # in a row; one may be a glitch, the robot stands on its last targets meanwhile
@@ -17,7 +17,8 @@ class PolicyMotion(Motion):
     """Follows a policy.
 
     Attributes:
-        failure: Why it was given up; empty while it works.
+        policy: The policy.
+        answer: What it answered last; None when there was nothing to ask it by.
     """
 
     def __init__(self, policy: Policy, start: Targets, ease_time: float) -> None:
@@ -29,30 +30,37 @@ class PolicyMotion(Motion):
             ease_time: Over how long the policy's targets take over in [s].
         """
         policy.reset(start)
-        self._policy = policy
+        self.policy = policy
+        self.answer: PolicyStep | None = None
         self._start = self._last = start
         self._ease_time = ease_time
         self._time = 0.0
         self._rest_time = 0.0
         self._bad_steps = 0
-        self.failure = ''
+        self._failure = ''
 
     @property
     def settled(self) -> bool:
         """Whether the robot has had time to stop, or the policy is of no use any more."""
         return self._rest_time >= WIND_DOWN or bool(self.failure)
 
+    @property
+    def failure(self) -> str:
+        """Why it was given up; empty while it works."""
+        return self._failure
+
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones when there is nothing to go by."""
         self._rest_time = self._rest_time + dt if situation.velocity.at_rest else 0.0
         inputs = situation.policy_inputs
+        self.answer = None
         if inputs is None:
             return self._last
-        step = self._policy.step(inputs, dt)
+        step = self.answer = self.policy.step(inputs, dt)
         if step.targets is None:
             self._bad_steps += 1
             if self._bad_steps >= MAX_BAD_STEPS:
-                self.failure = step.reason
+                self._failure = step.reason
             return self._last
         self._bad_steps = 0
         self._time += dt

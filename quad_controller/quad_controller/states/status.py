@@ -32,6 +32,7 @@ class Status:
         refused: Samples and commands that could not be used.
         limited: Targets of single joints that were too fast and were cut.
         unreachable: Steps in which a leg did not reach its target.
+        policy: Which policy is loaded, and how far it is where it takes over; empty for none.
     """
 
     state: State
@@ -47,6 +48,7 @@ class Status:
     refused: int
     limited: int
     unreachable: int
+    policy: str = ''
 
 
 class EventKind(Enum):
