@@ -14,10 +14,12 @@ EXECUTABLES = [
     'attach_contract = quad_controller.attach_contract:main',
     'check_policy = quad_controller.policy_check.main:main',
     'controller_node = quad_controller.nodes.controller_node:main',
+    'replay_policy = quad_controller.replay_policy:main',
 ]
 COMMANDS = [
     'quad-attach-contract = quad_controller.attach_contract:main',
     'quad-check-policy = quad_controller.policy_check.main:main',
+    'quad-replay-policy = quad_controller.replay_policy:main',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -49,6 +51,7 @@ setup(
         'onnxruntime>=1.19',
         'PyYAML>=6.0',
         sibling('quad_description'),
+        sibling('libraries/rosbag_files'),
     ],
     extras_require={
         'test': ['pytest'],

@@ -38,6 +38,7 @@ LAUNCH_ARGUMENTS = (
     LaunchArgument('arm', FALSE, 'true: the robot has its arm', flag=True),
     LaunchArgument('gait', '', 'trot, crawl or pace'),
     LaunchArgument('policy', '', 'ONNX policy to load'),
+    LaunchArgument('record', '', 'folder for recordings of each step (MCAP)'),
     LaunchArgument('servo', '', 'servo model of a simulated robot'),
     LaunchArgument('protocol', '', 'auto, v2, v1 or vendor'),
     LaunchArgument('calibration', '', 'parameters of the serial bridge'),

@@ -91,6 +91,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='ONNX policy to load and check, a file or trot_imitation; mode "policy" lets it walk',
     )
     parser.add_argument(
+        '--record',
+        metavar='FOLDER',
+        type=Path,
+        help='record each step of the controller there (MCAP), for replay_policy and Foxglove',
+    )
+    parser.add_argument(
         '--protocol',
         type=protocol_argument,
         choices=PROTOCOLS,
@@ -144,6 +150,7 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
             gait=arguments.gait,
             protocol=_protocol(arguments.protocol, simulate=port is None),
             policy=policy,
+            record=arguments.record and arguments.record.expanduser().resolve(),
             calibration=calibration and namespaced_parameters(calibration, ros, folder),
             ros=ros,
             ready_timeout=arguments.timeout,

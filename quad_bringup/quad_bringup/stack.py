@@ -39,6 +39,7 @@ class Stack:
         calibration: Parameter file that ``quad_hardware calibrate`` has written.
         ready_timeout: How long each process may take to be ready in [s].
         ros: Options of all nodes.
+        record: Folder in which the controller records its runs; None for none.
         view: With the page on which the robot is seen.
     """
 
@@ -53,6 +54,7 @@ class Stack:
     calibration: Path | None = None
     ready_timeout: float = 30.0
     ros: RosOptions = field(default_factory=RosOptions)
+    record: Path | None = None
     view: bool = False
 
 
@@ -126,6 +128,8 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
     values = {'gait': stack.gait}
     if stack.policy is not None:
         values['policy'] = str(stack.policy)
+    if stack.record is not None:
+        values['record'] = str(stack.record)
     executable = Executable('quad_controller', 'controller_node')
     return ProcessSpec(
         name='controller',

@@ -36,6 +36,7 @@ class StillPolicy:
     name = 'still'
     needs_linear_velocity = False
     memory = 0.0  # [s]
+    digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Return what it has to see: what every policy sees."""

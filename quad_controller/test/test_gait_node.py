@@ -25,6 +25,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
 from node_runner import LATCHED, ParameterError
+from quad_controller import replay_policy
 from quad_controller.exceptions import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
@@ -182,10 +183,16 @@ def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     assert float(figures['feedback_to_command_p50']) > 0.0
 
 
-def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> None:
-    """By its name it is loaded; in a dry run its answers are published beside the commands."""
+def test_a_shipped_policy_is_found_checked_watched_and_recorded(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """By its name it is loaded; in a dry run its answers are published beside the commands.
+
+    The recording has them, and replay_policy finds the same ones.
+    """
     with ExitStack() as stack:
         words = ['-p', 'policy:=trot_imitation', '-p', 'policy_dry_run:=true']
+        words += ['-p', f'record:={tmp_path}']
         process = stack.enter_context(RunningProcess([*NODE, *words], isolation.env))
         client = stack.enter_context(RosClient(isolation.domain_id))
         process.wait_for('waiting for joint_states')
@@ -196,6 +203,9 @@ def test_a_shipped_policy_is_found_checked_and_watched(isolation: Isolation) -> 
         client.spin_until(lambda: bool(shadows and reports), 20.0, 'shadow commands')
         assert 'sha256' in reports[0].data
         assert 'dry run' in robot.mode('policy').message
+        process.stop()
+    (recording,) = tmp_path.iterdir()
+    assert replay_policy.run([str(recording)]) == 0
 
 
 def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_path: Path) -> None:

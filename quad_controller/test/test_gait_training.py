@@ -51,6 +51,7 @@ class Lesson:
     name = 'teacher'
     needs_linear_velocity = False
     memory = 0.0  # [s]
+    digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Need nothing more."""

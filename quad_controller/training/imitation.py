@@ -21,6 +21,7 @@ import optax
 from policy_export import Floats
 from trained_contract import SCALE
 
+from quad_controller.policy.statistics import ObservationStatistics
 from quad_sim.env import ProcessVectorEnv
 
 BATCH = 1024
@@ -91,6 +92,11 @@ class Imitation:
             last = number == self._lessons.rounds
             error = self._learn(self._lessons.epochs * (3 if last else 1))
             yield Round(number, len(self._rows) * self._envs.num_envs, error, falls)
+
+    @property
+    def observed(self) -> ObservationStatistics:
+        """What was observed in all rounds."""
+        return ObservationStatistics.of(np.concatenate(self._rows)[:, : -self._count])
 
     def _walk(self, *, taught: bool) -> int:
         falls = 0

@@ -10,13 +10,16 @@ from pathlib import Path
 
 from contract_env import IMITATED, practice_env, PRACTISED, taught_env, values_for
 from imitation import Imitation, Lessons
-from networks import Actor, layers_of, Normaliser
+import jax
+from networks import Actor, answer, layers_of, Normaliser
+import numpy as np
 from policy_export import export
 from practice import Practice
 from progress import Progress
 import skrl
 from trained_contract import metadata_of, PERIOD
 
+from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_description import quadruped, robot_urdf
 from quad_sim.env import ProcessVectorEnv, Randomization
 
@@ -24,6 +27,7 @@ RANDOMIZATION = Randomization(
     friction=(0.35, 1.3), trunk_mass=(0.9, 1.3), kick=(-1.0, 1.0), kick_interval=3.0
 )
 """What differs in the end."""
+OBSERVED_STEPS = 500  # of each environment, for the ranges that replay_policy compares with
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +59,8 @@ def train(folder: Path, plan: Plan, progress: Progress) -> dict[str, Path]:
     skrl.config.jax.device = 'cpu'
     skrl.config.jax.key = plan.seed
     skrl.logger.setLevel('WARNING')
-    actor, normaliser = _imitate(plan, progress)
-    imitated = _write(actor, normaliser, folder / 'imitation.onnx', IMITATED)
+    actor, normaliser, observed = _imitate(plan, progress)
+    imitated = _write(actor, normaliser, observed, folder / 'imitation.onnx', IMITATED)
     envs = ProcessVectorEnv(partial(practice_env, RANDOMIZATION), plan.environments)
     try:
         practice = Practice(
@@ -75,13 +79,14 @@ def train(folder: Path, plan: Plan, progress: Progress) -> dict[str, Path]:
                 f'{each.steps / 1e6:.2f} M steps  randomized {each.share:.0%}'
             )
         practice.close()
+        observed = _observe(actor, normaliser, envs, plan.seed)
     finally:
         envs.close()
-    practised = _write(actor, normaliser, folder / 'practice.onnx', PRACTISED)
+    practised = _write(actor, normaliser, observed, folder / 'practice.onnx', PRACTISED)
     return {'imitation': imitated, 'practice': practised}
 
 
-def _imitate(plan: Plan, progress: Progress) -> tuple[Actor, Normaliser]:
+def _imitate(plan: Plan, progress: Progress) -> tuple[Actor, Normaliser, ObservationStatistics]:
     ranges = RANDOMIZATION.scaled(0.5)
     envs = ProcessVectorEnv(partial(taught_env, ranges), plan.environments)
     try:
@@ -96,12 +101,31 @@ def _imitate(plan: Plan, progress: Progress) -> tuple[Actor, Normaliser]:
             )
         if imitation.normaliser is None:
             raise ValueError('an imitation has one round at least')
-        return actor, imitation.normaliser
+        return actor, imitation.normaliser, imitation.observed
     finally:
         envs.close()
 
 
-def _write(actor: Actor, normaliser: Normaliser, path: Path, kind: str) -> Path:
+def _observe(
+    actor: Actor, normaliser: Normaliser, envs: ProcessVectorEnv, seed: int
+) -> ObservationStatistics:
+    """Return what a policy observes where it has practised, with all that differs there."""
+    act = jax.jit(partial(answer, actor))
+    seen, _ = envs.reset(seed=seed)
+    rows = []
+    for _ in range(OBSERVED_STEPS):
+        rows.append(seen)
+        seen = envs.step(np.asarray(act(actor.state_dict.params, normaliser(seen))))[0]
+    return ObservationStatistics.of(np.concatenate(rows))
+
+
+def _write(
+    actor: Actor,
+    normaliser: Normaliser,
+    observed: ObservationStatistics,
+    path: Path,
+    kind: str,
+) -> Path:
     metadata = metadata_of(values_for(quadruped(robot_urdf()), kind))
-    export(layers_of(actor, normaliser), path, metadata)
+    export(layers_of(actor, normaliser), path, {**metadata, STATISTICS_KEY: observed.to_json()})
     return path

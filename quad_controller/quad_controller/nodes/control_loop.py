@@ -32,6 +32,7 @@ class ControlLoop:
         period: float,
         publish: Callable[[Output], None],
         fail: Callable[[Exception], None],
+        record: Callable[[Output, float, float, float | None], None] | None = None,
     ) -> None:
         """Prepare; the thread starts with :meth:`start`.
 
@@ -40,10 +41,12 @@ class ControlLoop:
             period: Nominal time between two steps in [s].
             publish: Takes every output, in the thread.
             fail: Takes what ended the thread, in the thread.
+            record: Takes every output after it was published, in the thread, with the time
+                since the step before, that of the step, and from feedback to command in [s].
         """
         self.lock = threading.Lock()
         self._controller, self._period = controller, period
-        self._publish, self._fail = publish, fail
+        self._publish, self._fail, self._record = publish, fail, record
         self._statistics = LoopStatistics(period)
         self._pacer = Pacer(period, time.monotonic())
         self._arrived = threading.Condition()
@@ -136,6 +139,8 @@ class ControlLoop:
             latency = end - arrival if arrival is not None else None
             with self._arrived:
                 self._statistics.record(now - last, end - now, latency)
+            if self._record is not None:
+                self._record(output, now - last, end - now, latency)
             last = now
 
     def _wait(self) -> None:

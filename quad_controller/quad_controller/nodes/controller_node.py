@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timezone
+from pathlib import Path
 import sys
 import threading
 import time
@@ -47,13 +49,15 @@ from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
 from ..policy.shipped import find_policy
+from ..recording.recorder import Recorder
+from ..recording.step import StepTiming
 from ..states.controller import Controller, NO_POLICY
 from ..states.faults import Fault
 from ..states.modes import Answer
 from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
-from .diagnostics import loop_diagnostic, state_diagnostic
+from .diagnostics import loop_diagnostic, recorder_diagnostic, state_diagnostic
 from .joint_reader import CommandFilter, JointReader
 from .parameters import changed_gait, declare_parameters
 
@@ -103,8 +107,13 @@ class ControllerNode(Node):
             arm_pose=settings.arm_pose,
         )
         self._loop = ControlLoop(
-            self._controller, settings.states.period, self._publish, self._give_up
+            self._controller,
+            settings.states.period,
+            self._publish,
+            self._give_up,
+            self._record if settings.record else None,
         )
+        self._recorder = self._make_recorder() if settings.record else None
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
@@ -141,6 +150,9 @@ class ControllerNode(Node):
 
     def begin(self) -> None:
         """Start the control loop."""
+        if self._recorder is not None:
+            self._recorder.start()
+            self.get_logger().info(f'records to {self._recorder.folder}')
         priority = self._settings.thread_priority
         self._loop.start(lambda: raise_thread_priority(self, priority, 'the control loop'))
 
@@ -148,6 +160,27 @@ class ControllerNode(Node):
         """Stop sending; the servos hold their last targets."""
         self._loader.shutdown(cancel_futures=True)
         self._loop.stop()
+        if (recorder := self._recorder) is not None:
+            recorder.close()
+            words = f'recorded to {recorder.folder}; {recorder.lost} steps lost'
+            self.get_logger().info(f'{words}; {recorder.failure}' if recorder.failure else words)
+
+    def _make_recorder(self) -> Recorder:
+        """Begin a recording.
+
+        Raises:
+            ParameterError: It cannot be written there.
+        """
+        settings, now = self._settings, datetime.now(tz=timezone.utc)
+        folder = Path(settings.record).expanduser() / now.strftime('quad_%Y%m%d_%H%M%S_%f')
+        names = ','.join(settings.robot.names)
+        about = {'joint_names': names, 'policy': settings.policy}
+        return Recorder(folder, about)
+
+    def _record(self, output: Output, dt: float, computing: float, latency: float | None) -> None:
+        if self._recorder is not None:
+            stamp = self.get_clock().now().nanoseconds
+            self._recorder.offer(output, StepTiming(stamp, dt, computing, latency))
 
     def _load_first_policy(self) -> tuple[Policy | None, str]:
         """Return the policy, or None and why there is none; the gait does not need it."""
@@ -378,6 +411,8 @@ class ControllerNode(Node):
             state_diagnostic(name, status),
             loop_diagnostic(name, self._loop.figures()),
         ]
+        if self._recorder is not None:
+            array.status = [*array.status, recorder_diagnostic(name, self._recorder)]
         self._diagnostics.publish(array)
 
     def _give_up(self, error: Exception) -> None:

@@ -8,6 +8,7 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from ..recording.recorder import Recorder
 from ..states.status import Status
 from ..timing.statistics import LoopFigures
 
@@ -64,6 +65,17 @@ def loop_diagnostic(node: str, figures: LoopFigures) -> DiagnosticStatus:
                 'feedback_to_command_p99': f'{figures.latency_p99:.6f}',
             }
         ),
+    )
+
+
+def recorder_diagnostic(node: str, recorder: Recorder) -> DiagnosticStatus:
+    """Describe how the recording goes."""
+    trouble = recorder.failure or (f'{recorder.lost} steps lost' if recorder.lost else '')
+    return DiagnosticStatus(
+        level=DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
+        name=f'{node}: recorder',
+        message=trouble or f'records to {recorder.folder}',
+        values=_values({'folder': str(recorder.folder), 'lost': str(recorder.lost)}),
     )
 
 

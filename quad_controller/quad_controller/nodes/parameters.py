@@ -81,6 +81,7 @@ class NodeSettings:
         policy: Path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none.
         policy_options: How it is run.
         policy_dry_run: Whether the policy is only watched.
+        record: Folder in which each run is recorded; empty for none.
         diagnostics_period: In [s].
         thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
     """
@@ -93,6 +94,7 @@ class NodeSettings:
     policy: str
     policy_options: PolicyOptions
     policy_dry_run: bool
+    record: str
     diagnostics_period: float
     thread_priority: int
 
@@ -125,6 +127,7 @@ def declare_parameters(node: Node) -> NodeSettings:
             default=False,
             meaning='the policy runs, but its targets go to joint_command_shadow only',
         ),
+        record=read.text('record', '', 'folder for recordings of all steps (MCAP); empty: none'),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )

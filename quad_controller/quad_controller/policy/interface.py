@@ -7,10 +7,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from quad_description import ImuSample, JointSample, Targets
 from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
+
+Numbers = npt.NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,12 +44,16 @@ class PolicyStep:
         reason: Why it cannot be used.
         saturated: Share of the policy's joints whose targets were cut at their limits.
         computing: Time that the network took in [s], of this thread alone.
+        observation: What the network was given; None when it was not asked.
+        action: What it answered.
     """
 
     targets: Targets | None
     reason: str = ''
     saturated: float = 0.0
     computing: float = 0.0
+    observation: Numbers | None = None
+    action: Numbers | None = None
 
 
 class Policy(Protocol):
@@ -58,6 +67,11 @@ class Policy(Protocol):
     @property
     def needs_linear_velocity(self) -> bool:
         """Whether it sees the linear velocity of the body, which has to be estimated."""
+        ...
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of its file."""
         ...
 
     @property

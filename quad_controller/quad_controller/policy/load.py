@@ -25,6 +25,7 @@ from .network import Floats, Network, OnnxNetwork
 from .options import ImuFrame, PolicyOptions
 from .report import Report, Row
 from .runner import PolicyRunner
+from .statistics import STATISTICS_KEY
 
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
 
@@ -56,7 +57,7 @@ class LoadedPolicy:
         lines += [
             f'metadata {key}: {value}'
             for key, value in sorted(self.metadata.items())
-            if key != CONTRACT_KEY
+            if key not in {CONTRACT_KEY, STATISTICS_KEY}
         ]
         return '\n'.join(lines)
 

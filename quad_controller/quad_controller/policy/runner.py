@@ -107,6 +107,11 @@ class PolicyRunner:
         return self._contract.needs(Source.LINEAR_VELOCITY)
 
     @property
+    def digest(self) -> str:
+        """SHA-256 of its file."""
+        return self._network.digest
+
+    @property
     def memory(self) -> float:
         """How far back it sees what was observed in [s]."""
         return self._contract.period * max(
@@ -181,7 +186,13 @@ class PolicyRunner:
             return PolicyStep(None, 'the action is not finite')
         computing = self._clock() - begun
         targets = self.act(action, dt)
-        return PolicyStep(targets, saturated=self._saturated, computing=computing)
+        return PolicyStep(
+            targets,
+            saturated=self._saturated,
+            computing=computing,
+            observation=observation,
+            action=action,
+        )
 
     def advance(self, dt: float) -> None:
         """Let the clock of the phase go on by some [s]."""

@@ -32,8 +32,9 @@ from .modes import Answer, GAIT_STATES, ModeRequest, MODES, MOVING_STATES, parse
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
+from .policy_motion import PolicyMotion
 from .shadow import Shadow
-from .status import Event, EventKind, Output, Status
+from .status import Asked, Event, EventKind, Output, Status
 from .tracking import TrackingMonitor
 from .unseen import UnseenJoints
 from .watchdogs import Watchdogs
@@ -350,7 +351,26 @@ class Controller:
         shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
         targets = self._limiter.step(wanted, dt)
         self._track(targets, dt)
-        return Output(targets, shadow, self._machine.title, self._health.complete, tuple(events))
+        return Output(
+            targets,
+            shadow,
+            self._machine.title,
+            self._health.complete,
+            tuple(events),
+            situation,
+            self._asked(),
+        )
+
+    def _asked(self) -> Asked | None:
+        """Return the policy that was asked in this step."""
+        if self._shadow is not None:
+            return self._shadow.asked
+        motion = self._machine.motion
+        if isinstance(motion, Handover):
+            motion = motion.current
+        if self._held or not isinstance(motion, PolicyMotion) or motion.answer is None:
+            return None
+        return Asked(motion.policy, motion.answer, motion.steps)
 
     def _take(self, state: RobotState, dt: float, events: list[Event]) -> None:
         """Take in what arrived, and the time that passed."""

@@ -19,6 +19,7 @@ class PolicyMotion(Motion):
     Attributes:
         policy: The policy.
         answer: What it answered last; None when there was nothing to ask it by.
+        steps: How often it was stepped.
     """
 
     def __init__(self, policy: Policy, start: Targets, ease_time: float) -> None:
@@ -32,6 +33,7 @@ class PolicyMotion(Motion):
         policy.reset(start)
         self.policy = policy
         self.answer: PolicyStep | None = None
+        self.steps = 0
         self._start = self._last = start
         self._ease_time = ease_time
         self._time = 0.0
@@ -56,6 +58,7 @@ class PolicyMotion(Motion):
         self.answer = None
         if inputs is None:
             return self._last
+        self.steps += 1
         step = self.answer = self.policy.step(inputs, dt)
         if step.targets is None:
             self._bad_steps += 1

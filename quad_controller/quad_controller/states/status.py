@@ -11,7 +11,9 @@ from quad_description import Targets
 
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
+from ..policy.interface import Policy, PolicyStep
 from .modes import State
+from .motion import Situation
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +76,21 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """A policy that was asked in a step.
+
+    Attributes:
+        policy: Which one.
+        answer: What it answered.
+        step: How often it was stepped since its reset; 1 for the first time.
+    """
+
+    policy: Policy
+    answer: PolicyStep
+    step: int
+
+
+@dataclass(frozen=True, slots=True)
 class Output:
     """What one step gives.
 
@@ -83,6 +100,8 @@ class Output:
         title: Name of the state, with the way to it.
         ready: Whether all measurements were received once that walking needs.
         events: News.
+        situation: What the motion knew; None when nothing moved.
+        asked: The policy that was asked, followed or watched; None for none.
     """
 
     targets: Targets | None
@@ -90,3 +109,5 @@ class Output:
     title: str
     ready: bool
     events: tuple[Event, ...]
+    situation: Situation | None = None
+    asked: Asked | None = None

@@ -1,0 +1,199 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of steps, and policies that are fed by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message
+
+from quad_controller import replay_policy
+from quad_controller.exceptions import ParameterError, PolicyError
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import Velocity
+from quad_controller.policy import onnx_file
+from quad_controller.policy.load import load_policy
+from quad_controller.policy.options import PolicyOptions
+from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy.shipped import find_policy
+from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
+from quad_controller.recording.recorder import Recorder, TOPIC
+from quad_controller.recording.replay import feed, read_recording, statistics_of
+from quad_controller.recording.step import definition, FIELDS, pack, record_of, StepTiming, unpack
+from quad_controller.states.controller import Controller
+from quad_controller.states.parameters import StateParameters
+from quad_controller.states.status import Output
+from quad_description import JointSample, robot_urdf, RobotState
+from quad_gait_physics import MODEL
+from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT
+from quad_msgs.msg import ControllerStep
+from quad_sim import Terrain
+from quad_sim.physics import PhysicsBackend, Robot
+from rosbag_files import BagReader
+
+FORWARD = Velocity(0.15)
+TIMING = StepTiming(1_700_000_000_123_456_789, 0.0201, 0.0007, None)
+
+
+def shipped(path: Path | None = None) -> PolicyRunner:
+    """Return the policy that is shipped, or one in another file, anew."""
+    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    file = path or find_policy('trot_imitation')
+    return load_policy(file, MODEL, stand, PolicyOptions(), PERIOD).runner
+
+
+def walk(
+    folder: Path, policy: PolicyRunner, seconds: float, terrain: Terrain | None = None
+) -> Path:
+    """Record a walk in physics: standing up by the gait, then by a policy."""
+    robot = Robot(robot_urdf()) if terrain is None else Robot(robot_urdf(), terrain=terrain)
+    backend = PhysicsBackend(robot, PERIOD)
+    controller = Controller(MODEL, GaitParameters(), StateParameters(), policy=policy)
+    recorder = Recorder(folder, {'policy': 'trot_imitation'}, backlog=10_000)
+    state = backend.observe()
+    for step in range(round(seconds / PERIOD)):
+        controller.set_velocity(FORWARD)
+        output = controller.step(state, PERIOD)
+        stamp = round((1 + step * PERIOD) * 1e9)
+        recorder.offer(output, StepTiming(stamp, PERIOD, 0.001, 0.002))
+        state = backend.step(output.targets)
+        if step == 0:
+            assert controller.set_mode('policy').accepted
+    recorder.start()
+    recorder.close()
+    assert not recorder.lost
+    assert not recorder.failure
+    return folder
+
+
+def test_a_step_is_the_message_that_ros_reads() -> None:
+    """Bytes and definition made here are those of quad_msgs/msg/ControllerStep."""
+    controller = Controller(ROBOT, GaitParameters(), StateParameters())
+    joints = JointSample(STANDING, (0.5,) * 12)
+    output = controller.step(RobotState(joints, UPRIGHT), PERIOD)
+    data = pack(record_of(output, TIMING))
+    message = deserialize_message(data, ControllerStep)
+    fields = ControllerStep.get_fields_and_field_types()
+    spelt = {'float64': 'double', 'float32[]': 'sequence<float>'}
+    assert list(fields.values())[1:] == [
+        spelt.get(kind.value, kind.value) for kind, _ in FIELDS.values()
+    ]
+    assert list(fields)[1:] == list(FIELDS)
+    assert (message.stamp.sec, message.stamp.nanosec) == (1_700_000_000, 123_456_789)
+    assert message.state == 'relax'
+    assert message.dt == TIMING.dt
+    assert math.isnan(message.latency)
+    assert list(message.position) == pytest.approx(STANDING)
+    assert list(message.velocity) == pytest.approx([0.5] * 12)
+    assert list(message.orientation) == [0.0, 0.0, 0.0, 1.0]
+    assert list(message.linear_velocity) == []
+    again = unpack(data)
+    assert again.stamp == TIMING.stamp
+    assert again.inputs is not None
+    assert again.inputs.joints.positions == pytest.approx(STANDING)
+    assert again.inputs.imu == UPRIGHT or again.inputs.imu.tilt == 0.0
+    assert definition().startswith('builtin_interfaces/Time stamp\nstring state\n')
+
+
+@pytest.mark.parametrize('size', [0, 3, 40])
+def test_bytes_of_something_else_are_refused(size: int) -> None:
+    """A message that was cut, or another one."""
+    controller = Controller(ROBOT, GaitParameters(), StateParameters())
+    output = controller.step(RobotState(JointSample(STANDING, None), UPRIGHT), PERIOD)
+    with pytest.raises(ValueError, match=r'CDR|ControllerStep'):
+        unpack(pack(record_of(output, TIMING))[:size])
+
+
+def test_steps_that_find_no_place_are_counted(tmp_path: Path) -> None:
+    """The queue is bounded, and the control loop never waits."""
+    recorder = Recorder(tmp_path / 'full', {}, backlog=3)
+    output = Output(None, None, 'relax', False, ())
+    for _ in range(5):
+        recorder.offer(output, TIMING)
+    assert recorder.lost == 2
+    recorder.start()
+    recorder.close()
+    assert len(read_recording(tmp_path / 'full')) == 3
+
+
+def test_a_folder_that_cannot_be_made_is_refused_at_the_start(tmp_path: Path) -> None:
+    """The message has the folder."""
+    (tmp_path / 'file').write_text('', encoding='utf-8')
+    with pytest.raises(ParameterError, match=r'record: .*file'):
+        Recorder(tmp_path / 'file', {})
+
+
+@pytest.mark.slow
+def test_a_recorded_walk_is_answered_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Observations and actions are recomputed from what was measured; other answers are seen."""
+    folder = walk(tmp_path / 'walk', shipped(), 5.0)
+    reader = BagReader(folder)
+    assert [(each.topic.name, each.count) for each in reader.metadata.topics] == [(TOPIC, 250)]
+    assert replay_policy.run([str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert 'trot_imitation.onnx' in printed
+    assert 'the same' in printed
+    assert 'the file has no observation_statistics' in printed
+    steps = read_recording(folder)
+    asked = [step for step in steps if len(step.values['action'])]
+    assert len(asked) > 100
+    changed = dict(asked[-1].values) | {'action': asked[-1].values['action'] + np.float32(0.01)}
+    last = steps.index(asked[-1])
+    wrong = [*steps[:last], replace(asked[-1], values=changed)]
+    answers = list(feed(shipped(), wrong))
+    off = np.abs(answers[-1].action - answers[-1].step.values['action']).max()
+    assert off == pytest.approx(0.01, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_slope_leaves_what_was_seen_on_the_level(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By a reference recording, and by statistics in the model: gravity is what differs."""
+    level = walk(tmp_path / 'level', shipped(), 5.0)
+    slope = walk(tmp_path / 'slope', shipped(), 5.0, Terrain(angle=0.2))
+    model = str(find_policy('trot_imitation'))
+    assert replay_policy.run([str(level), model, '--reference', str(level)]) == 0
+    assert 'LEAVES' not in capsys.readouterr().out
+    assert replay_policy.run([str(slope), model, '--reference', str(level)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any('gravity' in line and 'LEAVES' in line for line in lines)
+    runner = shipped()
+    found = statistics_of(runner, read_recording(level))
+    own = tmp_path / 'own.onnx'
+    data = find_policy('trot_imitation').read_bytes()
+    own.write_bytes(onnx_file.with_metadata(data, STATISTICS_KEY, found.to_json()))
+    assert replay_policy.run([str(slope), str(own)]) == 1
+    printed = capsys.readouterr().out
+    assert 'reference: training' in printed
+    assert 'no answer of this file is in the recording' in printed
+    assert any('gravity' in line and 'LEAVES' in line for line in printed.splitlines())
+
+
+def test_statistics_of_another_width_are_refused() -> None:
+    """So are those that are no numbers; none are none."""
+    found = ObservationStatistics.of(np.arange(12.0).reshape(4, 3))
+    again = ObservationStatistics.from_metadata({STATISTICS_KEY: found.to_json()}, 3)
+    assert again is not None
+    assert again.mean.tolist() == [4.5, 5.5, 6.5]
+    assert again.most.tolist() == [9.0, 10.0, 11.0]
+    assert ObservationStatistics.from_metadata({}, 3) is None
+    for text, width in ((found.to_json(), 4), ('{"mean": 1}', 3), ('no', 3)):
+        with pytest.raises(PolicyError, match='observation_statistics'):
+            ObservationStatistics.from_metadata({STATISTICS_KEY: text}, width)
+
+
+def test_what_is_no_recording_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In one line."""
+    assert replay_policy.run([str(tmp_path / 'nothing')]) == 1
+    assert 'nothing' in capsys.readouterr().out
