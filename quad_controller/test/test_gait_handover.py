@@ -31,7 +31,7 @@ FORWARD = Velocity(0.15)
 
 
 class NamedPolicy(StillPolicy):
-    """A policy that answers as it is told to."""
+    """A policy that answers as a test says."""
 
     def __init__(self, name: str, answer: PolicyStep) -> None:
         """Answer always the same."""

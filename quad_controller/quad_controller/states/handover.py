@@ -78,7 +78,7 @@ class Handover(Motion):
             warm_up: Least time of watching before the blend in [s].
         """
         self.before, self.after = before, after
-        self.phase = Phase.WARM_UP
+        self.phase = Phase.BLEND if watchdogs is None else Phase.WARM_UP
         self.reason = ''
         self._watchdogs = watchdogs
         self.warm_up = max(warm_up, WARM_UP_TIME) if watchdogs is not None else 0.0

@@ -28,7 +28,7 @@ class Watched(Enum):
     LATE = 'late inference'
 
 
-PATIENCE: Mapping[Watched, float] = {
+TOLERATED: Mapping[Watched, float] = {
     Watched.TILT: 0.0,
     Watched.SATURATION: 0.3,
     Watched.JUMP: 0.05,
@@ -74,7 +74,7 @@ class Watchdogs:
         )
 
     def _over(self, what: Watched) -> bool:
-        return self._lasts[what] > PATIENCE[what]
+        return self._lasts[what] > TOLERATED[what]
 
     def _seen(
         self, situation: Situation, answer: PolicyStep | None, dt: float, *, moves: bool
