@@ -137,11 +137,14 @@ def test_both_ends_of_the_line_speak_the_same_protocol(tmp_path: Path, protocol:
 
 
 def test_gait_and_policy_reach_the_controller(tmp_path: Path) -> None:
-    """A policy only where there is one."""
+    """A policy, and a folder for recordings, only where there is one."""
     settings = controller_of(processes(tmp_path, Stack('p', gait='crawl')))
     assert (settings.first_gait.value, settings.policy) == ('crawl', '')
     settings = controller_of(processes(tmp_path, Stack('p', policy=Path('/a.onnx'))))
     assert (settings.first_gait.value, settings.policy) == ('trot', '/a.onnx')
+    assert settings.record == ''
+    settings = controller_of(processes(tmp_path, Stack('p', record=Path('/runs'))))
+    assert settings.record == '/runs'
 
 
 def test_soft_servos_reach_the_simulator(tmp_path: Path) -> None:
