@@ -227,14 +227,15 @@ def test_a_policy_that_does_not_fit_leaves_the_gait(isolation: Isolation, tmp_pa
 
 def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -> None:
     """Checked as at the start and refused in the same words; then it takes over, and leaves."""
+    names = joined(['fl_hip', *ROBOT.names[1:]])
+    # before the robot lives: it is silent as long as this process writes
+    renamed = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
     reports = robot.client.listen(String, 'controller_node/policy', LATCHED)
     robot.begin()
     robot.until_ready()
     assert robot.mode('walk').success
     robot.until_state('walk')
     assert 'neither a file nor shipped' in robot.load('no_such').message
-    names = joined(['fl_hip', *ROBOT.names[1:]])
-    renamed = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
     assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
     answer = robot.load('trot_imitation')
     assert answer.success, answer.message
