@@ -95,6 +95,33 @@ def test_two_rules_are_refused(tmp_path: Path) -> None:
         load_text(tmp_path, text, eds=EDS)
 
 
+POSITIONS = 'scale_pos_to_dev: -57295.78\nscale_pos_from_dev: -1.745329e-5'
+RATES = 'scale_vel_to_dev: 1000\nscale_vel_from_dev: 0.001'
+
+
+@pytest.mark.parametrize(
+    ('piece', 'warns'),
+    [
+        (POSITIONS, True),
+        (f'{POSITIONS}\n{RATES}', False),  # written, and so meant
+        (f'{POSITIONS}\nscale_vel_to_dev: 5\nscale_vel_from_dev: 0.2', False),
+        ('scale_pos_to_dev: 1000', False),
+        ('mandatory: false', False),
+        ('scale_from_factor_group: true', False),
+    ],
+)
+def test_velocities_left_at_the_default(tmp_path: Path, piece: str, *, warns: bool) -> None:
+    """As most files of ros2_canopen have them: positions in rad, velocities by 1000."""
+    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=EDS))
+    found = [each for each in report.warnings if 'velocities the default' in each.message]
+    assert len(found) == warns
+    for each in found:
+        assert each.key.endswith('scale_pos_to_dev')
+        assert 'moves at 0.01745 where 1.0 is asked' in each.message
+        assert 'write scale_vel_to_dev: -57295.8 (increments per second' in each.remedy
+        assert 'rpm of the joint: -9.549297' in each.remedy
+
+
 @pytest.mark.parametrize('key', ['scale_pos_to_dev', 'scale_vel_to_dev'])
 def test_a_scale_that_rounds_everything_is_a_warning(tmp_path: Path, key: str) -> None:
     """As in the robot_control sample of ros2_canopen, where the two directions are mixed up."""

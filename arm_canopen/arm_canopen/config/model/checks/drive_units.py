@@ -15,7 +15,7 @@ from ...findings import Findings
 from ..boot_plan import is_requested
 from ..bus import BusConfig, NodeConfig
 from ..drive import DriveConfig
-from ..factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from ..factor_group import FACTOR_OBJECTS, FactorGroup, ratio, REVOLUTION
 from .subject import Subject
 
 POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
@@ -25,6 +25,7 @@ POSITION_TOLERANCE = 0.01
 COARSE_SCALE = 1.0
 """Device units per user unit of velocity below which more than half a user unit becomes 0."""
 POSITION_MAX = 2**31 - 1  # [inc] of 0x6064, an INTEGER32
+SECONDS_PER_MINUTE = 60.0
 SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
 
 
@@ -111,6 +112,7 @@ def check_units(subject: Subject) -> None:
             )
             continue
         _check_coarse(subject, units)
+        _check_velocity_default(subject, axis, units)
         _check_against_factors(subject, units)
         _check_profile_velocity(subject, axis)
 
@@ -129,6 +131,24 @@ def _check_coarse(subject: Subject, units: AxisUnits) -> None:
                 f'correct {key}: it is device units per user unit (ros2_canopen has 1000), the '
                 'inverse of the one from the device',
             )
+
+
+def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
+    """Say when only positions have a scale; where none has, the two fit each other."""
+    position, velocity = axis.scale_pos_to_dev, axis.scale_vel_to_dev
+    default = DriveConfig().scale_vel_to_dev
+    if units.rule is not UnitRule.BUS_YML or velocity != default or position == default:
+        return
+    if is_coarse(position) or is_requested(subject.bus, subject.node, VELOCITY_KEY):
+        return  # what is coarse is wrong itself
+    in_rpm = math.copysign(SECONDS_PER_MINUTE / REVOLUTION, position)
+    subject.findings.warning(
+        subject.place(POSITION_KEY),
+        f'{units.name}: positions have a scale, velocities the default {default:g}: a drive that '
+        f'counts increments per second moves at {default / abs(position):.4g} where 1.0 is asked',
+        f'write {VELOCITY_KEY}: {position:g} (increments per second: the same as {POSITION_KEY}; '
+        f'rpm of the joint: {in_rpm:.7g}, of the motor: times its gear), and its inverse',
+    )
 
 
 def is_coarse(scale: float) -> bool:
