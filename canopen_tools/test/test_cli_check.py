@@ -101,6 +101,18 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert row.split()[:4] == ['joint1', '1000', '0.01', '1000']
 
 
+def test_radians_that_nobody_says_are_explained(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Below the table, and only there where one is unknown."""
+    for rows, asks in ((DRIVE_ROWS, True), ((*DRIVE_ROWS, *FACTOR_ROWS), False)):
+        main(['check', str(write_bus(tmp_path, eds=eds_text(rows)))])
+        lines = capsys.readouterr().out.splitlines()
+        row = next(line for line in lines if line.startswith('joint1'))
+        assert (row.split()[2] == '?') is asks
+        assert any(line.startswith('?: the EDS has no factor group') for line in lines) is asks
+
+
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [

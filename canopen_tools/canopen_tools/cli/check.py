@@ -71,6 +71,7 @@ def show_check(
 
 
 def _print_units(units: Iterable[AxisUnits]) -> None:
+    units = tuple(units)
     rows = [
         (
             axis.name,
@@ -83,6 +84,10 @@ def _print_units(units: Iterable[AxisUnits]) -> None:
     ]
     head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
     print_table(head, rows, right='increments,rad,velocity units')
+    if any(axis.radians is None for axis in units):
+        print_line(
+            '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad this is'
+        )
 
 
 def _print_load(load: LoadEstimate, *, each: bool) -> None:
