@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 from can_addresses import free_multicast
-from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, write_bus
+from config_samples import BUS, DRIVE_ROWS, eds_text, FACTOR_ROWS, write_bus
 import pytest
 from tool_environment import ENVIRONMENT, REPOSITORY
 
@@ -99,6 +99,21 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     main(['check', str(write_bus(tmp_path, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
     assert row.split()[:4] == ['joint1', '1000', '0.01', '1000']
+
+
+def test_the_speed_of_moves_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """In the units of bus.yml, as boot leaves the objects; only what the EDS has."""
+    keys = '''scale_vel_to_dev: -2000
+    scale_vel_from_dev: -0.0005
+    sdo: [{index: 0x6081, value: 30}]'''
+    text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {keys}\n')
+    main(['check', str(write_bus(tmp_path, text, eds=eds_text()))])
+    lines = capsys.readouterr().out.splitlines()
+    head = next(line for line in lines if '0x6081 speed of moves' in line)
+    row = lines[lines.index(head) + 1]
+    assert row.split() == ['joint1', '0.015', '0.5', '0.5']
+    assert '0x6083 acceleration' in head
+    assert '0x607F' not in head
 
 
 def test_radians_that_nobody_says_are_explained(

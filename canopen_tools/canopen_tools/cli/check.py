@@ -5,16 +5,25 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
 from arm_canopen.config import check_file
-from arm_canopen.config.model.checks.drive_units import AxisUnits
+from arm_canopen.config.model.checks.drive_units import AxisUnits, MOTION_OBJECTS
 from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
+from arm_canopen.standard.objects import Index
 
 from .arguments import bitrate, SubParsers
 from .output import counted, print_line, print_problem, print_table, RED, YELLOW
+
+MOTION_TITLES = {
+    Index.PROFILE_VELOCITY: 'speed of moves',
+    Index.MAX_PROFILE_VELOCITY: 'at most',
+    Index.PROFILE_ACCELERATION: 'acceleration',
+    Index.PROFILE_DECELERATION: 'deceleration',
+}
+"""Titles of columns; the values are in the units of bus.yml."""
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -63,6 +72,7 @@ def show_check(
         print_problem(problem, 'warning', YELLOW)
     if report.units:
         _print_units(report.units)
+        _print_motion(report.units)
     if report.load is not None and report.load.traffic:
         _print_load(report.load, each=frames)
     errors, warnings = len(report.errors), len(report.warnings)
@@ -70,8 +80,7 @@ def show_check(
     return 1 if errors or (strict and warnings) else 0
 
 
-def _print_units(units: Iterable[AxisUnits]) -> None:
-    units = tuple(units)
+def _print_units(units: Sequence[AxisUnits]) -> None:
     rows = [
         (
             axis.name,
@@ -88,6 +97,19 @@ def _print_units(units: Iterable[AxisUnits]) -> None:
         print_line(
             '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad this is'
         )
+
+
+def _print_motion(units: Sequence[AxisUnits]) -> None:
+    """Show how fast the moves of the drives' own are; a slow one looks like a drive that hangs."""
+    known = [index for index in MOTION_OBJECTS if any(index in axis.motion for axis in units)]
+    if not known:
+        return
+    rows = [
+        (axis.name, *(f'{axis.motion[i]:.4g}' if i in axis.motion else '-' for i in known))
+        for axis in units
+    ]
+    titles = [f'0x{index:04X} {MOTION_TITLES[index]}' for index in known]
+    print_table(('in user units, s', *titles), rows, right=','.join(titles))
 
 
 def _print_load(load: LoadEstimate, *, each: bool) -> None:

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
 import math
 
@@ -25,6 +26,13 @@ POSITION_TOLERANCE = 0.01
 COARSE_SCALE = 1.0
 """Device units per user unit of velocity below which more than half a user unit becomes 0."""
 POSITION_MAX = 2**31 - 1  # [inc] of 0x6064, an INTEGER32
+MOTION_OBJECTS = (
+    Index.PROFILE_VELOCITY,
+    Index.MAX_PROFILE_VELOCITY,
+    Index.PROFILE_ACCELERATION,
+    Index.PROFILE_DECELERATION,
+)
+"""What the moves of a drive's own are made with, in its units of velocity (per second)."""
 SECONDS_PER_MINUTE = 60.0
 SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
 
@@ -48,6 +56,8 @@ class AxisUnits:
         velocity: Device velocity units of 1.0 per second.
         radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
             does not have it.
+        motion: Speeds and accelerations that the drive has after boot, by object, in user units
+            per second and second squared.
     """
 
     name: str
@@ -55,6 +65,7 @@ class AxisUnits:
     increments: float
     velocity: float
     radians: float | None
+    motion: Mapping[Index, float] = field(default_factory=dict)
 
 
 def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
@@ -70,7 +81,16 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
         rule = UnitRule.UPSTREAM
     per_radian = factors.position_scale
     radians = increments / per_radian if per_radian else None
-    return AxisUnits(axis.name or subject.node.name, rule, increments, velocity, radians)
+    motion = _motion(subject, axis, velocity)
+    return AxisUnits(axis.name or subject.node.name, rule, increments, velocity, radians, motion)
+
+
+def _motion(subject: Subject, axis: DriveConfig, scale: float) -> dict[Index, float]:
+    """Return what an axis moves with, by its velocity scale; accelerations are in units of it."""
+    held = {index: subject.value(index + AXIS_OFFSET * axis.channel) for index in MOTION_OBJECTS}
+    return {
+        index: value / abs(scale) for index, value in held.items() if value is not None and scale
+    }
 
 
 def reported_increments(
