@@ -128,6 +128,7 @@ ODDITIES: list[tuple[str, int, str]] = [
     ('[2000]|DataType=5', 1, 'no AccessType, taken as rw'),
     (f'[2000]|ObjectType=0x42|{NUMBER}', 2, 'unknown ObjectType 66'),
     (f'[2000]|{NUMBER}|DefaultValue=abc', 4, "'abc' is not a whole number"),
+    (f'[2000]|{NUMBER}|DefaultValue=1Fh', 4, "'1Fh' is not a whole number: write 0x1F"),
     (f'[2000]|{NUMBER}|DefaultValue=300', 4, '300 does not fit UNSIGNED8'),
     (f'[2000]|{NUMBER}|LowLimit=9|HighLimit=1', 4, 'LowLimit 9 is above HighLimit 1'),
     ('[2000]|ObjectType=9', 1, 'RECORD without sub-indices'),

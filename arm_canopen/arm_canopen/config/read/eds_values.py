@@ -19,6 +19,7 @@ from ...standard.datatypes import (
 
 NODE_ID_TERM = '$NODEID'
 INTEGER = re.compile(r'[-+]?(?:0[xX][0-9a-fA-F]+|[0-9]+)')
+ASSEMBLER_HEX = re.compile(r'[0-9a-fA-F]+[hH]')  # 60400010h, as some vendors' files have it
 INTEGER_DIGITS_MAX = 40  # longer than any 64-bit number in any notation
 BOOLEAN_WORDS = {'true': True, 'false': False}
 
@@ -46,7 +47,8 @@ def parse_integer(text: str) -> int:
     """
     text = text.partition(';')[0].strip()
     if len(text) > INTEGER_DIGITS_MAX or not INTEGER.fullmatch(text):
-        raise ValueError(f'{text[:40]!r} is not a whole number')
+        hint = f': write 0x{text[:-1]}' if ASSEMBLER_HEX.fullmatch(text[:40]) else ''
+        raise ValueError(f'{text[:40]!r} is not a whole number{hint}')
     return int(text, 16 if 'x' in text.lower() else 10)
 
 
