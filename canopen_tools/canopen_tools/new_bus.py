@@ -207,9 +207,10 @@ def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
 
 
 def _mode(device: NewDevice) -> tuple[OperationMode, str]:
-    if device.mode is not None:
-        return device.mode, 'as asked'
     bits, source = device.number(Index.SUPPORTED_MODES), device.source(Index.SUPPORTED_MODES)
+    if device.mode is not None:
+        _check_offered(device, device.mode, bits, source)
+        return device.mode, 'as asked'
     offered = [mode for mode in POSITION_MODES if bits & mode.support_bit]
     best = f'the best of 0x6502 in {source} (0x{bits:08X})'
     for mode in offered:
@@ -223,6 +224,23 @@ def _mode(device: NewDevice) -> tuple[OperationMode, str]:
     raise NewBusError(
         f'{device.name}: {device.eds.path.name} {what}, the modes that the drive has; look'
         f' into its manual and choose with --mode {device.name}=8: {known}'
+    )
+
+
+def _check_offered(device: NewDevice, mode: OperationMode, bits: int, source: str) -> None:
+    """Refuse a mode that the drive lacks by its own word, where its target is missing, too.
+
+    One that has its target is left to the check, as EDS files err in 0x6502.
+    """
+    target = device.eds.dictionary.get(*TARGET_OBJECTS[mode])
+    is_carried = target is not None and RPDO.mappable(target)
+    if not bits or bits & mode.support_bit or is_carried:
+        return
+    has = ', '.join(str(int(each)) for each in OperationMode if bits & each.support_bit)
+    raise NewBusError(
+        f'{device.name}: 0x6502 in {source} (0x{bits:X}) has no mode {int(mode)}'
+        f' ({mode.title.lower()}), it has {has or "none of the standard"}; leave --mode'
+        f' {device.name}={int(mode)} out for the best of these'
     )
 
 

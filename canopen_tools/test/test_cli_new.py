@@ -177,6 +177,7 @@ def test_several_axes_are_not_made_one(
         (SAMPLE, ['--turn', 'leg=1'], "no drive 'leg'; drives: arm"),
         (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
         (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
+        (without(0x60C1), ['--mode', 'arm=7'], r'0x6502 .*0x81. has no mode 7 .*, it has 1, 8;'),
         (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),
     ],
 )
@@ -242,13 +243,17 @@ def test_nothing_is_overwritten(
     assert not (tmp_path / 'third').exists()
 
 
-def test_a_person_is_asked_for_units(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the EDS does not say them."""
+def test_a_person_is_asked_for_units(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the EDS does not say them; again after what is no number of increments."""
     monkeypatch.chdir(tmp_path)
     written(tmp_path, 'drive.eds', without(0x608F, 0x6092))
     monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
-    monkeypatch.setattr('builtins.input', lambda asked: ' 62831.853 ' if 'arm' in asked else '')
+    answers = ['a', '', '0', ' 62831.853 ']
+    monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
     assert main(['new', 'arm=drive.eds@2']) == 0
+    assert capsys.readouterr().out.count('a number of increments is needed') == 3
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
     assert node.axes[0].scale_pos_to_dev == pytest.approx(10_000.0)
 

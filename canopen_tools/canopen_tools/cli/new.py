@@ -197,11 +197,13 @@ def _asked(device: NewDevice) -> NewDevice:
         f'{device.name}: increments of the encoder for one turn of the joint, gear included'
         ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
     )
-    try:
-        answer = input(question).strip()
-    except EOFError as error:
-        raise UsageError(f'give --turn or --metre {device.name}=INCREMENTS') from error
-    return replace(device, units=_turn(device.name, answer))
+    while True:
+        try:
+            return replace(device, units=_turn(device.name, input(question).strip()))
+        except EOFError as error:
+            raise UsageError(f'give --turn or --metre {device.name}=INCREMENTS') from error
+        except UsageError:
+            print_line('a number of increments is needed, such as 360000 or -36000.5, and not 0')
 
 
 def _period(text: str) -> int:
