@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 import random
@@ -474,6 +475,26 @@ def test_rates(tmp_path: Path, old: str, new: str, rate: float, reason: str) -> 
     (item,) = [t for t in report.load.traffic if (t.device, t.service) == ('joint1', 'TPDO 2')]
     assert item.rate == pytest.approx(rate)
     assert reason in item.reason
+
+
+@pytest.mark.parametrize(
+    ('heartbeat', 'rows', 'warns'),
+    [('0', (), True), ('100', (), False), ('0', (Row(0x100C, 0, 'Guard', 6, 'rw', '0'),), False)],
+)
+def test_a_drive_that_is_kept_alive_says_its_state(
+    tmp_path: Path, heartbeat: str, rows: tuple[Row, ...], *, warns: bool
+) -> None:
+    """By a heartbeat of its own or node guarding; else it is booted by nobody when it is new."""
+    text = CLEAN.replace('# joint1', 'heartbeat_consumer: false\n    reset_communication: false')
+    drive = (
+        replace(row, default=heartbeat) if row.index == 0x1017 else row for row in DRIVE_ROWS
+    )
+    report = check_file(write_bus(tmp_path, text, eds=eds_text((*drive, *rows))))
+    found = [each for each in report.warnings if 'does not boot this way' in each.message]
+    assert len(found) == warns
+    for each in found:
+        assert each.key == 'nodes.joint1.reset_communication'
+        assert '~/nmt_reset_node once' in each.remedy
 
 
 def test_guarding_is_as_good_as_a_heartbeat(tmp_path: Path) -> None:

@@ -72,6 +72,8 @@ class BootProcess:
             bus,
             on_write=lambda place: self._enter(BootPhase.CONFIGURING, place),
         )
+        line = bus.place_of(node.name, 'reset_communication').line
+        self._written = f' ({bus.file}:{line})' if line else ''
         self._reported = ''
         self._fault = BootFault.CONFIGURATION
         self._restored = False
@@ -194,8 +196,8 @@ class BootProcess:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) is to be kept alive '
                 '(reset_communication: false), but does not send its NMT state: neither by a '
-                'heartbeat nor as an answer to node guarding; it is left alone. Reset it by '
-                'NMT, or give it a heartbeat'
+                'heartbeat nor as an answer to node guarding; it is left alone. Call '
+                f'~/nmt_reset_node once, or remove reset_communication: false{self._written}'
             ) from None
         return node.nmt_state is NmtState.OPERATIONAL
 
@@ -211,8 +213,8 @@ class BootProcess:
         if differences:
             raise BootError(
                 f'{node.name} (node {node.config.node_id}) runs with other PDOs: '
-                f'{"; ".join(differences)}; it is left alone. Reset it by NMT to have it '
-                'configured'
+                f'{"; ".join(differences)}; it is left alone. Call ~/nmt_reset_node to '
+                'have it configured'
             )
         await preset_outputs(node)
         reason = f' ({BootFault.RUNNING})' if node.nmt_state is NmtState.OPERATIONAL else ''

@@ -112,7 +112,7 @@ def test_a_device_with_other_pdos_is_left_alone() -> None:
     assert network.net.frames(0x205) == []
     (reported,) = network.net.reported(Severity.WARNING)
     assert '0x1A00:02 is 0x606C0020 instead of 0x60640020' in reported
-    assert 'Reset it by NMT' in reported
+    assert 'Call ~/nmt_reset_node to have it configured' in reported
     network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
     network.net.run(3.0)
     assert network.net.network.nodes[NODE].online
@@ -129,6 +129,10 @@ def test_a_device_that_does_not_report_its_state_is_left_alone() -> None:
     assert 'boot failed while' in reported
     assert 'boot error K: no heartbeat' in reported
     assert 'does not send its NMT state' in reported
+    assert 'Call ~/nmt_reset_node once, or remove reset_communication: false' in reported
+    network.net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
+    network.net.run(3.0)
+    assert network.net.network.nodes[NODE].online
 
 
 def test_a_device_that_is_kept_alive_but_does_not_run_is_configured() -> None:

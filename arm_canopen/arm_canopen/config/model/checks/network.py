@@ -67,6 +67,7 @@ def check_heartbeats(subject: Subject) -> None:
             'take a larger heartbeat_multiplier, 3 is usual',
         )
     _check_watches_master(subject)
+    _check_first_boot(subject)
     _check_consumer_limit(subject)
     _check_consumers(subject)
 
@@ -89,6 +90,23 @@ def _check_watches_master(subject: Subject) -> None:
             'it stops by itself, and there is nothing to take over',
             'write heartbeat_consumer: false, or remove reset_communication: false',
         )
+
+
+def _check_first_boot(subject: Subject) -> None:
+    """Say when a device that was switched on before the master would wait for a reset."""
+    node = subject.node
+    producer = node.dictionary.get(Index.PRODUCER_HEARTBEAT)
+    says_state = node.uses_node_guarding or node.dictionary.get(Index.GUARD_TIME) is not None
+    if node.reset_communication or not node.boot or says_state or (producer and producer.default):
+        return
+    subject.findings.warning(
+        subject.place('reset_communication'),
+        'a device that is switched on before the master does not boot this way: its EDS has 0 in '
+        '0x1017 and no node guarding, so nobody knows whether it is in operation, and it is left '
+        'alone',
+        'call ~/nmt_reset_node once after it was switched on, or remove reset_communication: '
+        'false',
+    )
 
 
 def _check_consumer_limit(subject: Subject) -> None:
