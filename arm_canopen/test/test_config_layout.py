@@ -222,6 +222,15 @@ def test_where_the_eds_is_looked_for(
     assert node.eds.resolve() == (tmp_path / folder / 'drive.eds').resolve()
 
 
+def test_an_eds_from_elsewhere_is_named(tmp_path: Path) -> None:
+    """Once for all devices, with the file that was looked for and the one that was taken."""
+    text = f'options: {{dcf_path: nowhere}}\n{BUS}  joint2:\n    node_id: 3\n'
+    (warning,) = load_text(tmp_path, text).warnings
+    assert f'({tmp_path}/nowhere/drive.eds); taken is {tmp_path}/drive.eds' in warning.message
+    assert warning.key.endswith('dcf')
+    assert 'dcf_path' in warning.remedy
+
+
 def test_another_folder_for_the_variable(tmp_path: Path) -> None:
     """@BUS_CONFIG_PATH@ may be made to stand for another folder."""
     other = tmp_path / 'other'

@@ -44,6 +44,12 @@ class EdsFiles:
         candidates = self._candidates(dcf, dcf_path)
         for path in candidates:
             if _exists(path):
+                if path != candidates[0] and path not in self._read:
+                    findings.warning(
+                        item.place,
+                        f'dcf_path has no {dcf!r} ({candidates[0]}); taken is {path}',
+                        'correct dcf_path, or remove it',
+                    )
                 return self._load(path, findings)
         tried = ' and '.join(str(path) for path in dict.fromkeys(candidates))
         findings.error(
