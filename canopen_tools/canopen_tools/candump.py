@@ -106,6 +106,7 @@ class Screen:
         for frame in frames:
             if self._left <= 0:
                 break
+            self._format.begin(frame.timestamp)
             description = self._describer.describe(frame)
             if self._filter.shows(frame, description):
                 self._left -= 1
@@ -255,7 +256,8 @@ def _parser() -> argparse.ArgumentParser:
         '--time',
         choices=[style.value for style in TimeStyle],
         default=TimeStyle.ZERO.value,
-        help='(a)bsolute, (A)bsolute with date, (d)elta, (z)ero (default), (n)one',
+        help='(a)bsolute, (A)bsolute with date, (d)elta, (z)ero: since the first frame, shown or not '
+        '(default), (n)one',
     )
     add('-q', '--quiet', action='store_true', help='print no frames; with --log')
     add('--no-color', action='store_true', help='no colours on a terminal either')

@@ -171,6 +171,18 @@ def test_a_log_is_shown_like_a_bus(
     ]
 
 
+def test_filters_of_a_log_count_from_its_begin(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Two of them can be compared; the time since the line before is that of what is shown."""
+    path = tmp_path / 'bus.log'
+    with closing(LogWriter(path, 'can0', 1.7e9)) as log:
+        log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
+    for style, first in (('z', '(0002.000000)'), ('d', '(0000.000000)')):
+        _, out, _ = run_main(capsys, '--read', str(path), '-t', style, '--filter', '182', '-n', '1')
+        assert out.startswith(first), style
+
+
 def test_it_ends_after_its_time(capsys: pytest.CaptureFixture[str]) -> None:
     """--timeout ends it on a silent bus, with success."""
     code, out, err = run_main(capsys, free_virtual(), '--timeout', '0.01')

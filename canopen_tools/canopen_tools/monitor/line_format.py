@@ -34,7 +34,7 @@ class TimeStyle(Enum):
     ABSOLUTE = 'a'  # [s] since 1970
     DATE = 'A'  # local date and time
     DELTA = 'd'  # [s] since the line before
-    ZERO = 'z'  # [s] since the first line
+    ZERO = 'z'  # [s] since the first frame, shown or not
     NONE = 'n'
 
 
@@ -57,6 +57,11 @@ class LineFormat:
         self._color = color
         self._node_width = node_width
         self._reference: float | None = None
+
+    def begin(self, stamp: float) -> None:
+        """Let the time since the first frame begin, so that it is the same by any filter."""
+        if self._reference is None and self._style is TimeStyle.ZERO:
+            self._reference = stamp
 
     def line(self, frame: Frame, description: Description) -> str:
         """Return the line of a frame, without its end."""
