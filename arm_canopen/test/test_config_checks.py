@@ -486,9 +486,7 @@ def test_a_drive_that_is_kept_alive_says_its_state(
 ) -> None:
     """By a heartbeat of its own or node guarding; else it is booted by nobody when it is new."""
     text = CLEAN.replace('# joint1', 'heartbeat_consumer: false\n    reset_communication: false')
-    drive = (
-        replace(row, default=heartbeat) if row.index == 0x1017 else row for row in DRIVE_ROWS
-    )
+    drive = (replace(row, default=heartbeat) if row.index == 0x1017 else row for row in DRIVE_ROWS)
     report = check_file(write_bus(tmp_path, text, eds=eds_text((*drive, *rows))))
     found = [each for each in report.warnings if 'does not boot this way' in each.message]
     assert len(found) == warns

@@ -21,7 +21,7 @@ from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import check_file
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.config.model.checks.drive_units import AxisUnits, UnitRule
+from arm_canopen.config.model.checks.drive_units import AxisUnits, UnitRule, velocity_unit
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import ConfigError, DriveError
 from arm_canopen.standard.drive import OperationMode
@@ -120,6 +120,23 @@ def test_velocities_left_at_the_default(tmp_path: Path, piece: str, *, warns: bo
         assert 'moves at 0.01745 where 1.0 is asked' in each.message
         assert 'write scale_vel_to_dev: -57295.8 (increments per second' in each.remedy
         assert 'rpm of the joint: -9.549297' in each.remedy
+
+
+@pytest.mark.parametrize(
+    ('piece', 'unit'),
+    [
+        ('mandatory: false', 1.0),
+        (POSITIONS, 1.0),
+        (f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5', 1.0),
+        (f'{POSITIONS}\nscale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472', 6000.0),
+        ('scale_from_factor_group: true', 1.0),
+    ],
+)
+def test_the_unit_of_velocities(tmp_path: Path, piece: str, unit: float) -> None:
+    """By the ratio of the scales, where velocities have one of their own."""
+    bus = load_text(tmp_path, added(JOINT, piece), eds=EDS)
+    (node,) = bus.nodes
+    assert velocity_unit(bus, node, node.drive) == pytest.approx(unit, rel=1e-3)
 
 
 @pytest.mark.parametrize('key', ['scale_pos_to_dev', 'scale_vel_to_dev'])

@@ -16,6 +16,7 @@ from arm_canopen.standard.objects import AXES_MAX, AXIS_OFFSET, Index
 from arm_canopen.standard.sdo import Abort
 
 from .drive.drive import Drive
+from .drive.rate import INCREMENTS_PER_SECOND
 from .drive.servo import ServoModel
 from .drive.shared_errors import SharedErrors
 from .faults.injector import FaultInjector
@@ -68,6 +69,7 @@ class Device:
         servo: ServoModel | None = None,
         handlers_changed: Callable[[], None] | None = None,
         memory: ParameterMemory | None = None,
+        velocity_units: Mapping[int, float] = INCREMENTS_PER_SECOND,
     ) -> None:
         """Build a device that is switched off.
 
@@ -80,6 +82,8 @@ class Device:
             servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
             memory: What it keeps without power; by default what lasts as long as the object.
+            velocity_units: What 1 of the velocities of an axis is in [inc/s], by its number; 1
+                where it is left out.
 
         Raises:
             ValueError: The node id is out of range.
@@ -98,16 +102,25 @@ class Device:
         self._nmt = NmtSlave(self.node_id, self, boot_time)
         self._errors = EmcyProducer(self.store, self._send)
         self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
-        self.drives = self._build_drives(servo or ServoModel())
+        self.drives = self._build_drives(servo or ServoModel(), velocity_units)
         self._build_services()
         self.faults = FaultInjector(self, self._line)
         self._powered_parts = self._timed_parts()
         self._parts = self._powered_parts
 
-    def _build_drives(self, servo: ServoModel) -> tuple[Drive, ...]:
+    def _build_drives(
+        self, servo: ServoModel, velocity_units: Mapping[int, float]
+    ) -> tuple[Drive, ...]:
         shared = SharedErrors(self._errors)
         return tuple(
-            Drive(self.store, shared, self._sync, servo, number=axis)
+            Drive(
+                self.store,
+                shared,
+                self._sync,
+                servo,
+                number=axis,
+                velocity_unit=velocity_units.get(axis, 1.0),
+            )
             for axis in range(AXES_MAX)
             if is_drive(self.store.dictionary)
             and (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from arm_canopen import BusConfig, CanopenError, load_bus, open_bus
-from arm_canopen.config.model.checks.drive_units import reported_increments
+from arm_canopen.config.model.checks.drive_units import reported_increments, velocity_unit
 
 from .host import DeviceHost
 from .node_id_check import NodeIdCheck
@@ -41,11 +41,15 @@ def add_devices(
         known = ', '.join(bus.joints) or 'none'
         raise CanopenError(f'positions: no drive {unknown[0]!r} in {bus.file}; drives: {known}')
     for node in bus.nodes:
+        axes = node.axes if node.is_drive else ()
         device = host.add(
-            node.node_id, node.dictionary, memory=None if memory is None else memory(node.node_id)
+            node.node_id,
+            node.dictionary,
+            memory=None if memory is None else memory(node.node_id),
+            velocity_units={axis.channel: velocity_unit(bus, node, axis) for axis in axes},
         )
         drives = {drive.number: drive for drive in device.drives}
-        for axis in node.axes if node.is_drive else ():
+        for axis in axes:
             if axis.name not in positions:
                 continue
             if axis.channel not in drives:

@@ -72,6 +72,40 @@ def test_without_a_mode_the_axis_is_held() -> None:
     assert (rig.get(0x6064), rig.get(0x606C)) == (0, 0)
 
 
+@pytest.mark.parametrize(
+    ('mode', 'target', 'actual', 'word'),
+    [(3, 0x60FF, 0x606C, ENABLE), (9, 0x60FF, 0x606C, ENABLE), (2, 0x6042, 0x6044, ENABLE | 0x70)],
+)
+def test_velocities_in_another_unit(mode: int, target: int, actual: int, word: int) -> None:
+    """A drive that counts rpm turns that much faster, and reports what it was given."""
+    rig = Rig(velocity_unit=50.0)  # 3000 increments per turn: 50 inc/s are 1 rpm
+    limits = ((0x607F, 60), (0x6080, 0), (0x6083, 40), (0x6084, 40))
+    for index, value in limits:
+        rig.put(index, value)
+    rig.enable(mode)
+    rig.command(word)
+    for _ in range(300):
+        rig.cycles(1)
+        rig.put(target, 20)
+    assert rig.velocity == pytest.approx(1000.0)
+    assert rig.get(actual) == 20
+
+
+def test_a_move_in_another_unit_takes_its_time() -> None:
+    """By 0x6081 and its ramps: 3000 increments at 10 rpm of 50 inc/s are more than 6 s."""
+    rig = Rig(velocity_unit=50.0)
+    for index, value in ((0x607F, 60), (0x6081, 10), (0x6083, 1000), (0x6084, 1000)):
+        rig.put(index, value)
+    rig.enable(1)
+    rig.put(0x607A, 3000)
+    rig.command(0x1F)
+    rig.run(3.0)
+    assert rig.velocity == pytest.approx(500.0)
+    assert 1400.0 < rig.position < 1500.0
+    rig.run(4.0)
+    assert rig.get(0x6064) == 3000
+
+
 @pytest.mark.parametrize('before', SIMULATED)
 @pytest.mark.parametrize('after', [0, *SIMULATED])
 def test_nothing_moves_at_a_change_of_mode(before: int, after: int) -> None:

@@ -256,8 +256,8 @@ def _parser() -> argparse.ArgumentParser:
         '--time',
         choices=[style.value for style in TimeStyle],
         default=TimeStyle.ZERO.value,
-        help='(a)bsolute, (A)bsolute with date, (d)elta, (z)ero: since the first frame, shown or not '
-        '(default), (n)one',
+        help='(a)bsolute, (A)bsolute with date, (d)elta, (z)ero (default): since the first frame, '
+        'shown or not, (n)one',
     )
     add('-q', '--quiet', action='store_true', help='print no frames; with --log')
     add('--no-color', action='store_true', help='no colours on a terminal either')

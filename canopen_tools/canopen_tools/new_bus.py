@@ -74,6 +74,8 @@ class NewDevice:
         eds: Its EDS.
         mode: Mode of operation; None takes the best one that the EDS names.
         units: Units of the joint; None where the factor group says them.
+        rpm: Turns of what the drive counts in rpm for one turn or 1 m of the joint; None where it
+            has another unit of velocity.
         values: What the device itself holds, by index and sub-index; it counts before the
             defaults of its EDS.
         found: Who it is and why it has this EDS, where it was found on a bus; else empty.
@@ -84,6 +86,7 @@ class NewDevice:
     eds: Eds
     mode: OperationMode | None = None
     units: Units | None = None
+    rpm: float | None = None
     values: Mapping[tuple[int, int], int] = field(default_factory=dict)
     found: str = ''
 
@@ -308,11 +311,21 @@ def _said_units(device: NewDevice) -> Units | None:
     defaults that the maker changes by parameters.
     """
     units = device.units or _named_units(device)
+    if units is not None and device.rpm is not None:
+        return _in_rpm(units, device.rpm)
     velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0)))
     if units is None or velocity is None or velocity.slides is not units.slides:
         return units
     said = f'0x60A9 of the drive: its unit is {velocity.text}'
     return replace(units, velocity=1.0 / velocity.size, velocity_said=said)
+
+
+def _in_rpm(units: Units, turns: float) -> Units:
+    """Return units with velocities in rpm; a joint has `turns` of the motor a turn or m."""
+    per, one = (1.0, '1 m') if units.slides else (TURN, 'one turn')
+    formula = f'60 * {turns:g}' + ('' if units.slides else ' / (2 pi)')
+    said = f'rpm, {turns:g} turns for {one} of the joint, as said: {formula}'
+    return replace(units, velocity=60.0 * turns / per, velocity_said=said)
 
 
 def _named_units(device: NewDevice) -> Units | None:
@@ -324,7 +337,8 @@ def _named_units(device: NewDevice) -> Units | None:
         return Units(1.0 / position.size, said, position.slides)
     names_velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0))) is not None
     factors = _factors(device)
-    if not (names_velocity or _has_unlisted(device)) or not _says_units(factors):
+    is_written = names_velocity or device.rpm is not None or _has_unlisted(device)
+    if not is_written or not _says_units(factors):
         return None
     source = device.source(*FACTOR_OBJECTS.values())
     return Units(factors.position_scale, f'0x608F, 0x6091, 0x6092 of {source}; per rad')
@@ -345,7 +359,9 @@ def _velocity(device: NewDevice, units: Units, factors: FactorGroup) -> tuple[fl
     if factors.velocity_factor:
         source = device.source(Index.VELOCITY_FACTOR)
         return units.scale * factors.velocity_factor, f'by 0x6096 of {source}'
-    return units.scale, 'increments per second, where the manual says nothing else'
+    turns = '60 * turns per m' if units.slides else '60 * turns of the motor per turn / (2 pi)'
+    said = 'increments per second, where the manual says nothing else'
+    return units.scale, f'{said}; rpm: {turns}, by --rpm {device.name}=TURNS'
 
 
 def _contradiction(device: NewDevice, units: Units, factors: FactorGroup) -> str:

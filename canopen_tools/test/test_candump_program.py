@@ -179,7 +179,9 @@ def test_filters_of_a_log_count_from_its_begin(
     with closing(LogWriter(path, 'can0', 1.7e9)) as log:
         log.write(frame._replace(timestamp=float(n)) for n, frame in enumerate(FRAMES))
     for style, first in (('z', '(0002.000000)'), ('d', '(0000.000000)')):
-        _, out, _ = run_main(capsys, '--read', str(path), '-t', style, '--filter', '182', '-n', '1')
+        _, out, _ = run_main(
+            capsys, '--read', str(path), '-t', style, '--filter', '182', '-n', '1'
+        )
         assert out.startswith(first), style
 
 

@@ -103,9 +103,9 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_the_speed_of_moves_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In the units of bus.yml, as boot leaves the objects; only what the EDS has."""
-    keys = '''scale_vel_to_dev: -2000
+    keys = """scale_vel_to_dev: -2000
     scale_vel_from_dev: -0.0005
-    sdo: [{index: 0x6081, value: 30}]'''
+    sdo: [{index: 0x6081, value: 30}]"""
     text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {keys}\n')
     main(['check', str(write_bus(tmp_path, text, eds=eds_text()))])
     lines = capsys.readouterr().out.splitlines()

@@ -130,6 +130,43 @@ def test_velocity_is_in_the_units_of_the_drive(tmp_path: Path) -> None:
     assert (axis.scale_eff_to_dev, axis.position_mode) == (-1.0, OperationMode.PROFILE_POSITION)
 
 
+@pytest.mark.parametrize(
+    ('units', 'velocity'),
+    [
+        (['--turn', 'arm=-409600'], -60 * 100 / TURN),
+        (['--metre', 'arm=50000'], 60 * 100),
+        ([], 60 * 100 / TURN),  # the factor group says what an increment is
+    ],
+)
+def test_a_drive_that_counts_in_rpm_follows(
+    tmp_path: Path, units: Sequence[str], velocity: float
+) -> None:
+    """By its formula, and so does the simulated drive: 0x607F of 3000 is no 3000 increments."""
+    limit = replace(CYCLIC_AND_PROFILE, index=0x607F, access='rw', default='3000')
+    window = replace(limit, index=0x6065, default='20000')
+    eds = written(tmp_path, 'drive.eds', [*SAMPLE, limit, window])
+    bus_yml = tmp_path / 'robot' / 'bus.yml'
+    rpm = [*units, '--rpm', 'arm=100']
+    assert main(['new', f'arm={eds}@2', *rpm, '--output', str(bus_yml)]) == 0
+    assert '# rpm, 100 turns for ' in bus_yml.read_text()
+    (node,) = load_bus(bus_yml).nodes
+    assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
+    assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
+    bus = free_virtual()
+    with (
+        simulated_devices(bus_yml, bus=bus),
+        CanopenMaster.from_bus_yml(bus_yml, bus=bus) as master,
+    ):
+        master.boot()
+        drive = master.drive('arm')
+        drive.enable()
+        drive.select_mode(OperationMode.CYCLIC_POSITION)
+        deadline = time.monotonic() + DEADLINE
+        while abs(drive.position - 0.5) > 0.01 and time.monotonic() < deadline:
+            drive.set_target(0.5)
+        assert drive.position == pytest.approx(0.5, abs=0.01)
+
+
 def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:
     """Interpolated position has another one, with a sub-index."""
     seventh = replace(CYCLIC_AND_PROFILE, default='0x41')
@@ -176,6 +213,8 @@ def test_several_axes_are_not_made_one(
         (without(*range(0x1800, 0x1806)), [], '0x6041: the EDS has 0 TPDOs that can be mapped'),
         (SAMPLE, ['--turn', 'leg=1'], "no drive 'leg'; drives: arm"),
         (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
+        (SAMPLE, ['--rpm', 'arm=-3'], '--rpm arm=-3: give turns of the motor'),
+        (without(0x6091), ['--rpm', 'arm=100'], 'how far an increment of the joint is'),
         (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
         (without(0x60C1), ['--mode', 'arm=7'], r'0x6502 .*0x81. has no mode 7 .*, it has 1, 8;'),
         (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),

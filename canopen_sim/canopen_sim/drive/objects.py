@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.objects import AXIS_OFFSET, Index
@@ -12,6 +13,10 @@ from arm_canopen.standard.target_objects import TARGET_OBJECTS
 
 from ..objects.object_store import Integer, ObjectStore
 from .profile import Limits
+from .rate import Rate
+
+Bind: TypeAlias = Callable[..., Integer]
+BindRate: TypeAlias = Callable[..., Integer | Rate]
 
 NOMINAL_TORQUE = 1000  # [0.1 % of the rated torque]
 NO_TORQUE_LIMIT = 0xFFFF
@@ -22,28 +27,34 @@ PERIOD_MIN = 0.001  # [s] shortest interpolation period that is believed
 
 
 class DriveObjects:
-    """All objects of a drive, bound once; units are raw increments.
+    """All objects of a drive, bound once; units are increments, and [inc/s] of velocities.
 
     Those that a dictionary lacks get a harmless value and stay invisible.
     """
 
-    def __init__(self, store: ObjectStore, axis: int = 0) -> None:
+    def __init__(self, store: ObjectStore, axis: int = 0, velocity_unit: float = 1.0) -> None:
         """Bind them.
 
         Args:
             store: Objects of the device.
             axis: Number of the axis from 0; those of axis n stand 0x800 n further on.
+            velocity_unit: What 1 of its velocities is in [inc/s], and of its accelerations in
+                [inc/s^2].
         """
 
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
             return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
 
+        def rate(index: int, subindex: int = 0, *, default: int = 0) -> Integer | Rate:
+            variable = bind(index, subindex, default=default)
+            return variable if velocity_unit == 1.0 else Rate(variable, velocity_unit)
+
         self._bind_states(bind)
-        self._bind_actual_values(bind)
-        self._bind_windows(bind)
-        self._bind_targets(bind)
-        self._bind_profile(bind)
-        self._bind_velocity_mode(bind)
+        self._bind_actual_values(bind, rate)
+        self._bind_windows(bind, rate)
+        self._bind_targets(bind, rate)
+        self._bind_profile(bind, rate)
+        self._bind_velocity_mode(bind, rate)
         self._bind_torque(bind)
         self._dictionary = store.dictionary
         self._offset = axis * AXIS_OFFSET
@@ -60,7 +71,7 @@ class DriveObjects:
             modes.append(OperationMode.HOMING)
         return sum(mode.support_bit for mode in modes)
 
-    def _bind_states(self, bind: Callable[..., Integer]) -> None:
+    def _bind_states(self, bind: Bind) -> None:
         self.abort_connection = bind(Index.ABORT_CONNECTION_OPTION, default=1)
         self.error_code = bind(Index.ERROR_CODE)
         self.controlword = bind(Index.CONTROLWORD)
@@ -74,65 +85,65 @@ class DriveObjects:
         self.mode_display = bind(Index.MODE_OF_OPERATION_DISPLAY)
         self.supported_modes = bind(Index.SUPPORTED_MODES, default=0xFFFF_FFFF)
 
-    def _bind_actual_values(self, bind: Callable[..., Integer]) -> None:
+    def _bind_actual_values(self, bind: Bind, rate: BindRate) -> None:
         self.position_demand = bind(Index.POSITION_DEMAND)
         self.position_internal = bind(Index.POSITION_ACTUAL_INTERNAL)
         self.position_actual = bind(Index.POSITION_ACTUAL)
-        self.velocity_demand = bind(Index.VELOCITY_DEMAND)
-        self.velocity_actual = bind(Index.VELOCITY_ACTUAL)
+        self.velocity_demand = rate(Index.VELOCITY_DEMAND)
+        self.velocity_actual = rate(Index.VELOCITY_ACTUAL)
         self.following_error = bind(Index.FOLLOWING_ERROR)
 
-    def _bind_windows(self, bind: Callable[..., Integer]) -> None:
+    def _bind_windows(self, bind: Bind, rate: BindRate) -> None:
         self.following_window = bind(Index.FOLLOWING_ERROR_WINDOW, default=NO_WINDOW)
         self.following_timeout = bind(Index.FOLLOWING_ERROR_TIMEOUT)  # [ms]
         self.position_window = bind(Index.POSITION_WINDOW, default=NO_WINDOW)
         self.position_window_time = bind(Index.POSITION_WINDOW_TIME)  # [ms]
-        self.velocity_window = bind(Index.VELOCITY_WINDOW, default=100)
+        self.velocity_window = rate(Index.VELOCITY_WINDOW, default=100)
         self.velocity_window_time = bind(Index.VELOCITY_WINDOW_TIME)  # [ms]
-        self.velocity_threshold = bind(Index.VELOCITY_THRESHOLD, default=10)
+        self.velocity_threshold = rate(Index.VELOCITY_THRESHOLD, default=10)
         self.velocity_threshold_time = bind(Index.VELOCITY_THRESHOLD_TIME)  # [ms]
 
-    def _bind_targets(self, bind: Callable[..., Integer]) -> None:
+    def _bind_targets(self, bind: Bind, rate: BindRate) -> None:
         self.target_position = bind(Index.TARGET_POSITION)
-        self.target_velocity = bind(Index.TARGET_VELOCITY)
+        self.target_velocity = rate(Index.TARGET_VELOCITY)
         self.interpolation_target = bind(Index.INTERPOLATION_DATA, 1)
         self.interpolation_period = bind(Index.INTERPOLATION_PERIOD, 1, default=10)
         self.interpolation_exponent = bind(Index.INTERPOLATION_PERIOD, 2, default=-3)
         self.home_offset = bind(Index.HOME_OFFSET)
         self.position_offset = bind(Index.POSITION_OFFSET)
-        self.velocity_offset = bind(Index.VELOCITY_OFFSET)
+        self.velocity_offset = rate(Index.VELOCITY_OFFSET)
         self.buffer_maximum = bind(Index.INTERPOLATION_CONFIGURATION, 1, default=1)
         self.buffer_size = bind(Index.INTERPOLATION_CONFIGURATION, 2, default=1)
         self.buffer_clear = bind(Index.INTERPOLATION_CONFIGURATION, 6, default=1)
         self.homing_method = bind(Index.HOMING_METHOD)
-        self.homing_speed_switch = bind(Index.HOMING_SPEEDS, 1, default=100)
-        self.homing_speed_zero = bind(Index.HOMING_SPEEDS, 2, default=10)
-        self.homing_acceleration = bind(Index.HOMING_ACCELERATION)
+        self.homing_speed_switch = rate(Index.HOMING_SPEEDS, 1, default=100)
+        self.homing_speed_zero = rate(Index.HOMING_SPEEDS, 2, default=10)
+        self.homing_acceleration = rate(Index.HOMING_ACCELERATION)
         self.digital_inputs = bind(Index.DIGITAL_INPUTS)
 
-    def _bind_profile(self, bind: Callable[..., Integer]) -> None:
+    def _bind_profile(self, bind: Bind, rate: BindRate) -> None:
         self.limit_low = bind(Index.SOFTWARE_POSITION_LIMIT, 1)
         self.limit_high = bind(Index.SOFTWARE_POSITION_LIMIT, 2)
-        self.max_velocity = bind(Index.MAX_PROFILE_VELOCITY)
-        self.profile_velocity = bind(Index.PROFILE_VELOCITY)
-        self.profile_acceleration = bind(Index.PROFILE_ACCELERATION)
-        self.profile_deceleration = bind(Index.PROFILE_DECELERATION)
-        self.quick_stop_deceleration = bind(Index.QUICK_STOP_DECELERATION)
-        self.max_motor_speed = bind(Index.MAX_MOTOR_SPEED)
-        self.max_acceleration = bind(Index.MAX_ACCELERATION)
-        self.max_deceleration = bind(Index.MAX_DECELERATION)
-        self.max_slippage = bind(Index.MAX_SLIPPAGE)
+        self.max_velocity = rate(Index.MAX_PROFILE_VELOCITY)
+        self.profile_velocity = rate(Index.PROFILE_VELOCITY)
+        self.profile_acceleration = rate(Index.PROFILE_ACCELERATION)
+        self.profile_deceleration = rate(Index.PROFILE_DECELERATION)
+        self.quick_stop_deceleration = rate(Index.QUICK_STOP_DECELERATION)
+        self.max_motor_speed = rate(Index.MAX_MOTOR_SPEED)
+        self.max_acceleration = rate(Index.MAX_ACCELERATION)
+        self.max_deceleration = rate(Index.MAX_DECELERATION)
+        self.max_slippage = rate(Index.MAX_SLIPPAGE)
 
-    def _bind_velocity_mode(self, bind: Callable[..., Integer]) -> None:
-        self.vl_target = bind(Index.VL_TARGET_VELOCITY)
-        self.vl_demand = bind(Index.VL_VELOCITY_DEMAND)
-        self.vl_actual = bind(Index.VL_VELOCITY_ACTUAL)
-        self.vl_min = bind(Index.VL_VELOCITY_MIN_MAX, 1)
-        self.vl_max = bind(Index.VL_VELOCITY_MIN_MAX, 2)
+    def _bind_velocity_mode(self, bind: Bind, rate: BindRate) -> None:
+        self.vl_target = rate(Index.VL_TARGET_VELOCITY)
+        self.vl_demand = rate(Index.VL_VELOCITY_DEMAND)
+        self.vl_actual = rate(Index.VL_VELOCITY_ACTUAL)
+        self.vl_min = rate(Index.VL_VELOCITY_MIN_MAX, 1)
+        self.vl_max = rate(Index.VL_VELOCITY_MIN_MAX, 2)
         ramps = (Index.VL_ACCELERATION, Index.VL_DECELERATION, Index.VL_QUICK_STOP)
-        self._vl_ramps = [(bind(ramp, 1), bind(ramp, 2, default=1)) for ramp in ramps]
+        self._vl_ramps = [(rate(ramp, 1), bind(ramp, 2, default=1)) for ramp in ramps]
 
-    def _bind_torque(self, bind: Callable[..., Integer]) -> None:
+    def _bind_torque(self, bind: Bind) -> None:
         self.target_torque = bind(Index.TARGET_TORQUE)
         self.torque_offset = bind(Index.TORQUE_OFFSET)
         self.torque_demand = bind(Index.TORQUE_DEMAND)
@@ -213,7 +224,7 @@ class DriveObjects:
         return min(max(position, low), high)
 
 
-def _ramp(profile: Integer, maximum: Integer) -> float:
+def _ramp(profile: Integer | Rate, maximum: Integer | Rate) -> float:
     """Return the ramp of a profile within its maximum; 0 in either means that it is not set."""
     ramp = float(profile.value) or UNSET_RAMP
     return min(ramp, float(maximum.value) or UNSET_RAMP)

@@ -95,7 +95,7 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
     print_table(head, rows, right='increments,rad,velocity units')
     if any(axis.radians is None for axis in units):
         print_line(
-            '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad this is'
+            '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad it is'
         )
 
 

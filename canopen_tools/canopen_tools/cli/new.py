@@ -84,6 +84,14 @@ def add_parser(parsers: SubParsers) -> None:
         help='the same for 1 m of a joint that slides',
     )
     add(
+        '--rpm',
+        metavar='NAME=TURNS',
+        action='append',
+        default=[],
+        help='the drive counts velocities in rpm: turns of its motor for one turn (or 1 m) of the '
+        'joint, its gear; 1 for rpm of the joint (default: increments per second, or 0x6096)',
+    )
+    add(
         '--mode',
         metavar='NAME=MODE',
         action='append',
@@ -140,9 +148,15 @@ def _with_choices(options: argparse.Namespace, devices: Sequence[NewDevice]) -> 
         for option, read in (('turn', _turn), ('metre', _metre))
         for name, value in _pairs(option, getattr(options, option), drives)
     }
+    turns = {name: _turns(name, value) for name, value in _pairs('rpm', options.rpm, drives)}
     modes = {name: _mode(name, value) for name, value in _pairs('mode', options.mode, drives)}
     return [
-        replace(device, units=units.get(device.name), mode=modes.get(device.name))
+        replace(
+            device,
+            units=units.get(device.name),
+            rpm=turns.get(device.name),
+            mode=modes.get(device.name),
+        )
         for device in devices
     ]
 
@@ -171,14 +185,28 @@ def _metre(name: str, text: str) -> Units:
     return Units(number, f'{number:g} increments per m, as said', slides=True)
 
 
+def _turns(name: str, text: str) -> float:
+    number = _number(text)
+    if not math.isfinite(number) or number <= 0.0:
+        raise UsageError(
+            f'--rpm {name}={text}: give turns of the motor for one of the joint, such'
+            ' as 100; the sign is that of the increments'
+        )
+    return number
+
+
 def _increments(option: str, name: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
+    number = _number(text)
     if not math.isfinite(number) or number == 0.0:
         raise UsageError(f'--{option} {name}={text}: give a number of increments, not 0')
     return number
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _mode(name: str, text: str) -> OperationMode:
@@ -197,13 +225,19 @@ def _asked(device: NewDevice) -> NewDevice:
         f'{device.name}: increments of the encoder for one turn of the joint, gear included'
         ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
     )
-    while True:
-        try:
-            return replace(device, units=_turn(device.name, input(question).strip()))
-        except EOFError as error:
-            raise UsageError(f'give --turn or --metre {device.name}=INCREMENTS') from error
-        except UsageError:
-            print_line('a number of increments is needed, such as 360000 or -36000.5, and not 0')
+    while (units := _answered(device.name, question)) is None:
+        print_line('a number of increments is needed, such as 360000 or -36000.5, and not 0')
+    return replace(device, units=units)
+
+
+def _answered(name: str, question: str) -> Units | None:
+    """Ask once; None where the answer is no number of increments."""
+    try:
+        return _turn(name, input(question).strip())
+    except EOFError as error:
+        raise UsageError(f'give --turn or --metre {name}=INCREMENTS') from error
+    except UsageError:
+        return None
 
 
 def _period(text: str) -> int:

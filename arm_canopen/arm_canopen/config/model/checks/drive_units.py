@@ -119,6 +119,19 @@ def reported_increments(
     return round(scaled)
 
 
+def velocity_unit(bus: BusConfig, node: NodeConfig, axis: DriveConfig) -> float:
+    """Return what 1 of the velocities of an axis is in [inc/s], by the ratio of its scales.
+
+    It is 1 where velocities have no scale of their own, as most drives count increments.
+    """
+    units = axis_units(Subject(bus, node, Findings()), axis)
+    is_default = units.velocity == DriveConfig().scale_vel_to_dev
+    if not units.velocity or (is_default and units.rule is not UnitRule.FACTOR_GROUP):
+        return 1.0
+    unit = abs(units.increments / units.velocity)
+    return 1.0 if math.isclose(unit, 1.0, rel_tol=SAME_SCALE) else unit
+
+
 def check_units(subject: Subject) -> None:
     """Warn of units by which targets move nothing, or another distance than was meant."""
     for axis in subject.node.axes if subject.node.is_drive else ():

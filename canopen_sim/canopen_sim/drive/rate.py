@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Velocities and accelerations of a drive that counts them in another unit, such as rpm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ..objects.object_store import Integer
+
+INCREMENTS_PER_SECOND: Mapping[int, float] = {}
+"""Units of velocity by axis, of a device whose axes all count [inc/s]."""
+
+
+class Rate:
+    """An object in a unit of its drive, seen in increments per second (or second squared)."""
+
+    __slots__ = ('_object', '_unit')
+
+    def __init__(self, variable: Integer, unit: float) -> None:
+        """See an object so.
+
+        Args:
+            variable: The object.
+            unit: What 1 of it is in [inc/s].
+        """
+        self._object = variable
+        self._unit = unit
+
+    @property
+    def value(self) -> float:
+        """What it holds in [inc/s]."""
+        return self._object.value * self._unit
+
+    def put(self, rate: float) -> None:
+        """Store a rate in [inc/s], rounded and held within the type of the object."""
+        self._object.put(rate / self._unit)
+
+    @property
+    def listener(self) -> Callable[[float], None] | None:
+        """Called with the steady time in [s] after an SDO or an RPDO wrote the object."""
+        return self._object.listener
+
+    @listener.setter
+    def listener(self, listener: Callable[[float], None] | None) -> None:
+        self._object.listener = listener
