@@ -8,6 +8,7 @@ import argparse
 from collections.abc import Collection, Iterable, Sequence
 import difflib
 import sys
+from typing import TYPE_CHECKING
 
 import urdf_reader
 from urdf_reader import KinematicTree, read_urdf
@@ -23,6 +24,9 @@ from .robots import Robot
 from .semantic_check import check_semantic, srdf_command
 from .session import add_robot, locate, robots_epilog
 from .start_positions import given_positions
+
+if TYPE_CHECKING:
+    from arm_canopen.config.model.checks.drive_units import AxisUnits
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -56,12 +60,14 @@ def check_robot(robot: Robot) -> list[Finding]:
         return [*findings, *found]
     moving = [joint.name for joint in tree.joints if joint.independent]
     if not drives or set(drives) - set(moving):
-        drives = moving  # what is wrong with the names of drives is reported already
+        drives = dict.fromkeys(
+            moving
+        )  # what is wrong with the names of drives is reported already
     return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
 
 
-def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
-    """Return what is wrong with bus.yml, and the joints of its drives."""
+def _bus(robot: Robot) -> tuple[list[Finding], dict[str, AxisUnits | None]]:
+    """Return what is wrong with bus.yml, and what its drives are set to, by joint."""
     from arm_canopen.config import check_file
 
     report = check_file(robot.bus_config)
@@ -71,17 +77,18 @@ def _bus(robot: Robot) -> tuple[list[Finding], list[str]]:
         for problem in problems
     ]
     if report.errors:
-        return findings, []
+        return findings, {}
     try:
         bus = read_bus(robot)
         in_namespace_of_bus(RosOptions(), bus)
         given_positions(robot, bus.joints)
     except RobotError as problem:
-        return [*findings, error('bus.yml', str(problem), 'see README of arm_bringup')], []
-    return findings, list(bus.joints)
+        return [*findings, error('bus.yml', str(problem), 'see README of arm_bringup')], {}
+    units = {axis.name: axis for axis in report.units}
+    return findings, {joint: units.get(joint) for joint in bus.joints}
 
 
-def _names(robot: Robot, drives: Sequence[str], tree: KinematicTree) -> Iterable[Finding]:
+def _names(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Iterable[Finding]:
     joints = {joint.name: joint for joint in tree.joints}
     moving = [joint.name for joint in tree.joints if joint.independent]
     idle = [name for name in moving if name not in drives]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TYPE_CHECKING
 
 from urdf_reader import find_group, KinematicTree, SemanticDescription
@@ -12,6 +12,7 @@ from urdf_reader import find_group, KinematicTree, SemanticDescription
 from process_supervisor import parameters_by_node, StartError
 
 from .description import read_semantic
+from .drive_check import check_drives
 from .exceptions import RobotError
 from .findings import error, Finding, warning
 from .groups import choose_groups, MovedGroups
@@ -19,6 +20,7 @@ from .motion import controller_names
 from .robots import Robot, SETTINGS
 
 if TYPE_CHECKING:
+    from arm_canopen.config.model.checks.drive_units import AxisUnits
     from arm_model import RobotModel
 
 START = 'ready'
@@ -36,7 +38,7 @@ def check_motion(
     urdf: str,
     tree: KinematicTree,
     semantic: SemanticDescription,
-    drives: Collection[str],
+    drives: Mapping[str, AxisUnits | None],
 ) -> list[Finding]:
     """Look at the files that trajectories and jogging need.
 
@@ -45,7 +47,7 @@ def check_motion(
         urdf: Its description as XML text.
         tree: The same.
         semantic: Its SRDF.
-        drives: Joints with a drive.
+        drives: Joints with a drive, and what it is set to, where that is known.
     """
     try:
         from arm_model import LimitsError, load_limits, ModelError, RobotModel
@@ -85,6 +87,7 @@ def check_motion(
             continue
         notes.update(dict.fromkeys(model.notes if is_arm else model.notes_beside_contact))
         models[group] = model
+        findings += check_drives(robot.limits.name, drives, model.limits)
         if is_arm:
             notes.update(dict.fromkeys(filter(None, [model.assumption(drives)])))
             findings += _start(robot, model)

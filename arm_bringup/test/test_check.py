@@ -62,6 +62,13 @@ def test_nothing_is_wrong_with_our_robots(name: str, warnings: list[str]) -> Non
     [
         ('bus.yml', ' joint_2_l:', ' joint_x:', [(ERROR, 'joint_x'), (WARNING, 'joint_2_l')]),
         ('bus.yml', 'cia402_slave.eds', 'lost.eds', [(ERROR, 'lost.eds')]),
+        ('bus.yml', 'value: 500000', 'value: 200000', [(WARNING, 'up to 2 (0x607F')]),
+        (
+            'bus.yml',
+            '0x6084, sub_index: 0, value: 200000',
+            '0x6084, sub_index: 0, value: 2000',
+            [(WARNING, '0x6084 is 0.02')],
+        ),
         ('gp110.urdf.xacro', '</robot>', '', [(ERROR, 'gp110.urdf.xacro')]),
         ('limits.yaml', '  joint_3_u:\n', '  joint_3:\n', [(ERROR, 'joint_3')]),
         ('gp110.srdf', '"tool0"', '"tool9"', [(ERROR, 'tool9')]),

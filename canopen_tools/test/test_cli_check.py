@@ -111,7 +111,7 @@ def test_the_speed_of_moves_is_shown(tmp_path: Path, capsys: pytest.CaptureFixtu
     lines = capsys.readouterr().out.splitlines()
     head = next(line for line in lines if '0x6081 speed of moves' in line)
     row = lines[lines.index(head) + 1]
-    assert row.split() == ['joint1', '0.015', '0.5', '0.5']
+    assert row.split() == ['joint1', '0.015', '0.5', '0.5', '0.5']
     assert '0x6083 acceleration' in head
     assert '0x607F' not in head
 

@@ -22,6 +22,7 @@ MOTION_TITLES = {
     Index.MAX_PROFILE_VELOCITY: 'at most',
     Index.PROFILE_ACCELERATION: 'acceleration',
     Index.PROFILE_DECELERATION: 'deceleration',
+    Index.QUICK_STOP_DECELERATION: 'quick stop',
 }
 """Titles of columns; the values are in the units of bus.yml."""
 

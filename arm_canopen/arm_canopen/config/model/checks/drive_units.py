@@ -31,6 +31,7 @@ MOTION_OBJECTS = (
     Index.MAX_PROFILE_VELOCITY,
     Index.PROFILE_ACCELERATION,
     Index.PROFILE_DECELERATION,
+    Index.QUICK_STOP_DECELERATION,
 )
 """What the moves of a drive's own are made with, in its units of velocity (per second)."""
 SECONDS_PER_MINUTE = 60.0
