@@ -4,7 +4,8 @@
 
 A command stands behind ``$`` in a block of the language console; the lines below it are what it
 prints. A line ``...`` stands for any lines, ``...`` in a line for anything; numbers count as
-numbers only. A comment before the block says what differs from a command that ends well:
+numbers only. A command that ends with ``<<'END'`` goes on to the line ``END``. A comment before
+the block says what differs from a command that ends well:
 
     <!-- stays -->                     it goes on in its terminal until the page ends
     <!-- in any order -->              the commands of the block run at the same time
@@ -31,6 +32,9 @@ _BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _NUMBER = re.compile(r'(?<![\w.])[-+]?\d+(?:\.\d+)*')
+_TYPED = re.compile(
+    r"[^\n]*<<'END'\n.*?^END$|(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE | re.DOTALL
+)
 _ANY_NUMBER = r'[-+]?\d+(?:\.\d+)*(?:e-?\d+)?'
 
 
@@ -96,8 +100,8 @@ def commands(page: Path) -> Iterator[Command]:
         if not block['text'].startswith('$ '):
             raise ValueError(f'{page}: a block of console begins with "$ ":\n{block["text"]}')
         for typed in re.split(r'^\$ ', block['text'], flags=re.MULTILINE)[1:]:
-            text, *shown = typed.replace('\\\n', '\0').splitlines()
-            text = text.replace('\0', '\\\n')
+            text = next(_TYPED.finditer(typed))[0]
+            shown = typed.removeprefix(text).splitlines()[1:]
             yield Command(text, tuple(shown), how, block.start(), block['detail'] or '')
 
 
