@@ -21,6 +21,8 @@ NOT_ENABLED = CHECKOUT / 'docs' / 'not_enabled.md'
 SOURCES = (
     'arm_bringup/arm_bringup',
     'arm_canopen/arm_canopen',
+    'arm_servo/arm_servo',
+    'canopen_sim/canopen_sim',
     'canopen_tools/canopen_tools',
     'libraries/process_supervisor/process_supervisor',
 )
