@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from node_runner import init_ros
 
-from .exceptions import CallError, GivenUpError
+from .exceptions import GivenUpError, no_answer
 
 SPIN = 0.05
 """Longest time in [s] after which a wait looks whether it shall be given up."""
@@ -77,7 +77,7 @@ class GraphClient:
         end = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > end:
-                raise CallError(f'waited {timeout:g} s in vain for {what}')
+                raise no_answer(what, timeout)
             if self._given_up():
                 raise GivenUpError(what)
             self._executor.spin_once(timeout_sec=SPIN)
