@@ -11,7 +11,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import urdf_reader
-from urdf_reader import KinematicTree, read_urdf
+from urdf_reader import JointKind, KinematicTree, read_urdf
 
 from process_supervisor import RosOptions, USAGE_ERROR
 
@@ -27,6 +27,9 @@ from .start_positions import given_positions
 
 if TYPE_CHECKING:
     from arm_canopen.config.model.checks.drive_units import AxisUnits
+
+EXAMPLE_ACCELERATIONS = (2.0, 0.5)
+"""Modest limits to begin with: of an axis that turns in [rad/s2], of a linear one in [m/s2]."""
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -52,7 +55,7 @@ def check_robot(robot: Robot) -> list[Finding]:
             warning(
                 f'{robot.name}/',
                 f'lacks {robot.lacking} for trajectories and jogging',
-                f'{srdf_command(robot)} makes the SRDF, robots/gp110/limits.yaml shows limits',
+                '\n'.join(_remedies(robot, drives, tree)),
             ),
         ]
     found, semantic = check_semantic(robot, tree)
@@ -64,6 +67,24 @@ def check_robot(robot: Robot) -> list[Finding]:
             moving
         )  # what is wrong with the names of drives is reported already
     return [*findings, *found, *check_motion(robot, urdf, tree, semantic, drives)]
+
+
+def _remedies(robot: Robot, drives: Collection[str], tree: KinematicTree) -> Iterable[str]:
+    """Say how each file that is missing is made."""
+    if not robot.semantic.is_file():
+        yield f'{srdf_command(robot)} makes the SRDF'
+    if not robot.limits.is_file():
+        yield (
+            f'copy joint_limits.yaml of its MoveIt package; or write {robot.limits}, with '
+            'accelerations of your arm (per second squared) in the place of these:'
+        )
+        yield 'joint_limits:'
+        for joint in tree.joints:
+            if joint.name in drives or (joint.independent and not drives):
+                value = EXAMPLE_ACCELERATIONS[joint.kind is JointKind.PRISMATIC]
+                yield (
+                    f'  {joint.name}: {{has_acceleration_limits: true, max_acceleration: {value}}}'
+                )
 
 
 def _bus(robot: Robot) -> tuple[list[Finding], dict[str, AxisUnits | None]]:

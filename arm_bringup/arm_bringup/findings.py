@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+import textwrap
 
 
 class Severity(Enum):
@@ -35,8 +36,9 @@ class Finding:
     remedy: str
 
     def __str__(self) -> str:
-        """Say it in two lines."""
-        return f'{self.severity.value}: {self.place}: {self.problem}\n    {self.remedy}'
+        """Say it in two lines or more."""
+        remedy = textwrap.indent(self.remedy, '    ')
+        return f'{self.severity.value}: {self.place}: {self.problem}\n{remedy}'
 
 
 def error(place: str, problem: str, remedy: str) -> Finding:

@@ -137,6 +137,21 @@ def test_without_the_files_of_motion(robot: Robot) -> None:
     (finding,) = check_robot(find_robot('gp110', robot.folder.parent))
     assert finding.severity is WARNING
     assert 'gp110.srdf and limits.yaml' in finding.problem
+    assert 'ros2 run arm_planning srdf' in finding.remedy
+
+
+def test_without_limits_the_lines_to_copy_are_shown(robot: Robot) -> None:
+    """As they are printed they are the file that is missing, and that is all that is missing."""
+    robot.limits.unlink()
+    robot = find_robot('gp110', robot.folder.parent)
+    (finding,) = check_robot(robot)
+    assert 'srdf' not in finding.remedy
+    assert f'write {robot.limits}' in finding.remedy
+    robot.limits.write_text('\n'.join(f'{finding}'.splitlines()[2:]), 'utf-8')
+    found = check_robot(find_robot('gp110', robot.folder.parent))
+    assert [each.problem.split(':')[0] for each in found] == [
+        'no max_jerk in the limits file, so 10/s of max_acceleration'
+    ]
 
 
 def main_controller(robot: Robot) -> str:
