@@ -28,7 +28,8 @@ from .description import read_description
 from .enabling import enabling
 from .exceptions import BringupError, RobotError
 from .groups import moved_groups
-from .motion import choose_master, motion_files, planning_files
+from .motion import choose_master, controller_names, motion_files, planning_files
+from .next_commands import next_commands
 from .session import (
     add_arguments,
     locate,
@@ -116,12 +117,12 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
     master, no_motion = MASTER, '--drives-only'
     if not arguments.drives_only:
         master, no_motion = choose_master(locate(arguments), find_executable)
-    files = no_files
+    files, controllers = no_files, dict[str, str]()
     if not no_motion:
-        files = partial(
-            planning_files if arguments.plan else motion_files,
-            groups=moved_groups(locate(arguments)),
-        )
+        robot = locate(arguments)
+        groups = moved_groups(robot)
+        files = partial(planning_files if arguments.plan else motion_files, groups=groups)
+        controllers = controller_names(robot, groups)
     elif arguments.plan:
         raise RobotError(f'--plan: nothing would execute a plan: {no_motion}')
     with session(
@@ -138,6 +139,17 @@ def _arm(arguments: argparse.Namespace, ros: RosOptions) -> int:
         _say(f'{arm.robot.name} on CAN bus {arm.bus}{place}: {offered}')
         if arm.start:
             _say(arm.start)
+        _say(
+            next_commands(
+                arm.drives,
+                arm.mode_service,
+                list(controllers.values()),
+                arm.ros,
+                enabled=arguments.enable,
+                simulated=arguments.simulate,
+                planned=arguments.plan,
+            )
+        )
         with contextlib.ExitStack() as stack:
             if arguments.enable:
                 stack.enter_context(

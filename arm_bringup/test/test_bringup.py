@@ -49,6 +49,7 @@ def test_ctrl_c_ends_it_with_0_after_the_master_and_the_slaves(
         rest, _ = process.communicate(timeout=TIMEOUT)
     assert process.returncode == 0, rest
     assert 'panda on CAN bus udp_multicast' in seen
+    assert '    ros2 service call /panda_joint1/target canopen_interfaces' in seen
     byes = [line.split()[0] for line in rest.splitlines() if line.endswith('| bye')]
     assert byes == ['master', 'slaves']
     assert list(workspace.folder.glob('arm_bringup-*/')) == []
@@ -63,6 +64,8 @@ def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) ->
     assert process.returncode == 0
     assert 'panda on CAN bus can0' in seen
     assert 'slaves' not in seen
+    assert 'ros2 service call /panda_joint1/init' in seen
+    assert '/target' not in seen, 'it is absolute: nothing for an arm that is anywhere'
 
 
 def test_a_master_that_dies_ends_it_with_its_last_words(workspace: SmallWorkspace) -> None:
