@@ -32,9 +32,7 @@ _BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _NUMBER = re.compile(r'(?<![\w.])[-+]?\d+(?:\.\d+)*')
-_TYPED = re.compile(
-    r"[^\n]*<<'END'\n.*?^END$|(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE | re.DOTALL
-)
+_TYPED = re.compile(r"[^\n]*<<'END'\n.*?^END$|(?:[^\n]*\\\n)*[^\n]*", re.MULTILINE | re.DOTALL)
 _ANY_NUMBER = r'[-+]?\d+(?:\.\d+)*(?:e-?\d+)?'
 
 

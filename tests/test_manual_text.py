@@ -116,8 +116,8 @@ def test_whoever_runs_a_command_elsewhere_compares_it() -> None:
 def test_a_command_goes_on_behind_a_backslash_and_to_the_end_of_its_file(tmp_path: Path) -> None:
     """What it prints begins behind that."""
     page = tmp_path / 'page.md'
-    shown = "```console\n$ cat > a <<'END'\none \\\n\ntwo\nEND\n$ echo a \\\n  b\na b\n$ ls\na\nb\n```\n"
-    page.write_text(shown, 'utf-8')
+    blocks = "$ cat > a <<'END'\none \\\n\ntwo\nEND\n$ echo a \\\n  b\na b\n$ ls\na\nb\n"
+    page.write_text(f'```console\n{blocks}```\n', 'utf-8')
     assert [(each.text, each.shown) for each in commands(page)] == [
         ("cat > a <<'END'\none \\\n\ntwo\nEND", ()),
         ('echo a \\\n  b', ('a b',)),

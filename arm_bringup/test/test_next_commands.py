@@ -31,8 +31,10 @@ def test_drives_that_are_not_enabled_are_enabled_first() -> None:
     )
     assert text.splitlines() == [
         'in a second terminal (--enable enables all drives at the start):',
-        '    ros2 service call /shoulder/init std_srvs/srv/Trigger # and of the others',
-        '    ros2 service call /shoulder/cyclic_position_mode std_srvs/srv/Trigger # and of the others',
+        *(
+            f'    ros2 service call /shoulder/{service} std_srvs/srv/Trigger # and of the others'
+            for service in ('init', MODE)
+        ),
         '    ros2 run arm_servo servo_keyboard_input',
         '    ros2 action info /arm_controller/follow_joint_trajectory',
         '    ros2 action info /move_action',
