@@ -17,6 +17,7 @@ from xgo_lib2.errors import XgoError, XgoNotSupportedError, XgoTimeoutError
 from xgo_lib2.feedback import DeviceState, SendStateParser
 from xgo_lib2.registry import feedback_slot_of
 
+from quad_hardware.link.probe import silence_cause
 from quad_hardware.protocol import Feedback, LEG_MOTORS, V1, V2
 from quad_pty_peer import PtyPeer
 
@@ -88,13 +89,22 @@ def test_either_protocol_is_found_and_used(peer: PtyPeer) -> None:
     assert peer.angles[42] == pytest.approx(-20.0, abs=0.4)
 
 
+def test_a_silent_port_has_the_remedy_of_its_kind(tmp_path: Path) -> None:
+    """Behind a pseudo-terminal is a simulated robot, which nobody can switch on."""
+    (tmp_path / 'link').symlink_to('/dev/pts/0')
+    (tmp_path / 'xgo').symlink_to('/dev/ttyUSB0')
+    assert 'simulated robot' in silence_cause(str(tmp_path / 'link'))
+    for path in (tmp_path / 'xgo', '/dev/ttyAMA0'):
+        assert silence_cause(str(path)) == 'is it switched on, and is this its port?'
+
+
 def test_what_a_robot_cannot_do_is_said(tmp_path: Path) -> None:
     """Protocol v1 pushes nothing; a silent port is a time-out; no port names the remedy."""
     with PtyPeer(tmp_path / 'port', V1) as peer:
         with XgoDog(str(peer.link)) as dog, pytest.raises(XgoNotSupportedError, match='read_imu'):
             dog.system_set_feedback(1)
         peer.behaviour.silent = True
-        with pytest.raises(XgoTimeoutError, match=r'115200 baud.*switched on'):
+        with pytest.raises(XgoTimeoutError, match=r'115200 baud.*simulated robot'):
             XgoDog(str(peer.link))
     with pytest.raises(XgoError, match='no such device'):
         XgoDog(str(tmp_path / 'nothing'))

@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+import math
 
 from urdf_reader import KinematicTree
 
 SILENCE_TIMEOUT = 5.0
 """Time in [s] after which a joint that was in no message is reported."""
+START_TIMEOUT = 30.0
+"""Time in [s] within which somebody publishes: a robot may take so long to start."""
 
 
 class JointWatch:
@@ -28,6 +31,8 @@ class JointWatch:
         self._reported: set[str] = set()
         self._received = False
         self._due = now + SILENCE_TIMEOUT
+        self._start_due = now + START_TIMEOUT
+        self._publisher_due = math.inf
 
     def take(self, names: Iterable[str]) -> None:
         """Take in the names of a message.
@@ -39,22 +44,34 @@ class JointWatch:
         self._silent.difference_update(names)
         self._unknown.update(name for name in names if name not in self._known)
 
-    def warnings(self, now: float, topic: str) -> list[str]:
+    def notes(self, now: float, topic: str, publishers: int) -> list[str]:
+        """Return what is not wrong yet and was not reported yet: nobody publishes so far.
+
+        Args:
+            now: Steady time in [s].
+            topic: Name of the topic, for the message.
+            publishers: How many it has.
+        """
+        waits = self._silent and not self._received and not publishers
+        return self._once(
+            f'no message on {topic} yet, as nobody publishes it: fine while the robot starts; '
+            f'else check the publisher (ros2 topic info {topic}) and ROS_DOMAIN_ID'
+            if waits and self._due <= now < self._start_due
+            else ''
+        )
+
+    def warnings(self, now: float, topic: str, publishers: int) -> list[str]:
         """Return what is wrong and was not reported yet.
 
         Args:
             now: Steady time in [s].
             topic: Name of the topic, for the message.
+            publishers: How many it has.
         """
+        if not self._received:
+            return self._silence(now, topic, publishers)
         if now < self._due:
             return []
-        if not self._received:
-            return self._once(
-                f'no message on {topic} for {SILENCE_TIMEOUT:g} s, so no /tf of moving joints; '
-                f'check the publisher (ros2 topic info {topic}) and ROS_DOMAIN_ID'
-                if self._silent
-                else ''
-            )
         silent, unknown = ', '.join(sorted(self._silent)), ', '.join(sorted(self._unknown))
         return [
             *self._once(
@@ -67,6 +84,19 @@ class JointWatch:
                 f'on {topic}, but not in the robot description: {unknown}' if unknown else ''
             ),
         ]
+
+    def _silence(self, now: float, topic: str, publishers: int) -> list[str]:
+        """Report a publisher that is silent, or that nobody has begun to publish."""
+        if publishers and self._publisher_due == math.inf:
+            self._publisher_due = now + SILENCE_TIMEOUT
+        begun = self._publisher_due < math.inf
+        silent = bool(self._silent) and now >= (self._publisher_due if begun else self._start_due)
+        return self._once(
+            f'no message on {topic}, so no /tf of moving joints; check the publisher '
+            f'(ros2 topic info {topic}) and ROS_DOMAIN_ID'
+            if silent
+            else ''
+        )
 
     def _once(self, text: str) -> list[str]:
         if not text or text in self._reported:

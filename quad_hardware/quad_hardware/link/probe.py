@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 import select
 import time
 
@@ -23,6 +24,7 @@ from ..protocol import (
 )
 from .port import SerialPort
 
+PSEUDO_TERMINALS = Path('/dev/pts')  # behind which a simulated robot is
 ANSWER_TIME = 0.15  # [s] a robot takes a few milliseconds
 ATTEMPTS = 2
 FIRMWARE_SIZE, BATTERY_SIZE = 10, 1  # [B]
@@ -71,10 +73,21 @@ def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0)
         if firmware is not None:
             return Connection(port, protocol, firmware)
         port.close()
-    raise NoAnswerError(
-        f'no robot answers on {path} ({", ".join(tried)}); '
-        'is it switched on, and is this its port?'
-    )
+    raise NoAnswerError(f'no robot answers on {path} ({", ".join(tried)}); {silence_cause(path)}')
+
+
+def silence_cause(path: str) -> str:
+    """Return what to look at where nobody answers on a port.
+
+    Args:
+        path: Device file, or a link to one.
+    """
+    if Path(path).resolve().is_relative_to(PSEUDO_TERMINALS):
+        return (
+            'it is a pseudo-terminal: does the simulated robot behind it still start, and is this '
+            'machine too busy?'
+        )
+    return 'is it switched on, and is this its port?'
 
 
 def read_firmware(port: SerialPort, protocol: Protocol) -> str | None:

@@ -115,7 +115,10 @@ class RobotStatePublisher(Node):
 
     def _watch_joints(self) -> None:
         topic = self._subscription.topic_name
-        for text in self._watch.warnings(time.monotonic(), topic):
+        now, publishers = time.monotonic(), self.count_publishers(topic)
+        for text in self._watch.notes(now, topic, publishers):
+            self.get_logger().info(text)
+        for text in self._watch.warnings(now, topic, publishers):
             self.get_logger().warning(text)
 
 
