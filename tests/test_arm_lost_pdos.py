@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from itertools import pairwise
 
-from drive_samples import bus_config, drive_config, PERIOD, SCALE
+from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from model_robots import ready, robot
 import numpy as np
 import pytest
@@ -46,6 +46,7 @@ class Arm:
             drive_config(
                 name,
                 2 + number,
+                sdo_writes=(*MOTION_WRITES, sdo_write(0x607F, 0, int(3.0 * SCALE))),
                 scales={'offset_pos_from_dev': at, 'offset_pos_to_dev': -at * SCALE},
             )
             for number, (name, at) in enumerate(zip(joints, self.begin.tolist(), strict=True))

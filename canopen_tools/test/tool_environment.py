@@ -14,6 +14,7 @@ ENVIRONMENT = os.environ | {
         for package in (
             'arm_canopen',
             'canopen_tools',
+            'libraries/black_box',
             'libraries/operator_input',
             'libraries/realtime_loop',
         )
