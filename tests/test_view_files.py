@@ -266,7 +266,7 @@ def test_a_running_arm_has_all_and_its_stop_stops_it(isolation: Isolation) -> No
         RunningProcess(command, isolation.env) as bringup,
         RosClient(isolation.domain_id) as client,
     ):
-        bringup.wait_for('all is ready', STARTING)
+        bringup.wait_for('drives are enabled', STARTING)
         shown = layout(robot / 'foxglove.json')
         check(client, [shown, rviz(robot / 'panda.rviz'), rviz(robot / 'moveit.rviz')])
         states = client.listen(JointState, '/joint_states')
