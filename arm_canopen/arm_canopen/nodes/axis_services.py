@@ -83,11 +83,14 @@ class AxisServices:
     def _set_target(self, request: COTargetDouble.Request) -> Future[str]:
         return self._deliver(lambda: self._commands.set_target(request.target))
 
-    def _answer_target(self, response: COTargetDouble.Response, future: Future[str]) -> None:
+    def _answer_target(
+        self, response: COTargetDouble.Response, future: Future[str]
+    ) -> COTargetDouble.Response:
         error = future.exception()
         response.success = error is None
         if error is not None:
             self._node.get_logger().warning(f'target: {error}')
+        return response
 
     def _move(self, request: MoveService.Request) -> Future[str]:
         move = Move(
@@ -98,10 +101,13 @@ class AxisServices:
         )
         return self._deliver(lambda: self._commands.move(move))
 
-    def _answer_move(self, response: MoveService.Response, future: Future[str]) -> None:
+    def _answer_move(
+        self, response: MoveService.Response, future: Future[str]
+    ) -> MoveService.Response:
         error = future.exception()
         response.success = error is None
         response.message = future.result() if error is None else str(error)
+        return response
 
     def _stream(self, message: Float64) -> None:
         self._call(lambda: self._commands.stream_target(message.data)).add_done_callback(

@@ -15,7 +15,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from node_runner import destroyed_when_refused
+from node_runner import create_deferred_service, destroyed_when_refused
 
 from ..exceptions import CanopenError, SdoError
 from ..master.object_access import bytes_from_raw, number_from_raw, raw_from_bytes
@@ -24,7 +24,6 @@ from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.dictionary import object_address
 from ..standard.nmt import NmtCommand
-from .deferred_service import DeferredServices
 from .device_topics import DeviceTopics, node_options
 from .object_services import ObjectServices
 from .output_thread import OutputThread
@@ -64,15 +63,14 @@ class DeviceNode(Node):
         self.output = output
         self._thread = thread
         self.admit: Callable[[], None] = lambda: None
-        self._deferred = DeferredServices(output)
         fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
         self.declare_parameter('node_id', config.node_id, fixed, ignore_override=True)
         self.topics = DeviceTopics(self, device, output)
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
-        self.offer(CORead, '~/sdo_read', self._read, self._answer_read)
-        self.offer(COWrite, '~/sdo_write', self._write, self._answer_write)
+        self.offer(CORead, '~/sdo_read', self._read, partial(answer_read, self))
+        self.offer(COWrite, '~/sdo_write', self._write, partial(answer_write, self))
         ObjectServices(self, thread)
 
     def offer(
@@ -80,7 +78,7 @@ class DeviceNode(Node):
         service_type: Any,  # noqa: ANN401  # service classes have no type
         name: str,
         handler: Callable[[Any], Future[Any]],
-        respond: Callable[[Any, Future[Any]], None],
+        respond: Callable[[Any, Future[Any]], Any],
     ) -> None:
         """Offer a service of this node whose outcome is a future.
 
@@ -88,29 +86,26 @@ class DeviceNode(Node):
             service_type: Its type.
             name: Its name.
             handler: Called with each request that is admitted.
-            respond: Fills the response in.
+            respond: Fills the response in, and returns it.
         """
 
         def admitted(request: Any) -> Future[Any]:  # noqa: ANN401
-            try:
-                self.admit()
-                return handler(request)
-            except CanopenError as error:
-                refused: Future[Any] = Future()
-                refused.set_exception(error)
-                return refused
+            self.admit()
+            return handler(request)
 
-        self._deferred.create(self, service_type, name, admitted, respond)
+        post = self.output.post
+        create_deferred_service(self, service_type, name, admitted, respond, post=post)
 
     def offer_trigger(self, name: str, handler: Callable[[], Future[str]]) -> None:
         """Offer a std_srvs/Trigger whose message is what the future returns, or why it failed."""
 
-        def respond(response: Any, future: Future[str]) -> None:  # noqa: ANN401
+        def respond(response: Any, future: Future[str]) -> Any:  # noqa: ANN401
             error = future.exception()
             response.success = error is None
             response.message = future.result() if error is None else str(error)
             if error is not None:
                 self.get_logger().warning(f'{name}: {error}')
+            return response
 
         self.offer(Trigger, name, lambda request: handler(), respond)
 
@@ -164,9 +159,6 @@ class DeviceNode(Node):
 
         return self._thread.run_coroutine(read)
 
-    def _answer_read(self, response: CORead.Response, future: Future[int]) -> None:
-        answer_read(self, response, future)
-
     def _write(self, request: COWrite.Request) -> Future[None]:
         device, index, subindex = self.device, request.index, request.subindex
 
@@ -177,18 +169,16 @@ class DeviceNode(Node):
 
         return self._thread.run(write)
 
-    def _answer_write(self, response: COWrite.Response, future: Future[None]) -> None:
-        answer_write(self, response, future)
 
-
-def answer_read(node: Node, response: Any, future: Future[int]) -> None:  # noqa: ANN401
+def answer_read(node: Node, response: Any, future: Future[int]) -> Any:  # noqa: ANN401
     """Fill in success and data; a failure, for which there is no field, is logged."""
     answer_write(node, response, future)
     if response.success:
         response.data = future.result()
+    return response
 
 
-def answer_write(node: Node, response: Any, future: Future[Any]) -> None:  # noqa: ANN401
+def answer_write(node: Node, response: Any, future: Future[Any]) -> Any:  # noqa: ANN401
     """Fill in success; a failure, for which there is no field, is logged."""
     error = future.exception()
     response.success = error is None
@@ -196,3 +186,4 @@ def answer_write(node: Node, response: Any, future: Future[Any]) -> None:  # noq
         node.get_logger().warning(str(error))
     elif error is not None:
         node.get_logger().error(f'{type(error).__name__}: {error}')
+    return response

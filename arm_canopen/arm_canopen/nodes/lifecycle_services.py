@@ -19,9 +19,10 @@ from lifecycle_msgs.srv import (
 )
 from rclpy.node import Node
 
+from node_runner import create_deferred_service
+
 from ..master.lifecycle import LifecycleState, Managed, Transition, TRANSITIONS
 from ..master.runner import NetworkThread
-from .deferred_service import DeferredServices
 from .output_thread import OutputThread
 
 
@@ -45,8 +46,8 @@ class LifecycleServices:
         self._output = output
         self._events = node.create_publisher(TransitionEvent, '~/transition_event', 10)
         managed.on_change = self._changed
-        DeferredServices(output).create(
-            node, ChangeState, '~/change_state', self._change, self._answer
+        create_deferred_service(
+            node, ChangeState, '~/change_state', self._change, self._answer, post=output.post
         )
         node.create_service(GetState, '~/get_state', self._get_state)
         node.create_service(GetAvailableStates, '~/get_available_states', self._get_states)
@@ -64,11 +65,14 @@ class LifecycleServices:
 
         return self._thread.run_coroutine(change)
 
-    def _answer(self, response: ChangeState.Response, future: Future[None]) -> None:
+    def _answer(
+        self, response: ChangeState.Response, future: Future[None]
+    ) -> ChangeState.Response:
         error = future.exception()
         response.success = error is None
         if error is not None:
             self._node.get_logger().warning(str(error))
+        return response
 
     def _changed(
         self, transition: Transition, before: LifecycleState, after: LifecycleState, ended: bool

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from functools import partial
 
 from canopen_interfaces.srv import CONmtID, COReadID, COWriteID
 from rclpy.node import Node
+
+from node_runner import create_deferred_service
 
 from ..exceptions import CanopenError
 from ..master.object_access import bytes_from_raw, raw_from_bytes
@@ -19,7 +21,6 @@ from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.datatypes import byte_length, DataType
 from ..standard.dictionary import object_address
 from ..standard.nmt import ALL_NODES, NmtCommand
-from .deferred_service import DeferredServices
 from .device_node import answer_read, answer_write
 from .output_thread import OutputThread
 
@@ -55,12 +56,14 @@ class MasterServices:
         """
         self.admit: Callable[[], None] = lambda: None
         self.check_owner: Callable[[int, int], None] = lambda node_id, index: None
-        self._node = node
         self._thread = thread
-        services = DeferredServices(output)
-        services.create(node, COReadID, '~/sdo_read', self._read, self._answer_read)
-        services.create(node, COWriteID, '~/sdo_write', self._write, self._answer_write)
-        services.create(node, CONmtID, '~/set_nmt', self._set_nmt, self._answer_write)
+        for kind, name, begin, respond in (
+            (COReadID, '~/sdo_read', self._read, answer_read),
+            (COWriteID, '~/sdo_write', self._write, answer_write),
+            (CONmtID, '~/set_nmt', self._set_nmt, answer_write),
+        ):
+            fill = partial(respond, node)
+            create_deferred_service(node, kind, name, begin, fill, post=output.post)
 
     def _read(self, request: COReadID.Request) -> Future[int]:
         async def read() -> int:
@@ -94,12 +97,6 @@ class MasterServices:
             return self._thread.network.send_nmt(_nmt_command(request.nmtcommand), node_id)
 
         return self._thread.run(send)
-
-    def _answer_read(self, response: Any, future: Future[int]) -> None:  # noqa: ANN401
-        answer_read(self._node, response, future)
-
-    def _answer_write(self, response: Any, future: Future[None]) -> None:  # noqa: ANN401
-        answer_write(self._node, response, future)
 
 
 def _data_type(number: int) -> DataType:

@@ -35,7 +35,7 @@ class ServiceOwner(Protocol):
         service_type: Any,  # noqa: ANN401  # service classes have no type
         name: str,
         handler: Callable[[Any], Future[Any]],
-        respond: Callable[[Any, Future[Any]], None],
+        respond: Callable[[Any, Future[Any]], Any],
     ) -> None:
         """Offer a service whose outcome is a future."""
 
@@ -60,7 +60,9 @@ class ObjectServices:
         _require_clear(request.object)
         return self._thread.run_coroutine(partial(self._objects.upload, request.object))
 
-    def _answer_read(self, response: ReadObject.Response, future: Future[Transfer]) -> None:
+    def _answer_read(
+        self, response: ReadObject.Response, future: Future[Transfer]
+    ) -> ReadObject.Response:
         try:
             entry, data = future.result()
             response.index, response.subindex = entry.address
@@ -70,6 +72,7 @@ class ObjectServices:
             response.message = str(error)
         else:
             response.success = True
+        return response
 
     def _write(self, request: WriteObject.Request) -> Future[Transfer]:
         _require_clear(request.object)
@@ -83,17 +86,20 @@ class ObjectServices:
             partial(self._objects.download, request.object, to_bytes)
         )
 
-    def _answer_write(self, response: WriteObject.Response, future: Future[Transfer]) -> None:
+    def _answer_write(
+        self, response: WriteObject.Response, future: Future[Transfer]
+    ) -> WriteObject.Response:
         try:
             entry, data = future.result()
         except CanopenError as error:
             response.message = str(error)
-            return
+            return response
         response.index, response.subindex = entry.address
         written = text_from_bytes(entry.data_type, data)
         address = object_address(entry.index, entry.subindex)
         response.success = True
         response.message = f'{address} {object_path(entry)} = {written}'
+        return response
 
 
 def _require_clear(path: str) -> None:

@@ -12,12 +12,12 @@ from typing import Any
 from moveit_msgs.msg import MoveItErrorCodes
 from rclpy.node import Node
 
+from node_runner import create_deferred_service
+
 from ..exceptions import PlanningCode, PlanningError
 
 SOURCE = 'move_group'
 """Who reports an error code."""
-
-Answer = Callable[[Any], Any]
 
 
 def error_code(code: PlanningCode = PlanningCode.SUCCESS, reason: str = '') -> MoveItErrorCodes:
@@ -83,46 +83,22 @@ class Background:
         Args:
             kind: Type of the service.
             name: Its name.
-            begin: Takes the request in the executor, and returns what makes the response.
+            begin: Called in the executor with the request; returns what makes the response.
             refuse: Fills the response of a request that is refused.
         """
-        pending: dict[int, Future[Any]] = {}
 
-        def take(request: Any, response: Any) -> Any:  # noqa: ANN401
-            pending[id(response)] = self._pool.submit(begin_or_raise(request))
+        def respond(response: Any, outcome: Future[Any]) -> Any:  # noqa: ANN401
+            error = outcome.exception()
+            if error is None:
+                return outcome.result()
+            refusal = as_refusal(error)
+            refuse(response, refusal)
+            self._node.get_logger().warning(f'{name} refused: {refusal}')
             return response
 
-        def begin_or_raise(request: Any) -> Callable[[], Any]:  # noqa: ANN401
-            try:
-                return begin(request)
-            except PlanningError as error:
-                refusal = error
-
-                def refused() -> Any:  # noqa: ANN401
-                    raise refusal
-
-                return refused
-
-        service = self._node.create_service(kind, name, take)
-        send = service.send_response
-
-        def answer(response: Any, header: Any) -> None:  # noqa: ANN401
-            def finish(done: Future[Any]) -> None:
-                if done.cancelled():
-                    return  # the node ends
-                error = done.exception()
-                if error is None:
-                    send(done.result(), header)
-                    return
-                refusal = as_refusal(error)
-                refuse(response, refusal)
-                self._node.get_logger().warning(f'{name} refused: {refusal}')
-                send(response, header)
-
-            pending.pop(id(response)).add_done_callback(finish)
-
-        # the executor calls this with what the callback returned; the response may come later
-        service.send_response = answer  # type: ignore[method-assign]
+        create_deferred_service(
+            self._node, kind, name, lambda request: self._pool.submit(begin(request)), respond
+        )
 
     def close(self) -> None:
         """Drop what has not begun, and wait for what has."""

@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every node's program has to do, once: start, end, and refuse parameters with words."""
 
-from .background_service import create_background_service
 from .black_box_parameters import declare_black_box
 from .construction import destroyed_if_refused, destroyed_when_refused
+from .deferred_service import create_deferred_service
 from .exceptions import ParameterError
 from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
@@ -24,7 +24,7 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
-    'create_background_service',
+    'create_deferred_service',
     'declare_black_box',
     'declare_given',
     'declare_thread_priority',

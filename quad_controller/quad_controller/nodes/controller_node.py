@@ -10,7 +10,6 @@ from pathlib import Path
 import sys
 import threading
 import time
-from typing import Any
 from weakref import WeakKeyDictionary
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -31,7 +30,7 @@ from std_srvs.srv import Trigger
 
 from message_templates import FastPublisher, FastReader
 from node_runner import (
-    create_background_service,
+    create_deferred_service,
     destroyed_when_refused,
     LATCHED,
     notify_ready,
@@ -137,8 +136,11 @@ class ControllerNode(Node):
             self._see_odometry()
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
-        create_background_service(
-            self, LoadPolicy, '~/load_policy', self._take_load_request, self._loader
+        create_deferred_service(
+            self,
+            LoadPolicy,
+            '~/load_policy',
+            lambda request: self._loader.submit(self._take_load_request, request),
         )
         self._gait = settings.gait
         self.add_on_set_parameters_callback(self._tune)
@@ -304,12 +306,11 @@ class ControllerNode(Node):
         self.get_logger().info(f'mode {request.mode!r}: {answer.message}')
         return response
 
-    def _take_load_request(self, request: Any, response: Any) -> Any:  # noqa: ANN401
+    def _take_load_request(self, request: LoadPolicy.Request) -> LoadPolicy.Response:
         """Load a policy and follow it; in the thread of the loader."""
         answer = self._follow(request.path)
-        response.success, response.message = answer.accepted, answer.message
         self.get_logger().info(f'load_policy {request.path!r}: {answer.message}')
-        return response
+        return LoadPolicy.Response(success=answer.accepted, message=answer.message)
 
     def _follow(self, path: str) -> Answer:
         if path in GAIT_WORDS:
