@@ -50,9 +50,10 @@ from ..policy.load import load_policy, LoadedPolicy
 from ..policy.shipped import find_policy
 from ..recording.recorder import Recorder
 from ..recording.step import StepTiming
-from ..states.controller import Controller, NO_POLICY
+from ..states.controller import Controller
 from ..states.faults import Fault
 from ..states.modes import Answer
+from ..states.policy_switch import NO_POLICY
 from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop

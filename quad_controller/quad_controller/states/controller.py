@@ -24,7 +24,6 @@ from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy, PolicyInputs
 from .commands import Commands
 from .faults import Fault, FaultLatch
-from .handover import BLEND_TIME, Handover, Phase, PROBATION_TIME
 from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
@@ -32,9 +31,8 @@ from .modes import Answer, GAIT_STATES, ModeRequest, MODES, MOVING_STATES, parse
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
-from .policy_motion import PolicyMotion
-from .shadow import Shadow
-from .status import Asked, Event, EventKind, Output, Status
+from .policy_switch import NO_POLICY, PolicySwitch
+from .status import Event, EventKind, Output, Status
 from .tracking import TrackingMonitor
 from .unseen import UnseenJoints
 from .watchdogs import Watchdogs
@@ -46,8 +44,6 @@ UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
 
 WAYS_DOWN = frozenset({State.LIE, State.RELAX})
 """Modes that no fault keeps a robot from: they need nothing but the last targets."""
-
-NO_POLICY = 'no policy is loaded (parameter policy, or ~/load_policy)'
 
 LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
 """What stops a robot on its way down, if it was in order when the way down was requested."""
@@ -102,13 +98,9 @@ class Controller:
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
-        self._policy, self._policy_refusal = policy, policy_refusal
         self._machine = StateMachine(poses, self._generator, states, policy)
-        self._parameters, self._dry_run = states, dry_run
-        self._handover: Handover | None = None
-        self._former_policy: Policy | None = None  # that a handover leads back to
-        self._reported_phase: Phase | None = None
-        self._shadow = Shadow(policy) if policy is not None and dry_run else None
+        self._policies = PolicySwitch(self._machine, policy, policy_refusal, dry_run=dry_run)
+        self._parameters = states
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
         self._limiter = StepLimiter(robot.limits, states.period, states.setpoint_speed_ratio)
@@ -163,13 +155,13 @@ class Controller:
     @property
     def policy(self) -> Policy | None:
         """What the mode ``policy`` follows."""
-        return self._policy
+        return self._policies.policy
 
     def handover_refusal(self) -> str:
         """Return why no other policy can be taken now, whichever it is; nothing when one can."""
-        if self._handover is not None:
+        if self._policies.is_handing_over:
             return (
-                f'{self._handover_text}; ask again when that is over '
+                f'{self._policies.text}; ask again when that is over '
                 '(the mode walk returns to the gait before)'
             )
         if self._latch.texts:
@@ -188,88 +180,17 @@ class Controller:
         Args:
             policy: It fits the robot; None for none.
         """
-        machine, last = self._machine, self._limiter.last
-        moves = machine.can_hand_over and not self._dry_run and last is not None
-        leaves = policy is None and machine.state is not State.POLICY
+        policies, last = self._policies, self._limiter.last
         refusal = self.handover_refusal()
-        if moves and not refusal and policy is not None:
+        if not refusal and policies.moves and last is not None and policy is not None:
             refusal = self._health_refusal() or self._unmeasured(policy)
         if refusal:
-            return Answer(False, f'stays with {self._policy_name}: {refusal}')
-        former, self._former_policy = self._policy_name, self._policy
-        self._set_policy(policy)
-        if not moves or leaves or last is None:
-            return Answer(True, self._installed(policy))
-        watchdogs = self._watchdogs() if policy is not None else None
-        self._handover = machine.hand_over(policy, last, watchdogs)
-        self._reported_phase = None
-        if policy is None:
-            return Answer(True, f'from {former} to the gait, within {BLEND_TIME:g} s')
-        return Answer(
-            True,
-            f'from {former} to {policy.name} within {BLEND_TIME:g} s, after it has watched for '
-            f'{self._handover.warm_up:g} s; then it is on probation for {PROBATION_TIME:g} s',
-        )
-
-    def _installed(self, policy: Policy | None) -> str:
-        if policy is None:
-            return 'no policy is loaded any more'
-        if self._dry_run:
-            return f'{policy.name} is watched (parameter policy_dry_run)'
-        return f'the mode policy follows {policy.name}'
-
-    def _set_policy(self, policy: Policy | None) -> None:
-        self._policy = policy
-        if policy is None:
-            self._policy_refusal = NO_POLICY
-        self._machine.set_policy(policy)
-        self._shadow = Shadow(policy) if policy is not None and self._dry_run else None
+            return Answer(False, f'stays with {policies.followed}: {refusal}')
+        return policies.follow(policy, last, self._watchdogs() if policy is not None else None)
 
     def _watchdogs(self) -> Watchdogs:
         speeds = [limits.velocity for limits in self._robot.limits]
         return Watchdogs(self._parameters.max_tilt, speeds, self._parameters.period)
-
-    @property
-    def _policy_name(self) -> str:
-        """What moves the robot, or would in the mode policy."""
-        followed = self._machine.state is State.POLICY or self._machine.state not in GAIT_STATES
-        return self._policy.name if self._policy is not None and followed else 'the gait'
-
-    @property
-    def _handover_text(self) -> str:
-        """How far a handover is."""
-        name = self._policy.name if self._policy is not None else 'the gait'
-        phase = self._handover.phase.value if self._handover is not None else ''
-        return f'{name}: {phase}' if phase else name
-
-    def _follow_handover(self, events: list[Event]) -> None:
-        """Report how far a handover is, and end it; one that a fault ended is undone."""
-        handover = self._handover
-        if handover is None:
-            return
-        name = self._policy.name if self._policy is not None else 'the gait'
-        former = self._former_policy.name if self._former_policy is not None else 'the gait'
-        faulted = self._machine.state is State.FAULT
-        if self._machine.motion is not handover:
-            self._handover = None
-            if faulted or handover.reason:
-                self._set_policy(self._former_policy)
-                text = f'{name} was given up for {former}, which the mode policy follows'
-                events.append(Event(EventKind.TROUBLE, text))
-            return
-        if handover.phase is not self._reported_phase:
-            self._reported_phase = handover.phase
-            if handover.phase is Phase.RETURN:
-                text = f'{name} was given up: {handover.reason}; back to {former}'
-                events.append(Event(EventKind.TROUBLE, text))
-            elif not handover.over:
-                events.append(Event(EventKind.NEWS, f'{name}: {handover.phase.value}'))
-        if handover.over:
-            self._handover = None
-            self._machine.conclude(handover)
-            if handover.phase is Phase.RETURNED:
-                self._set_policy(self._former_policy)
-            events.append(Event(EventKind.NEWS, f'{name}: {handover.phase.value}'))
 
     def retune(self, gait: GaitParameters) -> Answer:
         """Walk with another tuning from now on; only while the robot is not on its legs.
@@ -313,7 +234,7 @@ class Controller:
             refused=health.refused + self._commands.refused,
             limited=self._limiter.limited,
             unreachable=self._unreachable,
-            policy=self._handover_text if self._policy or self._handover else '',
+            policy=self._policies.text,
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
@@ -342,13 +263,13 @@ class Controller:
             return Output(None, None, self._machine.title, False, tuple(events))
         self._latch_faults(last, events)
         self._advance_state(last, events)
-        self._follow_handover(events)
+        events += self._policies.step()
         self._report_conditions(events)
         if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
             return Output(None, None, self._machine.title, self._health.complete, tuple(events))
         situation, dt_motion = self._situation(), min(dt, MAX_STEP)
         wanted = self._move(situation, dt_motion, last, events)
-        shadow = self._shadow.step(situation, dt_motion, last) if self._shadow else None
+        shadow = self._policies.watch(situation, dt_motion, last)
         targets = self._limiter.step(wanted, dt)
         self._track(targets, dt)
         return Output(
@@ -358,19 +279,8 @@ class Controller:
             self._health.complete,
             tuple(events),
             situation,
-            self._asked(),
+            self._policies.asked(is_held=self._held),
         )
-
-    def _asked(self) -> Asked | None:
-        """Return the policy that was asked in this step."""
-        if self._shadow is not None:
-            return self._shadow.asked
-        motion = self._machine.motion
-        if isinstance(motion, Handover):
-            motion = motion.current
-        if self._held or not isinstance(motion, PolicyMotion) or motion.answer is None:
-            return None
-        return Asked(motion.policy, motion.answer, motion.steps)
 
     def _take(self, state: RobotState, dt: float, events: list[Event]) -> None:
         """Take in what arrived, and the time that passed."""
@@ -531,15 +441,12 @@ class Controller:
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '
                 'The modes lie and relax are possible in spite of it'
             )
-        if request.state is State.POLICY and self._policy is None:
-            return self._policy_refusal
-        if request.state is State.POLICY and self._shadow is not None:
-            return 'the policy is only watched in a dry run (parameter policy_dry_run)'
+        policy = self._policies.policy if request.state is State.POLICY else None
+        if request.state is State.POLICY and (reason := self._policies.mode_refusal):
+            return reason
         if reason := self._health_refusal():
             return reason
-        if request.state is State.POLICY and self._policy is not None:
-            return self._unmeasured(self._policy)
-        return ''
+        return self._unmeasured(policy) if policy is not None else ''
 
     def _health_refusal(self) -> str:
         """Return what keeps the robot from moving its legs."""
