@@ -4,6 +4,9 @@
 
 The browser is on the same machine, and draws in software. It has the lowest priority: its work is
 that of another machine.
+
+Lateness is that of the last cycles, a window of them. It is read when the whole window lies in the
+measured time: the start of the processes is no part of it.
 """
 
 from __future__ import annotations
@@ -16,13 +19,13 @@ import browser
 from diagnostic_msgs.msg import DiagnosticArray
 from isolation import reserve
 from processes import executable, RunningProcess
-import psutil
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 
-SECONDS = 15.0
+from arm_canopen.master.statistics import WINDOW
+
+TIMEOUT = 60.0  # [s]
 MOVING = 0.05  # [rad/s]
-SEEN = r'the robot is seen at (http://localhost:\d+)$'
 LATE = ('jitter_p50', 'jitter_p99', 'jitter_max')
 VARIANTS = ('no page', 'page unseen', 'page open')
 
@@ -45,20 +48,20 @@ def measure(variant: str) -> None:
         if variant == 'no page':
             words.append('--no-view')
         arm = stack.enter_context(RunningProcess(words, isolation.env | {'NO_VIEW': ''}))
+        url = '' if variant == 'no page' else browser.url_of(arm, TIMEOUT)
         client = stack.enter_context(RosClient(isolation.domain_id))
         states = client.listen(JointState, '/joint_states')
-        client.spin_until(lambda: moves(states), 60.0, 'motion')
+        client.spin_until(lambda: moves(states), TIMEOUT, 'motion')
         diagnostics = client.listen(DiagnosticArray, '/diagnostics')
         if variant == 'page open':
-            url = arm.wait_for(SEEN).rpartition(' ')[2]
             page = browser.open_page(stack.enter_context(browser.browser()), url)
             for process in browser.processes():
                 process.nice(19)
             page.locator('canvas').first.wait_for()
         client.spin_until(lambda: has_bus(diagnostics), 10.0, 'status of the bus')
         first, used, begin = bus_values(diagnostics[-1]), page_time(arm), time.monotonic()
-        client.spin_until(lambda: time.monotonic() - begin > SECONDS, SECONDS + 5, 'end')
-        client.spin_until(lambda: has_bus(diagnostics), 10.0, 'status of the bus')
+        end = int(first['cycles']) + WINDOW
+        client.spin_until(lambda: cycles(diagnostics) >= end, TIMEOUT, 'cycles')
         last = bus_values(diagnostics[-1])
         share = (page_time(arm) - used) / (time.monotonic() - begin)
     late = ' / '.join(f'{float(last[key]) * 1e3:.2f}' for key in LATE) + ' ms'
@@ -78,13 +81,14 @@ def has_bus(diagnostics: list[DiagnosticArray]) -> bool:
     )
 
 
+def cycles(diagnostics: list[DiagnosticArray]) -> int:
+    """Return how many cycles there were until the last message; 0 where it has no bus."""
+    return int(bus_values(diagnostics[-1])['cycles']) if has_bus(diagnostics) else 0
+
+
 def page_time(arm: RunningProcess) -> float:
     """Return the processor time in [s] of the arm's page; 0 where there is none."""
-    return sum(
-        sum(child.cpu_times()[:2])
-        for child in psutil.Process(arm.pid).children(recursive=True)
-        if any(word.endswith('/web_viewer') for word in child.cmdline())
-    )
+    return sum(sum(viewer.cpu_times()[:2]) for viewer in browser.viewers_below(arm))
 
 
 if __name__ == '__main__':

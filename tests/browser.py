@@ -19,6 +19,7 @@ import psutil
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserType, Page
+    from processes import RunningProcess
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome')
 """What distributions call it."""
@@ -30,10 +31,31 @@ OPTIONS = [
 ]
 SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
 PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
+PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
+"""What a bring-up or demo prints of its page."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 330  # [px] width of the controls at the right
 TOP = 170  # [px] height of STOP and of messages
+
+
+def url_of(robot: RunningProcess, timeout: float) -> str:
+    """Wait for the URL of the page that a bring-up or demo prints, and return it.
+
+    Args:
+        robot: The bring-up or demo.
+        timeout: Longest time in [s].
+    """
+    return robot.wait_for(PAGE_URL, timeout).rpartition(' ')[2]
+
+
+def viewers_below(robot: RunningProcess) -> list[psutil.Process]:
+    """Return the processes that serve the page of a bring-up or demo."""
+    return [
+        child
+        for child in psutil.Process(robot.pid).children(recursive=True)
+        if any(word.endswith('/web_viewer') for word in child.cmdline())
+    ]
 
 
 def lacking() -> str:

@@ -145,7 +145,7 @@ def seen() -> Iterator[Seen]:
         ]
         command += ['--can', isolation.bus, '--timeout', f'{STARTING:g}']
         with RunningProcess(command, isolation.env | {'NO_VIEW': ''}) as bringup:
-            line = bringup.wait_for(r'the robot is seen at http://localhost:\d+$', STARTING)
+            url = chromium.url_of(bringup, STARTING)
             bringup.wait_for('are enabled', STARTING)
             states: deque[tuple[float, JointState]] = deque(maxlen=500)
             client.node.create_subscription(
@@ -156,7 +156,6 @@ def seen() -> Iterator[Seen]:
             )
             client.spin_until(lambda: bool(states), REACTION, 'joint states')
             with chromium.browser() as browser:
-                url = line.rpartition(' ')[2]
                 yield Seen(browser, url, chromium.open_page(browser, url), client, states)
 
 

@@ -9,8 +9,8 @@ import socket
 from typing import TYPE_CHECKING
 from urllib.request import urlopen
 
+from browser import url_of, viewers_below
 from processes import executable, RunningProcess
-import psutil
 import pytest
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.scenario, pytest.mark.timeout(180)]
 
-SEEN = r'the robot is seen at (http://localhost:\d+)$'
 STARTING = 60.0  # [s]
 SHARED = '/dev/shm/fastrtps'
 
@@ -29,20 +28,6 @@ def start(
     """Start a bring-up or demo with its page, as a person does."""
     env = isolation.env | {'NO_VIEW': no_view}
     return RunningProcess([executable(package, program), *arguments], env)
-
-
-def url_of(robot: RunningProcess) -> str:
-    """Wait for the URL that is printed, and return it."""
-    return robot.wait_for(SEEN, STARTING).rpartition(' ')[2]
-
-
-def viewers_below(robot: RunningProcess) -> list[psutil.Process]:
-    """Return the processes of its page."""
-    return [
-        child
-        for child in psutil.Process(robot.pid).children(recursive=True)
-        if any(word.endswith('/web_viewer') for word in child.cmdline())
-    ]
 
 
 def is_open(url: str) -> bool:
@@ -58,7 +43,7 @@ def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> N
         start(isolation, 'arm_bringup', 'bringup', *arm) as left,
         start(isolation, 'quad_bringup', 'bringup', '--simulate', '--namespace', 'dog') as dog,
     ):
-        urls = [url_of(left), url_of(dog)]
+        urls = [url_of(robot, STARTING) for robot in (left, dog)]
         assert urls[0] != urls[1]
         for url in urls:
             with urlopen(url, timeout=20.0) as page:  # noqa: S310  # it begins with http
@@ -80,7 +65,7 @@ def test_a_page_that_hangs_does_not_hold_the_end_up(isolation: Isolation) -> Non
     """It is killed, and the demo has ended well."""
     arguments = ['panda', '--duration', '6', '--can', isolation.bus]
     with start(isolation, 'arm_bringup', 'demo', *arguments) as demo:
-        demo_url = url_of(demo)
+        demo_url = url_of(demo, STARTING)
         (viewer,) = viewers_below(demo)
         viewer.suspend()
         assert demo.wait(STARTING) == 0, demo.output

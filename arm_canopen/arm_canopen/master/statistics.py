@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
+WINDOW = 2000  # cycles that the percentiles look back
+
 
 @dataclass(frozen=True, slots=True)
 class CycleFigures:
@@ -32,7 +34,7 @@ class CycleFigures:
 class CycleStatistics:
     """Collects the lateness of each cycle against its deadline."""
 
-    def __init__(self, period: float, window: int = 2000) -> None:
+    def __init__(self, period: float, window: int = WINDOW) -> None:
         """Start empty.
 
         Args:
