@@ -46,6 +46,7 @@ setup(
     install_requires=[
         'PyYAML>=6',
         sibling('arm_canopen'),
+        sibling('libraries/first_motion'),
     ],
     extras_require={
         'test': ['pytest'],  # colcon test runs pytest where it is named

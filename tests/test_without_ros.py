@@ -49,6 +49,7 @@ IMPORTED = [
     'canopen_sim',
     'canopen_tools',
     'demo_runner',
+    'first_motion',
     'message_definitions',
     'operator_input',
     'process_supervisor',

@@ -1,41 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The pure core of the first motion: guard, judgement, correction of a bus.yml."""
+"""Set-points of a first motion in the modes 7 and 8, and the correction of a bus.yml."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 import math
 from pathlib import Path
 
 from config_samples import DRIVE_ROWS, eds_text
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-import yaml
 
 from arm_canopen import AxisFeedback, DriveState, load_bus, Refusal, RefusalCause
-from arm_canopen.config.model.drive import DriveConfig
-from canopen_tools.first_motion.bus_edit import BusEditError, edited
-from canopen_tools.first_motion.correction import apply, Correction
-from canopen_tools.first_motion.guard import (
-    IDLE_TIME,
-    LOOP_GAP,
-    MotionGuard,
-    MotionPlan,
-    Order,
-    Outcome,
-    Sample,
-    STALL_TIME,
-)
-from canopen_tools.first_motion.joint_units import JointKind, read_quantity
-from canopen_tools.first_motion.judgement import CAUSES, DriveFacts, judge, Seen, Verdict
-from canopen_tools.first_motion.scales import corrected
+from canopen_tools.first_motion.correction import apply
 from canopen_tools.first_motion.slow_motion import PERMIT, RAMP_TIME, SlowMotion
+from first_motion import AxisScales, Cause, Judgement, propose, Verdict
 
-PERIOD = 0.03  # [s]
-PLAN = MotionPlan(start=0.5, distance=0.02, speed=0.01, increment=1e-4, others={'elbow': 1.0})
-FACTS = DriveFacts(scale=1000.0)
 BUS = """\
 # mine
 master: {node_id: 1, driver: ros2_canopen::MasterDriver, package: canopen_master_driver}
@@ -53,125 +34,6 @@ nodes:
     # behind the others
     node_id: 4
 """
-
-
-class Joint:
-    """A joint that follows its guard at a constant speed."""
-
-    def __init__(self, plan: MotionPlan, now: float = 100.0) -> None:
-        self.guard = MotionGuard(plan, now)
-        self.now = now
-        self.position = plan.start
-        self.moves = False
-
-    def step(self, *, held: bool, factor: float = 1.0, gap: float = PERIOD) -> Order:
-        """Advance; the joint does what was ordered before."""
-        plan = self.guard.plan
-        self.now += gap
-        if self.moves:
-            step = math.copysign(plan.speed * gap, plan.distance) * factor
-            left = plan.target - self.position
-            self.position += left if step * left > 0 and abs(left) < abs(step) else step
-        order = self.guard.step(self.now, Sample(self.position), held=held, busy=False)
-        if order is not Order.NONE:
-            self.moves = order is Order.GO
-        return order
-
-
-@given(
-    keys=st.lists(st.booleans(), max_size=400),
-    distance=st.floats(0.005, 0.1),
-    sign=st.sampled_from((1, -1)),
-)
-def test_the_joint_moves_only_while_the_key_is_held(
-    keys: list[bool], distance: float, sign: int
-) -> None:
-    """Whatever the person does: one order at each edge, and never a motion without the key."""
-    joint = Joint(MotionPlan(0.5, sign * distance, 0.01, 1e-4))
-    for held in keys:
-        order = joint.step(held=held)
-        assert joint.guard.moving is joint.moves
-        assert not (joint.moves and not held)
-        if order is Order.END:
-            assert joint.guard.outcome is Outcome.REACHED
-            assert abs(joint.position - joint.guard.plan.target) <= 0.03 * distance + 1e-4
-            return
-    assert joint.guard.outcome is Outcome.RUNNING
-
-
-def test_a_held_up_loop_is_a_release() -> None:
-    """The key has to be pressed anew: nobody was asked meanwhile."""
-    joint = Joint(PLAN)
-    assert joint.step(held=True) is Order.GO
-    assert joint.step(held=True, gap=LOOP_GAP * 1.1, factor=0.1) is Order.HALT
-    assert joint.step(held=True) is Order.NONE
-    assert joint.step(held=False) is Order.NONE
-    assert joint.step(held=True) is Order.GO
-
-
-def test_a_busy_drive_is_halted_but_not_ordered_to_go() -> None:
-    """A halt may not wait for anything."""
-    guard = MotionGuard(PLAN, 0.0)
-    sample = Sample(PLAN.start)
-    assert guard.step(0.1, sample, held=True, busy=True) is Order.NONE
-    assert guard.step(0.2, sample, held=True, busy=False) is Order.GO
-    assert guard.step(0.3, sample, held=False, busy=True) is Order.HALT
-
-
-@pytest.mark.parametrize(
-    ('factor', 'outcome'),
-    [
-        (1.0, Outcome.REACHED),
-        (-1.0, Outcome.OTHER_WAY),
-        (5.0, Outcome.TOO_FAST),
-        (0.0, Outcome.STALLED),
-    ],
-)
-def test_what_ends_a_motion(factor: float, outcome: Outcome) -> None:
-    """By what the drive reports."""
-    joint = Joint(PLAN)
-    steps = 0
-    while joint.step(held=True, factor=factor) is not Order.END:
-        steps += 1
-        assert steps * PERIOD < STALL_TIME + 3.0
-    assert joint.guard.outcome is outcome
-    assert joint.guard.outcome.is_judged is (outcome in {Outcome.REACHED, Outcome.STALLED})
-
-
-@pytest.mark.parametrize(
-    ('sample', 'outcome', 'words'),
-    [
-        (Sample(0.5, problem='fault: it is hot'), Outcome.PROBLEM, 'it is hot'),
-        (Sample(math.nan), Outcome.PROBLEM, 'no position'),
-        (Sample(0.5, following_error=-0.02), Outcome.FOLLOWING_ERROR, 'does not follow'),
-        (Sample(0.5, others={'elbow': 1.02}), Outcome.OTHER_JOINT, 'elbow'),
-        (Sample(0.53), Outcome.TOO_FAR, '50%'),
-    ],
-)
-def test_errors_end_a_motion_with_their_reason(
-    sample: Sample, outcome: Outcome, words: str
-) -> None:
-    """Even while no key is held: what moves by itself has to be stopped, too."""
-    plan = MotionPlan(0.5, 0.02, 0.01, 1e-4, following_limit=0.01, others={'elbow': 1.0})
-    guard = MotionGuard(plan, 0.0)
-    assert guard.step(0.03, sample, held=False, busy=False) is Order.END
-    assert guard.outcome is outcome
-    assert words in guard.detail
-    assert guard.step(0.06, Sample(0.5), held=True, busy=False) is Order.END
-
-
-def test_nobody_there_and_enough() -> None:
-    """It does not wait without end; Enter ends it before the target."""
-    guard = MotionGuard(PLAN, 0.0)
-    assert guard.step(IDLE_TIME + 1, Sample(PLAN.start), held=False, busy=False) is Order.END
-    assert guard.outcome is Outcome.IDLE
-    guard = MotionGuard(PLAN, 0.0)
-    assert guard.finish() is Order.END
-    assert guard.outcome is Outcome.IDLE
-    guard = MotionGuard(PLAN, 0.0)
-    assert guard.step(0.1, Sample(PLAN.start), held=True, busy=False) is Order.GO
-    assert guard.finish() is Order.END
-    assert guard.outcome is Outcome.FINISHED
 
 
 def feedback(position: float, *, followable: bool = True) -> list[AxisFeedback]:
@@ -220,107 +82,6 @@ def test_a_drive_that_was_taken_away_gets_nothing() -> None:
     assert motion.problem == 'shoulder is faulted: hot'
 
 
-@given(
-    cause=st.sampled_from(CAUSES),
-    by_eye=st.floats(0.85, 1.15),
-    reported=st.floats(0.01, 0.1) | st.floats(-0.1, -0.01),
-    sign=st.sampled_from((1, -1)),
-)
-def test_a_usual_mistake_is_found_by_an_estimate(
-    cause: object, by_eye: float, reported: float, sign: int
-) -> None:
-    """By eye, with an error of 15 %; the correction makes what is reported what is seen."""
-    assert isinstance(cause, type(CAUSES[0]))
-    kind = min(cause.kinds, key=lambda each: each.value)
-    truth = cause.factor * reported * sign
-    seen = Seen(1 if truth > 0 else -1, abs(truth) * by_eye)
-    judgement = judge(kind, reported, reported, seen, FACTS)
-    wanted = Verdict.WRONG_SCALE if sign > 0 else Verdict.WRONG_SIGN_AND_SCALE
-    assert judgement.verdict is wanted
-    assert judgement.causes[0] == cause
-    axis = DriveConfig(scale_pos_to_dev=1000.0, scale_pos_from_dev=0.001)
-    values = corrected(axis, judgement.sign, judgement.causes[0].factor)
-    increments = reported * axis.scale_pos_to_dev
-    assert increments * values['scale_pos_from_dev'] == pytest.approx(truth)
-    assert truth * values['scale_pos_to_dev'] == pytest.approx(increments)
-
-
-@given(
-    by_eye=st.floats(0.75, 1.3),
-    reported=st.floats(0.01, 0.1) | st.floats(-0.1, -0.01),
-    sign=st.sampled_from((1, -1)),
-    gear=st.none() | st.floats(2.0, 200.0),
-    distance=st.booleans(),
-)
-def test_a_right_scale_is_left_alone(
-    by_eye: float, reported: float, sign: int, gear: float | None, *, distance: bool
-) -> None:
-    """Whatever the gear; of the direction alone the sign is concluded."""
-    facts = DriveFacts(scale=1000.0, gear=gear, factor_scale=1000.0)
-    assume(gear is None or gear > 2.5)
-    seen = Seen(sign if reported > 0 else -sign, abs(reported) * by_eye if distance else None)
-    judgement = judge(JointKind.TURNS, reported, reported, seen, facts)
-    assert judgement.verdict is (Verdict.RIGHT if sign > 0 else Verdict.WRONG_SIGN)
-    assert judgement.sign == sign
-
-
-def test_what_the_drive_says_goes_before_the_usual_causes() -> None:
-    """A gear of 50 and 180/pi cannot be distinguished by eye: both are named."""
-    facts = DriveFacts(scale=1000.0, gear=50.0, factor_scale=50_000.0)
-    judgement = judge(JointKind.TURNS, 0.02, 0.02, Seen(1, 0.02 / 53), facts)
-    assert [round(1 / cause.factor, 1) for cause in judgement.causes] == [50.0, 57.3]
-    assert 'factor group' in judgement.causes[0].text
-    unusual = judge(JointKind.TURNS, 0.02, 0.02, Seen(1, 0.02 * 17), FACTS)
-    assert unusual.verdict is Verdict.WRONG_SCALE
-    assert unusual.causes == ()
-    assert unusual.measured == pytest.approx(17)
-
-
-@pytest.mark.parametrize(
-    ('reported', 'seen', 'verdict', 'words'),
-    [
-        (0.0, Seen(0), Verdict.NO_MOTION, 'brake'),
-        (0.02, Seen(0), Verdict.ENCODER_ONLY, 'larger --distance'),
-        (0.001, Seen(1), Verdict.NOT_REPORTED, 'encoder'),
-        (0.02, Seen(0, other_joint=True), Verdict.OTHER_JOINT, 'node_id'),
-    ],
-)
-def test_what_no_scale_explains_has_a_remedy(
-    reported: float, seen: Seen, verdict: Verdict, words: str
-) -> None:
-    """And changes nothing in bus.yml."""
-    judgement = judge(JointKind.TURNS, 0.02, reported, seen, FACTS)
-    assert judgement.verdict is verdict
-    assert not verdict.wants_change
-    assert words in judgement.remedy
-
-
-def test_corrected_scales() -> None:
-    """Torque turns with the position; a velocity in other units keeps its size, zero its place."""
-    axis = DriveConfig(
-        scale_pos_to_dev=100.0,
-        scale_pos_from_dev=0.01,
-        scale_vel_to_dev=9.55,
-        scale_vel_from_dev=1 / 9.55,
-        offset_pos_from_dev=0.5,
-        scale_from_factor_group=True,
-    )
-    values = corrected(axis, -1, 0.25)
-    assert values == {
-        'scale_from_factor_group': False,
-        'scale_pos_to_dev': -400.0,
-        'scale_pos_from_dev': -0.0025,
-        'scale_vel_to_dev': -9.55,
-        'scale_vel_from_dev': pytest.approx(-1 / 9.55),
-        'scale_eff_to_dev': -1.0,
-        'scale_eff_from_dev': -1.0,
-        'offset_pos_from_dev': -0.125,
-    }
-    assert 'scale_eff_to_dev' not in corrected(DriveConfig(), 1, 2.0)
-    odd = DriveConfig(scale_pos_to_dev=-1000.0, scale_pos_from_dev=-0.001)
-    assert 'scale_eff_to_dev' not in corrected(odd, -1, 1.0)
-
-
 @pytest.mark.parametrize('device', ['shoulder', 'elbow', 'wrist'])
 def test_a_bus_yml_is_changed_in_place(device: str, tmp_path: Path) -> None:
     """Keys of one device; every comment, and every other line, stays as it is."""
@@ -329,10 +90,12 @@ def test_a_bus_yml_is_changed_in_place(device: str, tmp_path: Path) -> None:
     path.write_text(BUS)
     path.chmod(0o640)
     before = {node.name: node.drive for node in load_bus(path).nodes}
-    values = corrected(before[device], -1, 4.0)
-    apply(Correction(device, device, None, values, 'why'), path)
+    judgement = Judgement(Verdict.WRONG_SIGN_AND_SCALE, -1, 4.0)
+    scales = AxisScales.of(before[device])
+    correction = propose(scales, judgement, Cause(4.0, 'four edges'))
+    apply(correction, path, device, device, None)
     after = {node.name: node.drive for node in load_bus(path).nodes}
-    for key, value in values.items():
+    for key, value in correction.values.items():
         assert getattr(after[device], key) == value
     assert {name: each for name, each in after.items() if name != device} == {
         name: each for name, each in before.items() if name != device
@@ -340,83 +103,9 @@ def test_a_bus_yml_is_changed_in_place(device: str, tmp_path: Path) -> None:
     text = path.read_text()
     for comment in ('# mine', '# the first one', '# by hand', '# short', '# behind the others'):
         assert comment in text
+    reason = '# first motion: the sign was wrong, and four edges; scale_pos_to_dev was'
+    assert (reason in text) is (device != 'elbow')  # which is written in a line
     changed = [line for line in BUS.splitlines() if line not in text.splitlines()]
     assert all('scale' in line or 'elbow' in line for line in changed)
     assert path.stat().st_mode & 0o777 == 0o640
     assert [each.name for each in tmp_path.iterdir() if each.suffix == '.new'] == []
-
-
-KEYS = st.sampled_from(('scale_pos_to_dev', 'scale_vel_to_dev', 'offset_pos_from_dev', 'period'))
-TEXTS = st.sampled_from(('1', "'two'", '[1, 2]', '{a: 1}', '"x: y"', '0x10'))
-
-
-@given(
-    own=st.dictionaries(KEYS, TEXTS, max_size=4),
-    values=st.dictionaries(KEYS, st.floats(0.1, 9e9) | st.booleans(), min_size=1, max_size=3),
-    flow=st.booleans(),
-    comments=st.lists(st.sampled_from(('', '  # one', '  # {two}: 3')), min_size=5, max_size=5),
-)
-def test_any_device_is_edited_as_yaml_means_it(
-    own: dict[str, str], values: dict[str, float | bool], *, flow: bool, comments: list[str]
-) -> None:
-    """The document is the same but for these keys, in block and in flow style."""
-    keys = {'node_id': '2', **own}
-    if flow:
-        body = ' {' + ', '.join(f'{key}: {text}' for key, text in keys.items()) + '}'
-    else:
-        pairs = zip(keys.items(), comments, strict=False)
-        body = ''.join(f'\n    {key}: {text}{comment}' for (key, text), comment in pairs)
-    text = f'nodes:\n  first:{body}\n  second: {{node_id: 3}}\n'
-    document = yaml.safe_load(text)
-    document['nodes']['first'] |= values
-    assert yaml.safe_load(edited(text, 'first', values, 'why', None)) == document
-
-
-@pytest.mark.parametrize(
-    ('text', 'channel', 'words'),
-    [
-        ('nodes: {a: &x {node_id: 2}, b: *x}', None, 'alias'),
-        ('nodes: {b: {node_id: 2, scale_pos_to_dev: *s}}', None, 'alias'),
-        ('nodes: {b: {node_id: 2}}', 1, 'no channels'),
-        ('nodes: {c: {node_id: 2}}', None, 'no keys of b'),
-    ],
-)
-def test_forms_that_are_left_to_the_person(text: str, channel: int | None, words: str) -> None:
-    """With what to write by hand."""
-    anchor = 'defaults: {scale_pos_to_dev: &s 2.0}\n' if '*s' in text else ''
-    with pytest.raises(BusEditError, match=rf'{words}.*scale_pos_to_dev: 5\.0|alias'):
-        edited(anchor + text, 'b', {'scale_pos_to_dev': 5.0}, 'why', channel)
-
-
-def test_channels_and_devices_beside_the_sections() -> None:
-    """As ros2_canopen has them, too."""
-    values: Mapping[str, float | bool] = {'scale_pos_to_dev': 5.0}
-    text = 'b:\n  node_id: 2\n  channels:\n    - {}\n    - {scale_pos_to_dev: 1.0}\n'
-    changed = yaml.safe_load(edited(text, 'b', values, 'why', 1))
-    assert changed['b']['channels'][1] == values
-    text = 'b:\n  node_id: 2\n'
-    assert yaml.safe_load(edited(text, 'b', values, 'why', None))['b'] == {'node_id': 2, **values}
-
-
-@pytest.mark.parametrize(
-    ('text', 'kind', 'value'),
-    [
-        ('1deg', JointKind.TURNS, math.radians(1)),
-        ('-2', JointKind.TURNS, -math.radians(2)),
-        ('0.5 rad', JointKind.TURNS, 0.5),
-        ('2mm', JointKind.SLIDES, 0.002),
-        ('.01m', JointKind.SLIDES, 0.01),
-    ],
-)
-def test_quantities(text: str, kind: JointKind, value: float) -> None:
-    """In the units of people; without one, in degrees."""
-    found = read_quantity(text)
-    assert found.kind is kind
-    assert found.value == pytest.approx(value)
-
-
-@pytest.mark.parametrize('text', ['', 'far', '1cm', '1 2', 'nan'])
-def test_what_is_no_quantity(text: str) -> None:
-    """The remedy is in the message."""
-    with pytest.raises(ValueError, match='write 1deg'):
-        read_quantity(text)

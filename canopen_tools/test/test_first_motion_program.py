@@ -27,8 +27,8 @@ from arm_canopen.config.model.factor_group import FactorGroup
 from canopen_sim import DeviceRunner, Fault, FaultInjection, simulated_devices
 from canopen_tools.cli.main import main
 from canopen_tools.first_motion.checks import AxisFacts
-from canopen_tools.first_motion.guard import Outcome
 from canopen_tools.first_motion.motion import Record
+from first_motion import Outcome
 
 pytestmark = pytest.mark.slow
 

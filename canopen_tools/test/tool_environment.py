@@ -15,6 +15,7 @@ ENVIRONMENT = os.environ | {
             'arm_canopen',
             'canopen_tools',
             'libraries/black_box',
+            'libraries/first_motion',
             'libraries/operator_input',
             'libraries/realtime_loop',
         )

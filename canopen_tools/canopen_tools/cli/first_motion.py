@@ -7,7 +7,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..first_motion.joint_units import JointKind, Quantity, read_quantity
+from first_motion import JointKind, Quantity, read_quantity
+
 from .arguments import add_bus_argument, SubParsers, UsageError
 
 DISTANCE = '1deg'

@@ -14,16 +14,10 @@ from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, r
 from arm_canopen.exceptions import DriveError, ObjectError, SdoError
 from arm_canopen.standard.objects import AXIS_OFFSET, Index
 from arm_canopen.standard.target_objects import CYCLIC_MODES
-
-from .joint_units import JointKind
+from first_motion import FASTEST, JointKind, too_few_increments
 
 TURNS_MAX = 20.0  # turns from 0 beyond which a position is hardly one of an arm
 LENGTH_MAX = 10.0  # [m] likewise
-INCREMENTS_MIN = 4  # of the drive that a motion has to have to be seen
-FASTEST = {JointKind.TURNS: math.radians(5.0), JointKind.SLIDES: 0.01}
-"""Speeds above which this is no first motion, in [rad/s] and [m/s]."""
-FURTHEST = {JointKind.TURNS: math.radians(20.0), JointKind.SLIDES: 0.05}
-"""Distances likewise, in [rad] and [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +122,8 @@ def obstacles(
             f'the target {kind.shown(target)} is beyond the software limits of the drive, {low} '
             f'to {high} (0x607D); give --distance with the other sign, or correct 0x607D'
         )
-    increments = abs(distance * axis.scale_pos_to_dev)
-    if increments < INCREMENTS_MIN:
-        yield (
-            f'{kind.shown(distance)} are {increments:.2g} increments, too few to be seen; correct '
-            'scale_pos_to_dev, or give a larger --distance'
-        )
+    if few := too_few_increments(kind, distance, axis.scale_pos_to_dev):
+        yield few
     if facts.speed > FASTEST[kind]:
         yield (
             f'one velocity unit of the drive is {kind.shown(1.0 / abs(axis.scale_vel_to_dev))}/s, '

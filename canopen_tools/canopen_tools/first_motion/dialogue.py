@@ -10,9 +10,7 @@ import sys
 import textwrap
 
 from arm_canopen import CanopenError
-
-from .joint_units import JointKind, read_quantity
-from .judgement import Cause, Seen
+from first_motion import Cause, JointKind, read_quantity, Seen
 
 WIDTH_MIN = 40  # [characters]
 

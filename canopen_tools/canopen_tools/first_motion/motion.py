@@ -16,13 +16,12 @@ from arm_canopen import CanopenDrive, CanopenError, CanopenMaster, DriveState, E
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import BootError
 from arm_canopen.standard.target_objects import CYCLIC_MODES
+from first_motion import JointKind, MotionGuard, MotionPlan, Order, Outcome, Quantity, Sample
 from operator_input import HeldKeys, Keyboard, ReleaseSource, status_text, Style, TerminalError
 
 from .checks import AxisFacts, doubts, motion_mode, obstacles, read_facts
 from .dialogue import agrees, FirstMotionError, say
-from .guard import MotionGuard, MotionPlan, Order, Outcome, Sample
 from .interruptions import Interruptions
-from .joint_units import JointKind, Quantity
 from .movers import CyclicMover, Mover, ProfileMover
 
 PERIOD = 0.03  # [s] between two looks at the drive

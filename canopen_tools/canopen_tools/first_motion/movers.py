@@ -13,8 +13,8 @@ from arm_canopen import CanopenError, CanopenMaster
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import DriveError, ObjectError, SdoError
 from arm_canopen.standard.objects import AXIS_OFFSET, Index
+from first_motion import MotionPlan
 
-from .guard import MotionPlan
 from .slow_motion import PERMIT, SlowMotion
 
 

@@ -5,21 +5,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-import math
 import signal
 import sys
 
 from arm_canopen import BusConfig, load_bus, NodeConfig
 from arm_canopen.config.model.drive import DriveConfig
+from first_motion import (
+    AxisScales,
+    DriveFacts,
+    FASTEST,
+    FURTHEST,
+    JointKind,
+    judge,
+    Judgement,
+    propose,
+    Verdict,
+)
 
-from .checks import FASTEST, FURTHEST
-from .correction import apply, Correction
+from .correction import apply
 from .dialogue import agrees, ask_seen, choose, FirstMotionError, say
 from .interruptions import Interrupted, Interruptions
-from .joint_units import JointKind
-from .judgement import DriveFacts, judge, Judgement, Verdict
 from .motion import move, Record, Request
-from .scales import corrected
 
 
 def run(request: Request) -> int:
@@ -124,42 +130,30 @@ def _correct(
     Returns:
         Whether it was made.
     """
-    factor, why, certain = _factor(judgement)
-    if factor is None:
-        return False
-    # what the file says decides which keys change; what the drive says, the values before
-    current = replace(record.facts.axis, scale_from_factor_group=axis.scale_from_factor_group)
-    values = corrected(current, judgement.sign, factor)
-    say(f'In {request.path}, at {node.name}:')
-    for key, value in values.items():
-        before = getattr(current, key)
-        say(f'  {key}: {before!r} -> {value!r}' if before != value else f'  {key}: {value!r}')
-    if not math.isclose(abs(axis.scale_vel_to_dev), abs(axis.scale_pos_to_dev)) and factor != 1.0:
-        say('  scale_vel_to_dev is in other units than increments per second: check it, too')
-    say('  limits 0x607D are in increments: those that were computed with the old scale are wrong')
-    if not (request.write and certain) and not agrees('change them?'):
-        return False
-    channel = axis.channel if len(node.axes) > 1 else None
-    reason = f'canopen first-motion: {why}; scale_pos_to_dev was {current.scale_pos_to_dev!r}'
-    apply(Correction(node.name, request.joint, channel, values, reason), request.path)
-    say(f'{request.path} is changed')
-    return True
-
-
-def _factor(judgement: Judgement) -> tuple[float | None, str, bool]:
-    """Choose the factor of the scale, its reason, and whether it is beyond doubt."""
-    turned = 'the sign was wrong'
-    if judgement.verdict is Verdict.WRONG_SIGN:
-        return 1.0, turned, True
-    sign = f'{turned}, and ' if judgement.sign < 0 else ''
-    causes = judgement.causes
-    if not causes:
+    causes, is_certain = judgement.causes, judgement.verdict is Verdict.WRONG_SIGN
+    cause = None
+    if causes:
+        is_certain = len(causes) == 1
+        cause = causes[0] if is_certain else choose(causes)
+        if cause is None:
+            return False
+    elif not is_certain:
         say(
             f'  no usual cause has the factor {judgement.measured:.3g}; as it was seen by eye, '
             'measure it over a larger --distance before you keep it'
         )
-        return judgement.measured, f'{sign}the scale by {judgement.measured:.4g}, by eye', False
-    chosen = causes[0] if len(causes) == 1 else choose(causes)
-    if chosen is None:
-        return None, '', False
-    return chosen.factor, f'{sign}{chosen.text}', len(causes) == 1
+    # what the file says decides which keys change; what the drive says, the values before
+    current = replace(record.facts.axis, scale_from_factor_group=axis.scale_from_factor_group)
+    correction = propose(AxisScales.of(current), judgement, cause)
+    say(f'In {request.path}, at {node.name}:')
+    for key, value in correction.values.items():
+        before = correction.before[key]
+        say(f'  {key}: {before!r} -> {value!r}' if before != value else f'  {key}: {value!r}')
+    for note in correction.notes:
+        say(f'  {note}')
+    if not (request.write and is_certain) and not agrees('change them?'):
+        return False
+    channel = axis.channel if len(node.axes) > 1 else None
+    apply(correction, request.path, node.name, request.joint, channel)
+    say(f'{request.path} is changed')
+    return True

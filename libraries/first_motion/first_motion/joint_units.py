@@ -28,6 +28,11 @@ class JointKind(Enum):
         return f'{value / self.size:.4g} {self.value}'
 
 
+FASTEST = {JointKind.TURNS: math.radians(5.0), JointKind.SLIDES: 0.01}
+"""Speeds above which this is no first motion, in [rad/s] and [m/s]."""
+FURTHEST = {JointKind.TURNS: math.radians(20.0), JointKind.SLIDES: 0.05}
+"""Distances likewise, in [rad] and [m]."""
+INCREMENTS_MIN = 4  # of the drive that a motion has to have to be seen
 UNITS: dict[str, tuple[JointKind, float]] = {
     'deg': (JointKind.TURNS, math.pi / 180.0),
     'rad': (JointKind.TURNS, 1.0),
@@ -61,3 +66,20 @@ def read_quantity(text: str, kind: JointKind = JointKind.TURNS) -> Quantity:
         raise ValueError(f'{text!r} is no distance; write 1deg, 0.02rad or 2mm')
     found, size = UNITS[match['unit'] or kind.value]
     return Quantity(found, float(match['number']) * size)
+
+
+def too_few_increments(kind: JointKind, distance: float, scale: float) -> str:
+    """Return why a distance cannot be seen; empty when it can.
+
+    Args:
+        kind: What the joint does.
+        distance: How far it shall go, in [rad] or [m].
+        scale: Increments per [rad] or [m].
+    """
+    increments = abs(distance * scale)
+    if increments >= INCREMENTS_MIN:
+        return ''
+    return (
+        f'{kind.shown(distance)} are {increments:.2g} increments, too few to be seen; correct '
+        'scale_pos_to_dev, or take a larger distance'
+    )

@@ -4,18 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import yaml
 
-from arm_canopen.exceptions import CanopenError
+from .exceptions import BusEditError
 
 NOT_DEVICES = frozenset({'options', 'master', 'defaults', 'nodes'})
-
-
-class BusEditError(CanopenError):
-    """The file has a form in which we change nothing; the message says what to write by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +49,39 @@ def edited(
         BusEditError: The device is an alias, or its axes have no ``channels`` to write to.
     """
     section = _section(text, device, channel, values)
-    if section.flow_style:
-        return _spliced(text, _in_flow(section, values))
-    return _spliced(text, _in_block(section, values, reason))
+    in_flow = section.flow_style
+    splices = _in_flow(section, values) if in_flow else _in_block(section, values, reason)
+    new = _spliced(text, splices)
+    section = _section(new, device, channel, values)
+    for name, value in values.items():
+        found = _value(section, name)
+        if not isinstance(found, yaml.ScalarNode) or found.value != yaml_text(value):
+            raise BusEditError(
+                f'{name} of {device} is not where it was expected; write by hand: '
+                f'{name}: {yaml_text(value)}'
+            )
+    return new
+
+
+def replace_file(
+    path: Path, edit: Callable[[str], str], check: Callable[[Path], None] = lambda path: None
+) -> None:
+    """Change a file; it is replaced as a whole, or not at all.
+
+    Args:
+        path: The file.
+        edit: Returns the new text for the one that it has.
+        check: Looks at the new file, and raises where it must not take the place of the old one.
+    """
+    text = edit(path.read_text(encoding='utf-8'))
+    new = path.with_name(f'{path.name}.new')
+    try:
+        new.write_text(text, encoding='utf-8')
+        check(new)
+        new.chmod(path.stat().st_mode)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
 
 
 def _section(
@@ -65,7 +92,7 @@ def _section(
     key, found = _pair(nodes if nodes is not None else root, device)
     if found is None and device not in NOT_DEVICES:
         key, found = _pair(root, device)
-    wanted = ', '.join(f'{name}: {_written(value)}' for name, value in values.items())
+    wanted = ', '.join(f'{name}: {yaml_text(value)}' for name, value in values.items())
     if not isinstance(found, yaml.MappingNode) or key is None or not found.value:
         raise BusEditError(f'no keys of {device} to change; write by hand: {wanted}')
     if found.start_mark.index < key.start_mark.index:
@@ -101,7 +128,7 @@ def _in_flow(section: yaml.MappingNode, values: Mapping[str, float | bool]) -> l
     changed = _replacements(section, values)
     new = [name for name in values if _value(section, name) is None]
     last = section.value[-1][1].end_mark.index
-    added = ''.join(f', {name}: {_written(values[name])}' for name in new)
+    added = ''.join(f', {name}: {yaml_text(values[name])}' for name in new)
     return [*changed, _Splice(last, last, added)] if added else changed
 
 
@@ -116,7 +143,7 @@ def _in_block(
     comment = f'# {reason}\n{indent}'
     if new:
         # before the first key: what stands behind its value may be a comment or a block
-        lines = ''.join(f'{name}: {_written(values[name])}\n{indent}' for name in new)
+        lines = ''.join(f'{name}: {yaml_text(values[name])}\n{indent}' for name in new)
         splices.append(_Splice(first.index, first.index, comment + lines))
     elif old:
         start = min(key.start_mark.index for key in old)
@@ -129,7 +156,7 @@ def _replacements(section: yaml.MappingNode, values: Mapping[str, float | bool])
     for key, value in section.value:
         if not isinstance(key, yaml.ScalarNode) or key.value not in values:
             continue
-        written = _written(values[key.value])
+        written = yaml_text(values[key.value])
         if value.start_mark.index < key.start_mark.index:
             raise BusEditError(
                 f'{key.value} is an alias (*); write by hand: {key.value}: {written}'
@@ -144,5 +171,9 @@ def _spliced(text: str, splices: list[_Splice]) -> str:
     return text
 
 
-def _written(value: float | bool) -> str:
-    return str(value).lower() if isinstance(value, bool) else repr(value)
+def yaml_text(value: float | bool) -> str:
+    """Write a value as YAML 1.1 reads it; 2e-05 were a text there, 2.0e-05 is a number."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    mantissa, exponent, power = repr(value).partition('e')
+    return f'{mantissa}{"" if "." in mantissa or not exponent else ".0"}{exponent}{power}'

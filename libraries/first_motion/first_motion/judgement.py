@@ -166,14 +166,14 @@ def _still(*, moved: bool) -> Judgement:
         return Judgement(
             Verdict.ENCODER_ONLY,
             remedy='either the motion is too small to be seen, so that the scale has too few '
-            'increments per unit: repeat it with a larger --distance and say how far it went; or '
+            'increments per unit: repeat it over a larger distance and say how far it went; or '
             'the motor turns and the joint does not: look at the coupling between them',
         )
     return Judgement(
         Verdict.NO_MOTION,
         remedy='look at the brake (does the drive release it, 0x60FE?), at the safe torque off, '
         'at the torque limit 0x6072, and whether the scale has far too few increments per unit: '
-        'then repeat it with a larger --distance',
+        'then repeat it over a larger distance',
     )
 
 

@@ -1,0 +1,44 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The first motion of a joint: guarded while it moves, then judged by what a person has seen.
+
+`guard` decides, `judgement` concludes, `scales`, `correction` and `bus_edit` correct: without a
+clock, bus or terminal, so that a terminal and a page conclude the same.
+"""
+
+from .bus_edit import edited, replace_file, yaml_text
+from .correction import Correction, propose
+from .exceptions import BusEditError
+from .guard import MotionGuard, MotionPlan, Order, Outcome, Sample
+from .joint_units import FASTEST, FURTHEST, JointKind, Quantity, read_quantity, too_few_increments
+from .judgement import Cause, CAUSES, DriveFacts, judge, Judgement, Seen, Verdict
+from .scales import AxisScales, corrected
+
+__all__ = [
+    'CAUSES',
+    'FASTEST',
+    'FURTHEST',
+    'AxisScales',
+    'BusEditError',
+    'Cause',
+    'Correction',
+    'DriveFacts',
+    'JointKind',
+    'Judgement',
+    'MotionGuard',
+    'MotionPlan',
+    'Order',
+    'Outcome',
+    'Quantity',
+    'Sample',
+    'Seen',
+    'Verdict',
+    'corrected',
+    'edited',
+    'judge',
+    'propose',
+    'read_quantity',
+    'replace_file',
+    'too_few_increments',
+    'yaml_text',
+]
