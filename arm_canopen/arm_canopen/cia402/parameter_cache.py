@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from ..config.model.checks.drive_units import is_coarse
 from ..config.model.drive import DriveConfig
+from ..config.model.factor_group import FactorGroup
 from ..exceptions import SdoError
 from ..master.remote_node import RemoteNode
 from ..master.scheduler import Promise, Scheduler, Task
@@ -59,6 +60,10 @@ class ParameterCache:
     def begin(self) -> None:
         """Read those of a device that was booted."""
         self._reading = self._scheduler.background(self._keep_reading())
+
+    async def factor_group(self) -> FactorGroup:
+        """Read what the drive says about its increments; SdoError when it does not answer."""
+        return await self._reader.factor_group()
 
     def forget(self, reason: str) -> None:
         """The device is lost; what comes back may be another one."""

@@ -127,6 +127,16 @@ class ParameterReader:
             units=self._units_from,
         )
 
+    async def factor_group(self) -> FactorGroup:
+        """Read what the drive says about its increments.
+
+        Raises:
+            SdoError: It does not answer.
+        """
+        return FactorGroup(
+            **{name: await self._ratio(index) for name, index in FACTOR_OBJECTS.items()}
+        )
+
     async def _profile_velocity(self) -> int | None:
         if self._node.image.mapped_output(Index.PROFILE_VELOCITY + self._offset) is not None:
             return None
@@ -163,8 +173,7 @@ class ParameterReader:
 
     async def _read_units(self) -> str:
         """Take the units of the factor group (CiA 402-2, clause 8); report where they are from."""
-        ratios = {name: await self._ratio(index) for name, index in FACTOR_OBJECTS.items()}
-        factors = FactorGroup(**ratios)
+        factors = await self.factor_group()
         scale, velocity_scale = factors.position_scale, factors.velocity_scale
         if not scale:
             raise SdoError(

@@ -49,6 +49,11 @@ class Units:
         return _to_integer(position, scaled, INT32_MAX)
 
     @property
+    def config(self) -> DriveConfig:
+        """The axis, with the factors that count."""
+        return self._config
+
+    @property
     def position_scale(self) -> float:
         """Increments per user unit."""
         return self._config.scale_pos_to_dev

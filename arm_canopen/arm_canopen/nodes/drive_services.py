@@ -11,6 +11,7 @@ from ..master.runner import NetworkThread
 from .axis_services import AxisServices
 from .device_node import DeviceNode
 from .joint_states import DriveJointStates
+from .units_service import BusFile, UnitsService
 
 
 class DriveServices:
@@ -22,7 +23,11 @@ class DriveServices:
     """
 
     def __init__(
-        self, node: DeviceNode, axes: Sequence[DriveCommands], thread: NetworkThread
+        self,
+        node: DeviceNode,
+        axes: Sequence[DriveCommands],
+        thread: NetworkThread,
+        file: BusFile,
     ) -> None:
         """Offer the services.
 
@@ -30,10 +35,16 @@ class DriveServices:
             node: The node of the device.
             axes: Commands of its axes.
             thread: The thread of its network.
+            file: The bus.yml.
         """
         self.axes = [commands.drive for commands in axes]
         self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
+        places = ['~' if len(axes) == 1 else axis.name for axis in self.axes]
         self._services = [
-            AxisServices(node, commands, '~' if len(axes) == 1 else axis.name, thread)
-            for commands, axis in zip(axes, self.axes, strict=True)
+            AxisServices(node, commands, place, thread)
+            for commands, place in zip(axes, places, strict=True)
+        ]
+        self._units = [
+            UnitsService(node, axis, place, thread, file)
+            for axis, place in zip(self.axes, places, strict=True)
         ]

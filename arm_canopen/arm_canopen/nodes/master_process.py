@@ -31,6 +31,7 @@ from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
 from .output_thread import OutputThread
+from .units_service import BusFile
 
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
 LAST_DIAGNOSTICS_TIMEOUT = 0.5  # [s] for the last /diagnostics
@@ -79,8 +80,9 @@ class MasterProcess:
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
         }
+        file = BusFile.at(config.file)
         self._drives = {
-            name: DriveServices(each, self._master.axes(each.device), self._thread)
+            name: DriveServices(each, self._master.axes(each.device), self._thread, file)
             for name, each in self._devices.items()
             if each.device.config.is_drive
         }
