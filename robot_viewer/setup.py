@@ -43,7 +43,13 @@ setup(
     install_requires=[sibling('libraries/urdf_reader')],
     extras_require={
         'test': ['pytest'],
-        'page': ['numpy', 'trimesh', 'viser', 'websockets'],
+        'page': [
+            'numpy',
+            'trimesh',
+            'viser',
+            'websockets',
+            sibling('libraries/first_motion'),
+        ],
         'foxglove': ['foxglove-sdk>=0.30'],
         'ros': [sibling('libraries/message_definitions'), sibling('libraries/node_runner')],
     },

@@ -42,6 +42,7 @@ from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot
 from .body import Body
 from .controllers import Controllers
+from .first_motion import FirstMotion
 from .listening import Listening
 from .motion_planning import MotionPlanning
 
@@ -117,6 +118,9 @@ class WebViewer(Node):
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
         self._body = Body(self, self.page, self._listening, self._positions)
+        self._first_motion = FirstMotion(
+            self, self.page, self._positions, self._statuses, self._order
+        )
         self._planning = MotionPlanning(self, self.page, self._positions, self._order)
         self.create_subscription(String, 'robot_description', self._describe, LATCHED)
         sensor = qos_profile_sensor_data
@@ -143,6 +147,7 @@ class WebViewer(Node):
         self._velocities = greatest_velocities(tree)
         notes = self.page.show_robot(tree)
         self._planning.describe(tree)
+        self._first_motion.describe(tree)
         self._body.describe(tree)
         for note in notes:
             self.get_logger().warning(f'not shown: {note}')
@@ -150,6 +155,7 @@ class WebViewer(Node):
     def _take_joints(self, message: JointState) -> None:
         if not self._own:
             self._received_at = time.monotonic()
+        self._first_motion.take(message.name)
         self._positions.update(zip(message.name, message.position, strict=False))
 
     def _take_transforms(self, message: TFMessage) -> None:
@@ -173,8 +179,9 @@ class WebViewer(Node):
         while self._orders:
             self._orders.popleft()()
         self._controllers.advance(self._velocities)
+        self._first_motion.advance()
         watched = self.page.watched
-        looked_at = watched or self._controllers.busy
+        looked_at = watched or self._controllers.busy or self._first_motion.busy
         if self._listening.update(time.monotonic(), looked_at=looked_at):
             self._received_at = None  # what is known is old
         if watched:
@@ -201,6 +208,7 @@ class WebViewer(Node):
         for name, controller in self._controllers.found.items():
             self.page.follow(name, busy=controller.busy, positions=controller.positions)
         self._body.list()
+        self._first_motion.list()
         self.page.plot(self._controllers.history, time.monotonic())
 
     # -- what the robot offers
@@ -208,6 +216,7 @@ class WebViewer(Node):
     def _look_around(self) -> None:
         services = dict(self.get_service_names_and_types())
         self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
+        self._first_motion.look(services, self._drives)
         self._find_jogging()
         self._controllers.look(self.resolve_topic_name('robot_description'))
         for name, controller in self._controllers.found.items():
@@ -295,6 +304,7 @@ class WebViewer(Node):
 
     def _stop(self) -> None:
         self._controllers.stop()
+        self._first_motion.stop()
         for drive in self._drives:
             self._call(f'{drive}/halt')
         self._planning.stop()

@@ -26,10 +26,13 @@ from viser import (
     ViserServer,
 )
 
+from first_motion import JointKind as MotionKind
+
 from .aim import History
 from .body_panel import BodyPanel
 from .deadman import Deadman, HEARTBEAT
 from .drive_table import drive_html
+from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
 from .motion_plan import PlanRequest
 from .overlay import Overlay
@@ -161,6 +164,7 @@ class RobotPage:
         self._plots: PlotPanel | None = None
         self._plan: PlanPanel | None = None
         self._body: BodyPanel | None = None
+        self._first_motion: FirstMotionPanel | None = None
         self._tree: KinematicTree | None = None
 
     @property
@@ -341,6 +345,21 @@ class RobotPage:
             self._body = BodyPanel(self._server, self._scene.path_of(self._tree.root))
         return self._body
 
+    def offer_first_motion(
+        self, joints: Mapping[str, MotionKind], actions: FirstMotionActions
+    ) -> FirstMotionPanel:
+        """Offer the first motion of joints, in the place of those before.
+
+        Args:
+            joints: What they do.
+            actions: What people do, in any thread.
+        """
+        if self._first_motion is not None:
+            self._first_motion.remove()
+        with self._tab('First motion'):
+            self._first_motion = FirstMotionPanel(self._server, joints, actions, self._held)
+        return self._first_motion
+
     def offer_jog(self) -> None:
         """Offer to jog the tool as long as a button is held."""
         if not self._offer('Jog'):
@@ -391,7 +410,9 @@ class RobotPage:
     def _speed(self) -> GuiSliderHandle[float]:
         return self._server.gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
 
-    def _held(self, label: str, act: Callable[[], None], rest: Callable[[], None]) -> None:
+    def _held(
+        self, label: str, act: Callable[[], None], rest: Callable[[], None]
+    ) -> GuiButtonHandle:
         """Add a button that acts as long as it is held, and rests when it is let go."""
 
         def beat(event: GuiEvent[GuiButtonHandle]) -> None:
@@ -405,6 +426,7 @@ class RobotPage:
         button = self._server.gui.add_button(label, hint='hold it')
         button.on_hold(beat, 1.0 / HEARTBEAT)
         button.on_click(release)  # a click ends where the button is let go
+        return button
 
     def _jog(self, speed: GuiSliderHandle[float], twist: Twist) -> None:
         x, y, z, a, b, c = (speed.value / 100.0 * part for part in twist)

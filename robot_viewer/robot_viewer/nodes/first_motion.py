@@ -1,0 +1,388 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The first motion of a joint, for people at the page: services and topics of its drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+import math
+from pathlib import Path
+import time
+from typing import Any, Protocol
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+from urdf_reader import JointKind as UrdfKind
+from urdf_reader import KinematicTree
+
+from first_motion import (
+    AxisScales,
+    Cause,
+    Correction,
+    DriveFacts,
+    JointKind,
+    judge,
+    Judgement,
+    MotionPlan,
+    Order,
+    Sample,
+    too_few_increments,
+    Verdict,
+)
+
+from ..page.first_motion import (
+    announcement,
+    Axis,
+    BusPlace,
+    correction_lines,
+    correction_of,
+    GuardedTargets,
+    MotionRequest,
+    problem_of,
+    Saw,
+)
+from ..page.first_motion_panel import FirstMotionActions, FirstMotionPanel
+from ..page.robot_page import Status
+
+READ_UNITS = 'read_units'
+READ_UNITS_TYPE = 'arm_msgs/srv/ReadUnits'
+STATUS_TIMEOUT, SILENCE_TIMEOUT = 3.0, 10.0
+"""Times in [s] after the enabling, in which /diagnostics has to show it, and to say anything."""
+SETTLE_TIME = 0.7
+"""Time in [s] after the last target, until the position is read: the robot's own time-out and its
+ramp are in it."""
+
+
+class Page(Protocol):
+    """Where it is shown."""
+
+    def offer_first_motion(
+        self, joints: Mapping[str, JointKind], actions: FirstMotionActions
+    ) -> FirstMotionPanel:
+        """Offer it for these joints, in the place of those before."""
+
+
+class FirstMotion:
+    """One joint after another; everything in the thread of the node, and nothing waits.
+
+    Targets go to ``~/target`` of the drive, as those of any client: one for each heartbeat of the
+    held button. When they end the drive halts by itself (``target_timeout_ms`` of bus.yml).
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        page: Page,
+        positions: Mapping[str, float],
+        statuses: Mapping[str, Status],
+        order: Callable[[Callable[[], None]], None],
+    ) -> None:
+        """Find no drive yet.
+
+        Args:
+            node: The node of the page.
+            page: The page.
+            positions: Where the joints are in [rad] or [m], always the last ones.
+            statuses: What came on /diagnostics, by name, always the last ones.
+            order: Has something done in the thread of the node.
+        """
+        self._node, self._page, self._order = node, page, order
+        self._positions, self._statuses = positions, statuses
+        self._kinds: Mapping[str, JointKind] = {}
+        self._drives: Mapping[str, str] = {}
+        self._panel: FirstMotionPanel | None = None
+        self._publishers: dict[str, Publisher] = {}
+        self._attempt = 0  # what is answered for an earlier one counts no more
+        self._request = MotionRequest('', 0.0, 0.0)
+        self._axis: Axis | None = None
+        self._seen_at = -math.inf  # when a position of the joint came
+        self._enabled: tuple[float, Status | None] | None = None  # when, and the status before
+        self._targets: GuardedTargets | None = None
+        self._rests_at: float | None = None  # when the position after the motion is read
+        self._reported: float | None = None
+        self._judgement: Judgement | None = None
+        self._correction: Correction | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether positions matter, also for a page that was closed."""
+        return self._enabled is not None or self._targets is not None
+
+    # -- what the robot offers
+
+    def describe(self, tree: KinematicTree) -> None:
+        """Another robot is shown."""
+        self._kinds = {
+            joint.name: JointKind.SLIDES if joint.kind is UrdfKind.PRISMATIC else JointKind.TURNS
+            for joint in tree.movable()
+            if joint.mimic is None
+        }
+
+    def look(self, services: Mapping[str, Sequence[str]], drives: Collection[str]) -> None:
+        """Find the drives that say how they count.
+
+        Args:
+            services: All services of the graph, with their types.
+            drives: Names below which the drives of the robot have theirs.
+        """
+        found = {
+            drive.rpartition('/')[2]: drive
+            for drive in sorted(drives)
+            if READ_UNITS_TYPE in services.get(f'{drive}/{READ_UNITS}', ())
+        }
+        found = {joint: found[joint] for joint in self._kinds if joint in found}
+        if not found or found == self._drives:
+            return
+        self._end()
+        self._drives = found
+        kinds = {joint: self._kinds[joint] for joint in found}
+        self._panel = self._page.offer_first_motion(kinds, self)
+
+    def take(self, names: Sequence[str]) -> None:
+        """Take note of the joints of which a position has come."""
+        if self._request.joint in names:
+            self._seen_at = time.monotonic()
+
+    # -- what people do, in any thread
+
+    def prepare(self, request: MotionRequest) -> None:
+        """Enable the drive, and say what will happen."""
+        self._order(partial(self._prepare, request))
+
+    def beat(self) -> None:
+        """Take a heartbeat of the held button that counts."""
+        self._order(partial(self._beat, time.monotonic()))
+
+    def release(self) -> None:
+        """The button was let go."""
+        self._order(self._release)
+
+    def finish(self) -> None:
+        """It is enough: end the motion before its target."""
+        self._order(self._finish)
+
+    def conclude(self, saw: Saw, distance: float) -> None:
+        """Conclude from what was seen."""
+        self._order(partial(self._conclude, saw, distance))
+
+    def choose(self, cause: Cause) -> None:
+        """Take one of several causes."""
+        self._order(partial(self._propose, cause))
+
+    def write(self) -> None:
+        """Change bus.yml."""
+        self._order(self._write)
+
+    # -- before the motion
+
+    def stop(self) -> None:
+        """Command nothing any more: the robot was stopped."""
+        if self._end():
+            self._begin('stopped; prepare it anew')
+
+    def _end(self) -> bool:
+        """Forget what was prepared; return whether something was."""
+        was = self.busy
+        self._attempt += 1
+        self._enabled = self._targets = self._rests_at = self._reported = None
+        self._judgement = self._correction = None
+        return was
+
+    def _begin(self, text: str, *, failed: bool = False) -> None:
+        if self._panel is not None:
+            self._panel.begin(text, failed=failed)
+
+    def _fail(self, why: str) -> None:
+        self._end()
+        self._begin(f'{self._request.joint}: {why}', failed=True)
+        self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
+
+    def _prepare(self, request: MotionRequest) -> None:
+        self._end()
+        if self._panel is None or request.joint not in self._drives:
+            return
+        self._request, self._seen_at = request, -math.inf
+        self._panel.show_preparing()
+        kind = import_module('arm_msgs.srv').ReadUnits
+        self._call(kind, READ_UNITS, self._take_units)
+
+    def _call(self, kind: Any, name: str, take: Callable[[Any], None]) -> None:  # noqa: ANN401
+        """Call a service of the drive; an answer to an attempt that is over is dropped."""
+        client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
+        attempt = self._attempt
+
+        def answered(future: Future) -> None:
+            self._node.destroy_client(client)
+            if attempt != self._attempt:
+                return
+            response = None if future.exception() is not None else future.result()
+            if response is None or not response.success:
+                self._fail(f'{name}: {"no answer" if response is None else response.message}')
+                return
+            take(response)
+
+        client.call_async(kind.Request()).add_done_callback(answered)
+
+    def _take_units(self, response: Any) -> None:  # noqa: ANN401
+        kind = self._kinds[self._request.joint]
+        scales = AxisScales.of(response)
+        says = DriveFacts(
+            scales.scale_pos_to_dev, response.gear or None, response.factor_scale or None
+        )
+        place = BusPlace(
+            Path(response.bus_config),
+            response.bus_config_inode,
+            response.bus_config_changed,
+            response.device,
+            None if response.channel < 0 else response.channel,
+        )
+        self._axis = Axis(kind, scales, says, place)
+        if few := too_few_increments(kind, self._request.distance, scales.scale_pos_to_dev):
+            self._fail(few)
+            return
+        self._call(Trigger, 'enable', self._enabled_now)
+
+    def _enabled_now(self, _response: Trigger.Response) -> None:
+        """The drive is enabled; what is known of it is older."""
+        self._enabled = time.monotonic(), self._status()
+
+    def _status(self) -> Status | None:
+        return self._statuses.get(f'{self._request.joint}: drive')
+
+    def _problem(self) -> str:
+        status = self._status()
+        values = {} if status is None else status.values
+        return problem_of(values, time.monotonic() - self._seen_at)
+
+    def _await_status(self, since: float, before: Status | None) -> None:
+        """Offer the motion once /diagnostics shows a drive that takes targets."""
+        silent = self._status() is before
+        problem = 'nothing came on /diagnostics' if silent else self._problem()
+        if not problem:
+            self._enabled = None
+            self._ready()
+        elif time.monotonic() - since > (SILENCE_TIMEOUT if silent else STATUS_TIMEOUT):
+            self._fail(problem)
+
+    def _ready(self) -> None:
+        axis, request, positions = self._axis, self._request, self._positions
+        if self._panel is None or axis is None:
+            return
+        others = {
+            name: positions[name]
+            for name in self._drives
+            if name != request.joint and name in positions
+        }
+        plan = MotionPlan(
+            start=positions[request.joint],
+            distance=request.distance,
+            speed=request.speed,
+            increment=abs(axis.scales.scale_pos_from_dev),
+            others=others,
+        )
+        self._targets = GuardedTargets(plan, time.monotonic())
+        self._panel.show_ready(list(announcement(request, axis, plan.start)))
+
+    # -- the motion
+
+    def _beat(self, at: float) -> None:
+        if self._targets is not None:
+            self._targets.beat(at)
+
+    def _release(self) -> None:
+        if self._targets is not None:
+            self._targets.release()
+
+    def _finish(self) -> None:
+        if self._targets is not None and self._targets.guard.finish() is Order.END:
+            self._targets.release()
+
+    def advance(self) -> None:
+        """Go on; called 30 times a second."""
+        now = time.monotonic()
+        if self._enabled is not None:
+            self._await_status(*self._enabled)
+        elif self._rests_at is not None:
+            if now >= self._rests_at:
+                self._ask()
+        elif self._targets is not None:
+            self._move(self._targets, now)
+
+    def _move(self, targets: GuardedTargets, now: float) -> None:
+        guard = targets.guard
+        others = {name: self._positions[name] for name in guard.plan.others}
+        position = self._positions[self._request.joint]
+        target = targets.step(now, Sample(position, problem=self._problem(), others=others))
+        if target is not None:
+            self._publisher().publish(Float64(data=target))
+        if not guard.detail:
+            return
+        if guard.outcome.is_judged:
+            self._rests_at = now + SETTLE_TIME
+            return
+        detail = guard.detail
+        # what moves as nobody has commanded is left without power, as at the terminal
+        self._fail(f'{detail}; the drive is stopped and disabled')
+        self._call(Trigger, 'shutdown', lambda _: None)
+
+    def list(self) -> None:
+        """Show how far it is; called some times a second."""
+        if self._targets is not None and self._rests_at is None and self._panel is not None:
+            self._panel.show_progress(self._targets.guard)
+
+    def _publisher(self) -> Publisher:
+        topic = f'{self._drives[self._request.joint]}/target'
+        if topic not in self._publishers:
+            self._publishers[topic] = self._node.create_publisher(Float64, topic, 1)
+        return self._publishers[topic]
+
+    # -- after the motion
+
+    def _ask(self) -> None:
+        if self._targets is None or self._panel is None:
+            return
+        guard = self._targets.guard
+        self._reported = self._positions[self._request.joint] - guard.plan.start
+        self._targets = self._rests_at = None
+        self._panel.ask(guard.detail, self._reported)
+
+    def _conclude(self, saw: Saw, distance: float) -> None:
+        axis, reported = self._axis, self._reported
+        if axis is None or reported is None or self._panel is None:
+            return
+        seen = saw.seen(reported, distance)
+        judgement = judge(axis.kind, self._request.distance, reported, seen, axis.says)
+        self._judgement, self._correction = judgement, None
+        text = f'first motion of {self._request.joint}: {judgement.verdict.value}'
+        self._node.get_logger().info(text)
+        self._panel.show_judgement(judgement, right=judgement.verdict is Verdict.RIGHT)
+        causes = judgement.causes
+        self._propose(causes[0] if len(causes) == 1 else None)
+
+    def _propose(self, cause: Cause | None) -> None:
+        axis, judgement = self._axis, self._judgement
+        if axis is None or judgement is None or self._panel is None:
+            return
+        self._correction = correction_of(axis, judgement, cause)
+        if self._correction is None:
+            return
+        lines = correction_lines(axis.place, self._correction)
+        here = axis.place.is_here
+        self._panel.show_correction(lines, self._correction.notes, writable=here)
+
+    def _write(self) -> None:
+        if self._axis is None or self._correction is None or self._panel is None:
+            return
+        try:
+            self._axis.place.write(self._correction)
+        except (OSError, ValueError) as error:
+            self._panel.show_written(str(error), failed=True)
+            return
+        text = f'{self._axis.place.path} is written; restart the robot, which has the old scales'
+        self._node.get_logger().info(text)
+        self._panel.show_written(text, failed=False)

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A first motion on the page: targets while a button is held, and the words that are shown.
+
+Positions in [rad] or [m], times on one steady clock in [s]. The library first_motion guards,
+concludes and corrects; a drive is commanded as by any client, by a stream of targets that the
+robot itself stops when it pauses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+import math
+from pathlib import Path
+
+from first_motion import (
+    AxisScales,
+    Cause,
+    Correction,
+    DriveFacts,
+    edited,
+    JointKind,
+    Judgement,
+    MotionGuard,
+    MotionPlan,
+    Order,
+    propose,
+    replace_file,
+    Sample,
+    Seen,
+    yaml_text,
+)
+
+RELEASED_AFTER = 0.15
+"""Time in [s] without a heartbeat after which the button counts as let go."""
+MAX_STEP_TIME = 0.1
+"""Longest time in [s] for which one heartbeat moves the target on: one that is late moves it no
+farther."""
+FRESHNESS = 0.5
+"""Age in [s] from which a position is too old to go on."""
+NO_POSITION = 'its position does not arrive on joint_states'
+ENABLED = 'Operation enabled'
+"""State of a drive that takes targets, as /diagnostics has it."""
+
+
+class Saw(Enum):
+    """What a person saw; the value is what he chooses."""
+
+    LIKE_PICTURE = 'it moved like the robot in the picture'
+    OTHER_WAY = 'it moved the other way'
+    NOTHING = 'nothing moved'
+    OTHER_JOINT = 'another joint moved'
+
+    def seen(self, reported: float, distance: float) -> Seen:
+        """Return what that is for the judgement.
+
+        Args:
+            reported: What the drive reports, which is what the picture shows.
+            distance: How far about it was.
+        """
+        if self in {Saw.NOTHING, Saw.OTHER_JOINT}:
+            return Seen(0, other_joint=self is Saw.OTHER_JOINT)
+        shown = 1 if reported >= 0.0 else -1
+        direction = shown if self is Saw.LIKE_PICTURE else -shown
+        return Seen(direction, distance or None)
+
+
+@dataclass(frozen=True, slots=True)
+class MotionRequest:
+    """The motion that a person requests.
+
+    Attributes:
+        joint: Name of the joint.
+        distance: How far; negative for the other way.
+        speed: How fast, per second.
+    """
+
+    joint: str
+    distance: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class BusPlace:
+    """Where the scales of an axis are written.
+
+    Attributes:
+        path: The bus.yml, on the computer of the robot.
+        inode: Its inode when the robot was started.
+        changed: When it was changed last then, in [ns].
+        device: Section of the device.
+        channel: Place of the axis in its channels; None for a device with one axis.
+    """
+
+    path: Path
+    inode: int
+    changed: int
+    device: str
+    channel: int | None
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this process sees the very file that the robot was started with."""
+        try:
+            stat = self.path.stat()
+        except OSError:
+            return False
+        return (stat.st_ino, stat.st_mtime_ns) == (self.inode, self.changed)
+
+    def write(self, correction: Correction) -> None:
+        """Change the keys in the file.
+
+        Raises:
+            OSError: It cannot be written.
+            BusEditError: It has a form in which nothing is changed.
+            ValueError: It is not the file that the robot was started with.
+        """
+        if not self.is_here:
+            raise ValueError(f'{self.path} was changed since the robot was started: restart it')
+        edit = partial(
+            edited,
+            device=self.device,
+            values=correction.values,
+            reason=correction.reason,
+            channel=self.channel,
+        )
+        replace_file(self.path, edit)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """How a joint counts.
+
+    Attributes:
+        kind: What it does.
+        scales: Those that the master uses.
+        says: What the drive says about its increments.
+        place: Where they are written.
+    """
+
+    kind: JointKind
+    scales: AxisScales
+    says: DriveFacts
+    place: BusPlace
+
+
+class GuardedTargets:
+    """Targets of one motion: at most one for each heartbeat, and none without.
+
+    Attributes:
+        guard: Decides whether the joint may move on.
+    """
+
+    def __init__(self, plan: MotionPlan, now: float) -> None:
+        """Begin at rest.
+
+        Args:
+            plan: The motion.
+            now: Time.
+        """
+        self.guard = MotionGuard(plan, now)
+        self._target = plan.start
+        self._beat = self._used = -math.inf
+
+    def beat(self, now: float) -> None:
+        """Take a heartbeat of the held button that counts."""
+        self._beat = now
+
+    def release(self) -> None:
+        """The button was let go."""
+        self._beat = -math.inf
+
+    def step(self, now: float, sample: Sample) -> float | None:
+        """Return the next target; None to command nothing.
+
+        Args:
+            now: Time.
+            sample: What the drives report.
+        """
+        held = now - self._beat < RELEASED_AFTER
+        order = self.guard.step(now, sample, held=held, busy=False)
+        if order is Order.GO:
+            # from where it stands, whatever was commanded before; a single touch moves nothing
+            self._target, self._used = sample.position, self._beat
+        if not self.guard.moving or self._beat <= self._used:
+            return None
+        plan = self.guard.plan
+        gap = min(self._beat - self._used, MAX_STEP_TIME)
+        self._used = self._beat
+        left = plan.target - self._target
+        self._target += math.copysign(min(plan.speed * gap, abs(left)), left)
+        return self._target
+
+
+def problem_of(drive: Mapping[str, str], age: float) -> str:
+    """Return why a drive cannot be moved, with the remedy; empty when it can.
+
+    Args:
+        drive: Values of its status in /diagnostics.
+        age: Of its position.
+    """
+    if age > FRESHNESS:
+        return NO_POSITION
+    state, mode = drive.get('state', ''), drive.get('mode', '')
+    if state != ENABLED:
+        return f'it is not enabled ({state or "no diagnostics"}): see Drives and Status'
+    if 'position' not in mode.lower():
+        return f'it is in {mode or "no mode"}: select a position mode below Drives'
+    return ''
+
+
+def announcement(request: MotionRequest, axis: Axis, position: float) -> Iterator[str]:
+    """Yield what will happen, a paragraph each."""
+    kind = axis.kind
+    unit = 'rad' if kind is JointKind.TURNS else 'm'
+    yield (
+        f'{request.joint} stands at {kind.shown(position)}; {axis.scales.scale_pos_to_dev:g} '
+        f'increments per {unit} by {_source(axis)}'
+    )
+    yield (
+        f'It will move {kind.shown(request.distance)}, with {kind.shown(request.speed)}/s, only '
+        'while you hold the button. Should the scale be wrong it moves farther, faster or the '
+        'other way: look at the real joint, keep the emergency stop in reach, and let go when it '
+        'is enough.'
+    )
+
+
+def _source(axis: Axis) -> str:
+    return 'the factor group' if axis.scales.scale_from_factor_group else 'bus.yml'
+
+
+def correction_of(axis: Axis, judgement: Judgement, cause: Cause | None) -> Correction | None:
+    """Return what corrects a sign or scale; None where a person has to choose a cause first."""
+    if not judgement.verdict.wants_change or (judgement.causes and cause is None):
+        return None
+    return propose(axis.scales, judgement, cause)
+
+
+def correction_lines(place: BusPlace, correction: Correction) -> str:
+    """Return the lines of the file, to be copied."""
+    where = place.device if place.channel is None else f'{place.device}, channel {place.channel}'
+    lines = [f'# {place.path}, {where}', f'# {correction.reason}']
+    lines += [f'{key}: {yaml_text(value)}' for key, value in correction.values.items()]
+    return '\n'.join(lines)

@@ -1,0 +1,228 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The first motion of a joint on a page: what is requested, seen and concluded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Protocol
+
+from viser import GuiButtonHandle, GuiDropdownHandle, GuiHtmlHandle, GuiNumberHandle, ViserServer
+
+from first_motion import Cause, FASTEST, FURTHEST, JointKind, Judgement, MotionGuard
+
+from .first_motion import MotionRequest, Saw
+
+DISTANCE = 1.0
+"""In the unit of people, degrees or millimetres."""
+SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
+"""In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
+HOLD = 'Hold to move'
+PRESS_ANEW = 'let go of the button, and press it anew: this page was held up'
+CHOOSE = 'choose'
+GOOD, BAD, PLAIN = '#2f9e44', '#e03131', '#868e96'
+
+Hold = Callable[[str, Callable[[], None], Callable[[], None]], GuiButtonHandle]
+"""Adds a button that acts as long as it is held, and rests when it is let go."""
+
+
+class FirstMotionActions(Protocol):
+    """What people do; any thread may call it, and none of it waits."""
+
+    def prepare(self, request: MotionRequest) -> None:
+        """Enable the drive, and say what will happen."""
+
+    def beat(self) -> None:
+        """Take a heartbeat of the held button that counts."""
+
+    def release(self) -> None:
+        """The button was let go."""
+
+    def finish(self) -> None:
+        """It is enough: end the motion before its target."""
+
+    def conclude(self, saw: Saw, distance: float) -> None:
+        """Conclude from what was seen, and how far about it was in [rad] or [m]."""
+
+    def choose(self, cause: Cause) -> None:
+        """Take one of several causes."""
+
+    def write(self) -> None:
+        """Change bus.yml."""
+
+
+class FirstMotionPanel:
+    """Asks for what people do, and shows what it is given; it decides nothing."""
+
+    def __init__(
+        self,
+        server: ViserServer,
+        joints: Mapping[str, JointKind],
+        actions: FirstMotionActions,
+        hold: Hold,
+    ) -> None:
+        """Add it to the tab that is open.
+
+        Args:
+            server: Of the page.
+            joints: What the joints do that can be moved.
+            actions: What people do.
+            hold: Adds a button to hold.
+        """
+        self._joints, self._actions = joints, actions
+        self._kind = next(iter(joints.values()))
+        self._causes: Mapping[str, Cause] = {}
+        gui = server.gui
+        self._folder = gui.add_folder(None)
+        with self._folder:
+            self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
+            self._distance: GuiNumberHandle[float] = gui.add_number('Distance', DISTANCE, step=0.1)
+            self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
+            self._prepare = gui.add_button('Enable and prepare')
+            self._state: GuiHtmlHandle = gui.add_html('')
+            self._hold = hold(HOLD, actions.beat, actions.release)
+            self._enough = gui.add_button('That is enough')
+            self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
+                'What you saw', tuple(each.value for each in Saw)
+            )
+            self._far: GuiNumberHandle[float] = gui.add_number('How far', DISTANCE, step=0.01)
+            self._conclude = gui.add_button('Conclude')
+            self._verdict: GuiHtmlHandle = gui.add_html('')
+            self._cause: GuiDropdownHandle[str] = gui.add_dropdown('Cause', (CHOOSE,))
+            self._lines = gui.add_markdown('')
+            self._write = gui.add_button('Write it into bus.yml', color='orange')
+            self._note: GuiHtmlHandle = gui.add_html('')
+        self._joint.on_update(lambda _: self._use_units())
+        self._prepare.on_click(lambda _: self._ask())
+        self._enough.on_click(lambda _: actions.finish())
+        self._conclude.on_click(
+            lambda _: actions.conclude(
+                Saw(self._saw.value), abs(self._far.value) * self._kind.size
+            )
+        )
+        self._cause.on_update(lambda _: self._choose())
+        self._write.on_click(lambda _: actions.write())
+        self._use_units()
+        self.begin('', failed=False)
+
+    def remove(self) -> None:
+        """Take it off the page."""
+        self._folder.remove()
+
+    # -- what is shown
+
+    def begin(self, text: str, *, failed: bool) -> None:
+        """Show that nothing is prepared, and why."""
+        self._prepare.disabled = False
+        self._state.content = _line(text, BAD if failed else PLAIN) if text else ''
+        self._show(moves=False, asks=False, concluded=False)
+
+    def show_preparing(self) -> None:
+        """Show that the drive is asked."""
+        self._prepare.disabled = True
+        self._state.content = _line('asking the drive ...', PLAIN)
+        self._show(moves=False, asks=False, concluded=False)
+
+    def show_ready(self, announced: Sequence[str]) -> None:
+        """Show what will happen, and offer the button."""
+        self._prepare.disabled = False
+        self._state.content = ''.join(_line(text, PLAIN) for text in announced)
+        self._note.content = ''
+        self._show(moves=True, asks=False, concluded=False)
+
+    def show_progress(self, guard: MotionGuard) -> None:
+        """Show how far it is."""
+        kind, distance = self._kind, guard.plan.distance
+        way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(distance))}'
+        state, color = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
+        if guard.needs_release:
+            state, color = PRESS_ANEW, BAD
+        self._note.content = _line(f'{state}: {way}', color)
+
+    def ask(self, ended: str, reported: float) -> None:
+        """Ask what was seen of a motion that has ended.
+
+        Args:
+            ended: How it ended.
+            reported: How far the drive reports, in [rad] or [m].
+        """
+        kind = self._kind
+        self._state.content = _line(
+            f'{ended}; the drive reported {kind.shown(reported)}', PLAIN
+        ) + _line('What did the real joint do?', PLAIN)
+        self._far.value = round(abs(reported) / kind.size, 3)  # type: ignore[misc]
+        self._note.content = ''
+        self._show(moves=False, asks=True, concluded=False)
+
+    def show_judgement(self, judgement: Judgement, *, right: bool) -> None:
+        """Show what is concluded."""
+        causes = [f'{each.text} (factor {each.factor:.4g})' for each in judgement.causes]
+        texts = [judgement.remedy] if judgement.remedy else causes
+        self._verdict.content = _line(judgement.verdict.value, GOOD if right else BAD) + ''.join(
+            _line(text, PLAIN) for text in texts
+        )
+        self._causes = dict(zip(causes, judgement.causes, strict=True))
+        self._cause.options = (CHOOSE, *causes)
+        self._cause.value = CHOOSE  # type: ignore[misc]
+        self._show(moves=False, asks=True, concluded=True)
+        self._cause.visible = len(causes) > 1
+
+    def show_correction(self, lines: str, notes: Sequence[str], *, writable: bool) -> None:
+        """Show what to write.
+
+        Args:
+            lines: Of bus.yml.
+            notes: What else to look at.
+            writable: The file can be changed from here.
+        """
+        self._lines.content = f'```yaml\n{lines}\n```'
+        self._lines.visible = True
+        self._write.visible = writable
+        self._note.content = ''.join(_line(text, PLAIN) for text in notes)
+
+    def show_written(self, text: str, *, failed: bool) -> None:
+        """Show what became of the file."""
+        self._write.visible = False
+        self._note.content = _line(text, BAD if failed else GOOD)
+
+    def _show(self, *, moves: bool, asks: bool, concluded: bool) -> None:
+        for handle in (self._hold, self._enough):
+            handle.visible = moves
+        for question in (self._saw, self._far, self._conclude):
+            question.visible = asks
+        self._verdict.visible = concluded
+        self._cause.visible = self._lines.visible = self._write.visible = False
+        if not moves and not asks:
+            self._note.content = ''
+
+    # -- what people do
+
+    def _use_units(self) -> None:
+        kind = self._kind = self._joints[self._joint.value]
+        furthest, fastest = FURTHEST[kind] / kind.size, FASTEST[kind] / kind.size
+        self._distance.label = f'Distance [{kind.value}]'
+        self._distance.min, self._distance.max = -furthest, furthest
+        self._distance.value = DISTANCE  # type: ignore[misc]  # it has a setter
+        self._speed.label = f'Speed [{kind.value}/s]'
+        self._speed.min, self._speed.max, self._speed.step = 0.1, fastest, 0.1
+        self._speed.value = SPEEDS[kind]  # type: ignore[misc]
+        self._far.label = f'How far [{kind.value}]'
+
+    def _ask(self) -> None:
+        size = self._kind.size
+        self._actions.prepare(
+            MotionRequest(self._joint.value, self._distance.value * size, self._speed.value * size)
+        )
+
+    def _choose(self) -> None:
+        cause = self._causes.get(self._cause.value)
+        if cause is not None:
+            self._actions.choose(cause)
+
+
+def _line(text: str, color: str) -> str:
+    return (
+        f'<div style="margin:0.3em 1em"><span style="color:{color}">&#9679;</span> '
+        f'{escape(text)}</div>'
+    )

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The first motion of a joint on the page: a bus.yml that is wrong about drives on a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from pathlib import Path
+import time
+from typing import TYPE_CHECKING
+
+import browser as chromium
+from processes import executable, RunningProcess
+import pytest
+
+from arm_canopen import DriveState, load_bus
+from canopen_sim import DeviceRunner, simulated_devices
+from canopen_tools.cli.main import main as canopen
+from robot_viewer.page.first_motion import Saw
+from robot_viewer.page.first_motion_panel import HOLD, PRESS_ANEW
+
+if TYPE_CHECKING:
+    from isolation import Isolation
+    from playwright.sync_api import Page
+
+pytestmark = [
+    pytest.mark.scenario,
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking()),
+]
+
+DRIVE = Path(__file__).parents[1] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
+PER_TURN = 36_000  # [inc] of the joints, in truth
+STARTING = 60.0  # [s]
+REACTION = 20.0  # [s] on a busy machine
+REST = 0.5  # [s] without a motion
+TAB, PREPARE = 'First motion', 'Enable and prepare'
+ARM = """
+<robot name="arm">
+  <link name="base"><visual><geometry><box size="0.3 0.3 0.1"/></geometry></visual></link>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/> <child link="upper"/> <axis xyz="0 1 0"/>
+    <limit lower="-1.5" upper="1.5" velocity="1.0" effort="50"/>
+  </joint>
+  <link name="upper">
+    <visual>
+      <origin xyz="0 0 0.2"/> <geometry><cylinder radius="0.05" length="0.4"/></geometry>
+    </visual>
+  </link>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/> <child link="lower"/> <origin xyz="0 0 0.4"/> <axis xyz="0 1 0"/>
+    <limit lower="-2.0" upper="2.0" velocity="1.0" effort="30"/>
+  </joint>
+  <link name="lower">
+    <visual>
+      <origin xyz="0 0 0.2"/> <geometry><cylinder radius="0.04" length="0.4"/></geometry>
+    </visual>
+  </link>
+</robot>
+"""
+
+
+class Joint:
+    """The shoulder as it really is: what its motor does."""
+
+    def __init__(self, runner: DeviceRunner) -> None:
+        self._runner = runner
+
+    @property
+    def angle(self) -> float:
+        """Where it is in [deg]."""
+        drive = self._runner.host.device(2).drives[0]
+        return self._runner.call(lambda: drive.position).result(REACTION) * 360.0 / PER_TURN
+
+    @property
+    def state(self) -> DriveState:
+        """State of its drive."""
+        drive = self._runner.host.device(2).drives[0]
+        return self._runner.call(lambda: drive.state).result(REACTION)
+
+    def wait(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until something is so."""
+        deadline = time.monotonic() + REACTION
+        while not condition():
+            assert time.monotonic() < deadline, what
+            time.sleep(0.02)
+
+    def move(self, page: Page) -> None:
+        """Hold the button of the page until it has moved a little; it is held on."""
+        start = self.angle
+        chromium.hold(page, HOLD)
+
+        def moved() -> bool:
+            if page.get_by_text(PRESS_ANEW).is_visible():  # a busy machine
+                page.mouse.up()
+                page.get_by_text(PRESS_ANEW).wait_for(state='hidden')
+                page.mouse.down()
+            return abs(self.angle - start) > 0.1
+
+        self.wait(moved, 'a motion')
+
+    def wait_for_rest(self) -> None:
+        """Wait until it has stood for a while."""
+        last, since = self.angle, time.monotonic()
+
+        def rests() -> bool:
+            nonlocal last, since
+            if (now := self.angle) != last:
+                last, since = now, time.monotonic()
+            return time.monotonic() - since > REST
+
+        self.wait(rests, 'rest')
+
+
+def write_bus(folder: Path, per_turn: float) -> Path:
+    """Write a bus.yml of two joints, as a person does."""
+    path = folder / 'bus.yml'
+    joints = [f'{name}={DRIVE}@{node}' for node, name in ((2, 'shoulder'), (3, 'elbow'))]
+    turns = [f'--turn={name}={per_turn}' for name in ('shoulder', 'elbow')]
+    modes = [f'--mode={name}=8' for name in ('shoulder', 'elbow')]
+    assert canopen(['new', *joints, *turns, *modes, '--output', str(path)]) == 0
+    return path
+
+
+def prepare(page: Page, distance: str) -> None:
+    """Have a motion prepared; nothing moves yet."""
+    page.get_by_role('tab', name=TAB).click()
+    page.get_by_label('Distance [deg]').fill(distance)
+    page.get_by_label('Speed [deg/s]').fill('2')
+    page.keyboard.press('Tab')  # the number counts when it is left
+    page.get_by_role('button', name=PREPARE).click()
+    page.get_by_text('only while you hold the button').wait_for()
+
+
+def test_a_wrong_sign_and_scale_are_found_on_the_page(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """Nothing moves for a page that was killed, nor after STOP; bus.yml is right in the end."""
+    truth, folder = tmp_path / 'truth', tmp_path / 'arm'
+    simulated = write_bus(truth, PER_TURN)
+    bus_yml = write_bus(folder, -PER_TURN / 4)
+    (folder / 'arm.urdf').write_text(ARM)
+    command = [executable('arm_bringup', 'bringup'), str(folder), '--can', isolation.bus]
+    with (
+        simulated_devices(simulated, bus=isolation.bus) as runner,
+        RunningProcess([*command, '--enable'], isolation.env | {'NO_VIEW': ''}) as bringup,
+        chromium.browser() as browser,
+    ):
+        url = bringup.wait_for(r'seen at http://localhost:\d+$', STARTING).rpartition(' ')[2]
+        bringup.wait_for('are enabled', STARTING)
+        joint = Joint(runner)
+
+        others = chromium.processes()
+        page = chromium.open_page(chromium.launch(browser.browser_type), url)
+        prepare(page, '20')
+        assert joint.angle == 0.0
+        joint.move(page)
+        for process in chromium.processes():
+            if process not in others:
+                process.kill()
+        joint.wait_for_rest()
+        assert abs(joint.angle) < 4.0, '20 deg of the wrong scale are 5'
+
+        page = chromium.open_page(browser, url)
+        page.get_by_role('tab', name=TAB).click()
+        page.get_by_text('at rest').wait_for()
+        page.get_by_role('button', name='That is enough').click()
+        page.get_by_text('ended by you before the target').wait_for()
+        chromium.choose(page, 'What you saw', Saw.OTHER_WAY.value)
+        page.get_by_label('How far [deg]').fill(f'{abs(joint.angle):.1f}')
+        page.keyboard.press('Tab')
+        page.get_by_role('button', name='Conclude').click()
+        page.get_by_text('wrong sign and wrong scale').wait_for()
+        page.get_by_text('encoder lines in the place of their four edges').first.wait_for()
+        page.get_by_text('scale_pos_to_dev: 5729.57795131').wait_for()
+        chromium.picture(page, 'first-motion')
+
+        page.get_by_role('button', name='Write it into bus.yml').click()
+        page.get_by_text('is written; restart the robot').wait_for()
+        shoulder, elbow = (node.drive for node in load_bus(bus_yml).nodes)
+        assert shoulder.scale_pos_to_dev == pytest.approx(PER_TURN / math.tau)
+        assert elbow.scale_pos_to_dev == pytest.approx(-PER_TURN / 4 / math.tau)
+
+        prepare(page, '-20')
+        joint.move(page)
+        page.keyboard.press('Space')
+        joint.wait_for_rest()
+        page.get_by_text('stopped; prepare it anew').wait_for()
+        assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
+        page.mouse.up()
+        joint.wait_for_rest()
