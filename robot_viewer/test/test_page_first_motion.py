@@ -68,6 +68,7 @@ def test_a_touch_moves_nothing_and_a_late_heartbeat_no_farther() -> None:
     assert motion.step(10.1, Sample(0.5)) is None
     motion.beat(10.19)
     assert motion.step(10.2, Sample(0.5)) == pytest.approx(0.5 + 0.05 * (0.04 + MAX_STEP_TIME))
+    assert motion.commanded == pytest.approx(0.05 * (0.04 + MAX_STEP_TIME))
     motion.release()
     assert motion.step(10.23, Sample(0.505)) is None
     assert not motion.guard.moving

@@ -30,6 +30,7 @@ from first_motion import (
     Judgement,
     MotionPlan,
     Order,
+    Outcome,
     Sample,
     too_few_increments,
     Verdict,
@@ -100,10 +101,12 @@ class FirstMotion:
         self._attempt = 0  # what is answered for an earlier one counts no more
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
+        self._asking = False  # the drive, for its units and to be enabled
         self._seen_at = -math.inf  # when a position of the joint came
         self._enabled: tuple[float, Status | None] | None = None  # when, and the status before
         self._targets: GuardedTargets | None = None
         self._rests_at: float | None = None  # when the position after the motion is read
+        self._commanded = 0.0
         self._reported: float | None = None
         self._judgement: Judgement | None = None
         self._correction: Correction | None = None
@@ -111,7 +114,7 @@ class FirstMotion:
     @property
     def busy(self) -> bool:
         """Whether positions matter, also for a page that was closed."""
-        return self._enabled is not None or self._targets is not None
+        return self._asking or self._enabled is not None or self._targets is not None
 
     # -- what the robot offers
 
@@ -154,6 +157,10 @@ class FirstMotion:
         """Enable the drive, and say what will happen."""
         self._order(partial(self._prepare, request))
 
+    def forget(self) -> None:
+        """Another joint was chosen: what was prepared counts no more."""
+        self._order(self._forget)
+
     def beat(self) -> None:
         """Take a heartbeat of the held button that counts."""
         self._order(partial(self._beat, time.monotonic()))
@@ -189,9 +196,14 @@ class FirstMotion:
         """Forget what was prepared; return whether something was."""
         was = self.busy
         self._attempt += 1
+        self._asking = False
         self._enabled = self._targets = self._rests_at = self._reported = None
         self._judgement = self._correction = None
         return was
+
+    def _forget(self) -> None:
+        self._end()
+        self._begin('')
 
     def _begin(self, text: str, *, failed: bool = False) -> None:
         if self._panel is not None:
@@ -207,6 +219,7 @@ class FirstMotion:
         if self._panel is None or request.joint not in self._drives:
             return
         self._request, self._seen_at = request, -math.inf
+        self._asking = True
         self._panel.show_preparing()
         kind = import_module('arm_msgs.srv').ReadUnits
         self._call(kind, READ_UNITS, self._take_units)
@@ -249,6 +262,7 @@ class FirstMotion:
 
     def _enabled_now(self, _response: Trigger.Response) -> None:
         """The drive is enabled; what is known of it is older."""
+        self._asking = False
         self._enabled = time.monotonic(), self._status()
 
     def _status(self) -> Status | None:
@@ -325,6 +339,10 @@ class FirstMotion:
         if guard.outcome.is_judged:
             self._rests_at = now + SETTLE_TIME
             return
+        if guard.outcome is Outcome.IDLE:
+            self._end()
+            self._begin('the button was not held: prepare it anew')
+            return
         detail = guard.detail
         # what moves as nobody has commanded is left without power, as at the terminal
         self._fail(f'{detail}; the drive is stopped and disabled')
@@ -347,6 +365,7 @@ class FirstMotion:
         if self._targets is None or self._panel is None:
             return
         guard = self._targets.guard
+        self._commanded = self._targets.commanded
         self._reported = self._positions[self._request.joint] - guard.plan.start
         self._targets = self._rests_at = None
         self._panel.ask(guard.detail, self._reported)
@@ -356,7 +375,7 @@ class FirstMotion:
         if axis is None or reported is None or self._panel is None:
             return
         seen = saw.seen(reported, distance)
-        judgement = judge(axis.kind, self._request.distance, reported, seen, axis.says)
+        judgement = judge(axis.kind, self._commanded, reported, seen, axis.says)
         self._judgement, self._correction = judgement, None
         text = f'first motion of {self._request.joint}: {judgement.verdict.value}'
         self._node.get_logger().info(text)

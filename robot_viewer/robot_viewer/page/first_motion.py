@@ -165,6 +165,11 @@ class GuardedTargets:
         self._target = plan.start
         self._beat = self._used = -math.inf
 
+    @property
+    def commanded(self) -> float:
+        """How far it was commanded until now: a motion may be ended before its target."""
+        return self._target - self.guard.plan.start
+
     def beat(self, now: float) -> None:
         """Take a heartbeat of the held button that counts."""
         self._beat = now

@@ -33,6 +33,9 @@ class FirstMotionActions(Protocol):
     def prepare(self, request: MotionRequest) -> None:
         """Enable the drive, and say what will happen."""
 
+    def forget(self) -> None:
+        """Another joint was chosen: what was prepared counts no more."""
+
     def beat(self) -> None:
         """Take a heartbeat of the held button that counts."""
 
@@ -93,7 +96,7 @@ class FirstMotionPanel:
             self._lines = gui.add_markdown('')
             self._write = gui.add_button('Write it into bus.yml', color='orange')
             self._note: GuiHtmlHandle = gui.add_html('')
-        self._joint.on_update(lambda _: self._use_units())
+        self._joint.on_update(lambda _: self._select())
         self._prepare.on_click(lambda _: self._ask())
         self._enough.on_click(lambda _: actions.finish())
         self._conclude.on_click(
@@ -197,6 +200,10 @@ class FirstMotionPanel:
             self._note.content = ''
 
     # -- what people do
+
+    def _select(self) -> None:
+        self._actions.forget()
+        self._use_units()
 
     def _use_units(self) -> None:
         kind = self._kind = self._joints[self._joint.value]
