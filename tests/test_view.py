@@ -9,6 +9,7 @@ import socket
 from typing import TYPE_CHECKING
 from urllib.request import urlopen
 
+import browser as chromium
 from browser import url_of, viewers_below
 from processes import executable, RunningProcess
 import pytest
@@ -36,6 +37,21 @@ def is_open(url: str) -> bool:
         return client.connect_ex(('127.0.0.1', int(url.rpartition(':')[2]))) == 0
 
 
+def see_feet(url: str) -> None:
+    """Look at what the page of a quadruped says of its feet, where there is a browser."""
+    if chromium.lacking():
+        return
+    with chromium.browser() as browser:
+        page = chromium.open_page(browser, url)
+        page.get_by_role('tab', name='Walk').click()
+        page.get_by_role('button', name='stand', exact=True).click()
+        page.get_by_role('tab', name='Body').click()
+        page.get_by_text('feet on the ground: bl, br, fl, fr').wait_for()
+        page.get_by_text('estimated by where they were sent; nothing senses it').wait_for()
+        page.get_by_text('inside the support').wait_for()
+        chromium.picture(page, 'feet')
+
+
 def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> None:
     """Two robots, two pages; the end of one is a warning; the other ends with its bring-up."""
     arm = ['panda', '--simulate', '--namespace', 'left', '--can', isolation.bus]
@@ -50,6 +66,7 @@ def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> N
                 assert b'<html' in page.read()
         left.wait_for('all is ready', STARTING)
         dog.wait_for('all is ready', STARTING)
+        see_feet(urls[1])
         (viewer,) = viewers_below(left)
         # a page that hangs could hold a lock in it, and all others would wait
         assert not [each.path for each in viewer.memory_maps() if each.path.startswith(SHARED)]

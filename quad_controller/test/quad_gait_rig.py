@@ -35,6 +35,7 @@ class StillPolicy:
 
     name = 'still'
     needs_linear_velocity = False
+    needs_foot_contacts = False
     memory = 0.0  # [s]
     digest = ''
 

@@ -182,7 +182,9 @@ GOOD = {
         ('observation.history.layout', None, 'observation.history.layout: per_term'),
         ('observation.history.newest', 'middle', 'one of first, last'),
         ('observation.history.layout', 'frames', 'the same history of all terms'),
-        ('observation.terms.feet', {'source': 'foot_contacts'}, 'nothing here senses'),
+        ('observation.terms.feet', {'source': 'foot_contacts'}, 'feet.feet: links of the feet'),
+        ('observation.terms.feet', {'source': 'foot_contacts', 'feet': ['fl_foot']},
+         'each of fl_foot, fr_foot, bl_foot, br_foot once'),
         ('observation.terms.scan', {'source': 'height_scan', 'values': [0.0]}, 'scan.flat: true'),
         ('observation.terms.scan', {'source': 'height_scan', 'values': 0.0, 'flat': False},
          'flat False must be true'),
@@ -273,6 +275,40 @@ def test_a_policy_needs_a_velocity_that_somebody_estimates(tmp_path: Path) -> No
     assert not controller.set_mode('policy').accepted
     controller.step(replace(state, linear_velocity=(0.1, 0.0, 0.0)), PERIOD)
     assert controller.set_mode('policy').accepted
+    for _ in range(20):
+        controller.step(state, PERIOD)
+    assert not controller.set_mode('policy').accepted
+
+
+def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Path) -> None:
+    """The order is asked for; the mode is refused while nobody publishes them, or not lately."""
+    tool = TOOLS['mjlab']()
+    names, scales, clips, lengths, flat = (
+        'observation_names',
+        *(f'observation_terms_{each}' for each in ('scale', 'clip', 'history_length')),
+        'observation_terms_flatten_history_dim',
+    )
+    more = {names: 'foot_contact', scales: 'None', clips: 'None', lengths: '0', flat: 'True'}
+    order = ['fr_foot', 'fl_foot', 'br_foot', 'bl_foot']
+    tool = replace(
+        tool,
+        metadata={k: f'{v},{more[k]}' if k in more else v for k, v in tool.metadata.items()},
+        settings={**tool.settings, 'observation.terms.foot_contact.feet': order},
+        width=tool.width + 4,
+    )
+    write_network(tool, tmp_path / 'policy.onnx')
+    assert run(attached(tool, tmp_path)) == 0
+    policy = load(tmp_path / 'policy.onnx').runner
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy)
+    state = RobotState(JointSample(STAND, (0.0,) * 12), UPRIGHT, 0.9)
+    controller.step(state, PERIOD)
+    assert '/foot_contacts' in controller.set_mode('policy').message
+    for _ in range(150):
+        output = controller.step(replace(state, foot_contacts=(True, False, False, True)), PERIOD)
+        controller.set_mode('policy')
+    assert output.asked is not None
+    assert output.asked.answer.observation is not None
+    assert output.asked.answer.observation[0, -4:].tolist() == [0.0, 1.0, 1.0, 0.0]
     for _ in range(20):
         controller.step(state, PERIOD)
     assert not controller.set_mode('policy').accepted

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 from pathlib import Path
+import struct
 
 import numpy as np
 import pytest
@@ -76,7 +77,8 @@ def test_a_step_is_the_message_that_ros_reads() -> None:
     """Bytes and definition made here are those of quad_msgs/msg/ControllerStep."""
     controller = Controller(ROBOT, GaitParameters(), StateParameters())
     joints = JointSample(STANDING, (0.5,) * 12)
-    output = controller.step(RobotState(joints, UPRIGHT), PERIOD)
+    feet = (True, False, True, True)
+    output = controller.step(RobotState(joints, UPRIGHT, foot_contacts=feet), PERIOD)
     data = pack(record_of(output, TIMING))
     message = deserialize_message(data, ControllerStep)
     fields = ControllerStep.get_fields_and_field_types()
@@ -93,10 +95,15 @@ def test_a_step_is_the_message_that_ros_reads() -> None:
     assert list(message.velocity) == pytest.approx([0.5] * 12)
     assert list(message.orientation) == [0.0, 0.0, 0.0, 1.0]
     assert list(message.linear_velocity) == []
+    assert list(message.foot_contacts) == [1.0, 0.0, 1.0, 1.0]
     again = unpack(data)
     assert again.stamp == TIMING.stamp
     assert again.inputs is not None
     assert again.inputs.joints.positions == pytest.approx(STANDING)
+    assert again.inputs.foot_contacts == feet
+    before = unpack(data[: -struct.calcsize('<I4f')])
+    assert before.inputs is not None
+    assert before.inputs.foot_contacts is None, 'recorded before there were contacts'
     assert again.inputs.imu == UPRIGHT or again.inputs.imu.tilt == 0.0
     assert definition().startswith('builtin_interfaces/Time stamp\nstring state\n')
 

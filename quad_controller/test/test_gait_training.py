@@ -50,6 +50,7 @@ class Lesson:
 
     name = 'teacher'
     needs_linear_velocity = False
+    needs_foot_contacts = False
     memory = 0.0  # [s]
     digest = ''
 

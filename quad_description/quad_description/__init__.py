@@ -16,7 +16,7 @@ Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
 from .backend import Backend, RecordedBackend
 from .exceptions import DescriptionError, PresetError
 from .joint_commands import STREAM_TIMEOUT
-from .kinematics.leg import LegGeometry, LEGS
+from .kinematics.leg import FEET, LegGeometry, LEGS
 from .kinematics.leg_kinematics import foot_position, jacobian, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, Targets
 from .kinematics.support import raised_feet
@@ -26,6 +26,7 @@ from .state import ImuSample, JointSample, RobotState
 from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
+    'FEET',
     'LEGS',
     'PRESETS',
     'STREAM_TIMEOUT',

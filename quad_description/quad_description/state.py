@@ -123,6 +123,8 @@ class RobotState:
         battery: Charge 0 to 1, None while it is unknown.
         position: Of base_link in the world in [m]; None where the back end does not know it.
         linear_velocity: Of base_link in its own frame in [m/s]; None where nobody estimates it.
+        foot_contacts: Which feet are on the ground, in the order of :data:`.FEET`; None where
+            nobody estimates it.
         time: When it was measured, on the clock of the back end in [s]; the joints may have been
             measured before.
     """
@@ -132,4 +134,5 @@ class RobotState:
     battery: float | None = None
     position: Vector | None = None
     linear_velocity: Vector | None = None
+    foot_contacts: tuple[bool, ...] | None = None
     time: float = 0.0

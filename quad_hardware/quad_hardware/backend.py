@@ -137,6 +137,7 @@ class SerialBackend(Backend):
                 state,
                 position=(odometry.x, odometry.y, odometry.height),
                 linear_velocity=odometry.velocity_in_base,
+                foot_contacts=odometry.standing,
             )
         with self._arrived:
             self._state, self._count = state, self._count + 1

@@ -21,7 +21,7 @@ from tf2_msgs.msg import TFMessage
 
 from quad_hardware.nodes.hardware_node import COMMAND_QOS
 from quad_hardware.protocol import Protocol, V2
-from quad_msgs.msg import JointCommand
+from quad_msgs.msg import FootContacts, JointCommand
 from quad_pty_peer import Behaviour, PtyPeer
 
 if TYPE_CHECKING:
@@ -34,10 +34,12 @@ TOPICS = {
     '/joint_states': JointState,
     '/imu': Imu,
     '/odom': Odometry,
+    '/foot_contacts': FootContacts,
     '/battery_state': BatteryState,
     '/diagnostics': DiagnosticArray,
     '/tf': TFMessage,
     '/fake_xgo/ground_truth': Odometry,
+    '/fake_xgo/foot_contacts': FootContacts,
 }
 
 

@@ -16,7 +16,12 @@ import pytest
 from quad_description import FootPose, movable_joints, quadruped, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, IDENTITY, yaw_of
 from quad_hardware.estimation import Estimator, EstimatorSettings
-from quad_hardware.estimation.odometry import ground_normal, LegOdometry, OdometrySettings
+from quad_hardware.estimation.odometry import (
+    ContactSource,
+    ground_normal,
+    LegOdometry,
+    OdometrySettings,
+)
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
@@ -109,7 +114,8 @@ def test_commands_may_come_from_another_thread() -> None:
 def test_a_gap_is_no_way() -> None:
     """A robot that was carried to another stance while it was silent has not walked."""
     odometry = LegOdometry(OdometrySettings(), 0.01)
-    odometry.update(0.0, ROBOT.foot_poses([0.0] * 12), IDENTITY)
+    state = odometry.update(0.0, ROBOT.foot_poses([0.0] * 12), IDENTITY)
+    assert (state.standing, state.contact_source) == ((True,) * 4, ContactSource.MEASURED_HEIGHT)
     state = odometry.update(2.0, ROBOT.foot_poses([0.2] * 12), IDENTITY)
     assert (state.x, state.y, state.velocity_x) == (0.0, 0.0, 0.0)
 

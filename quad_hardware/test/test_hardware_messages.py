@@ -33,6 +33,7 @@ from quad_description.rotations import Quaternion as Rotation
 from quad_hardware.estimation import Battery, Health, OdometryState
 from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
+from quad_hardware.estimation.odometry import ContactSource
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus
 from quad_hardware.nodes import messages
@@ -50,7 +51,8 @@ STAMP = Time(sec=1)
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
 PARENT = replace(FRAMES, footprint_is_parent=True)
 DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3)
-PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4)
+COMMANDED = ContactSource.COMMANDED_HEIGHT
+PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4, COMMANDED)
 IMU = ImuSample(IDENTITY, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8), rate_differentiated=True)
 ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
 
@@ -126,10 +128,11 @@ def test_joints_are_stamped_when_they_were_measured() -> None:
     node._robot = SimpleNamespace(names=joints.names, update_odometry=estimator.update_odometry)
     node._settings = SimpleNamespace(deviations=DEVIATIONS, frames=FRAMES)
     node._joint_states, node._imu, node._odom = map(stream, ('joints', 'imu', 'odom'))
+    node._contacts = stream('contacts')
     node._tf = stream('tf')
     node._stamp = lambda monotonic: round(monotonic * 1e3)
     node._publish(estimator.update(state))
-    assert stamps == {'joints': 4992, 'imu': 5000, 'odom': 5000, 'tf': 5000}
+    assert stamps == {'joints': 4992, 'imu': 5000, 'odom': 5000, 'contacts': 5000, 'tf': 5000}
 
 
 def test_a_differentiated_rate_says_so_by_its_covariance() -> None:

@@ -18,11 +18,12 @@ import pytest
 from rclpy.qos import ReliabilityPolicy
 from std_srvs.srv import SetBool
 
-from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_description import FEET, movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import MAX_PERIOD
 from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.protocol import BULK_READ_ORDER, MOTOR_ORDER, Protocol, V1, V2
+from quad_msgs.msg import FootContacts
 from quad_node_rig import NodeRig, TIMEOUT
 
 pytestmark = [pytest.mark.scenario, pytest.mark.xdist_group('hardware_node')]
@@ -62,6 +63,10 @@ def test_the_topics_of_the_article(rig: NodeRig) -> None:
     assert (imu.orientation.z, imu.orientation.w) == pytest.approx((0.5**0.5, 0.5**0.5))
     assert imu.linear_acceleration.z == pytest.approx(9.8, abs=0.01)
     assert rig.receive('/odom').child_frame_id == 'base_link'
+    contacts = rig.receive('/foot_contacts')
+    assert list(contacts.name) == list(FEET)
+    assert list(contacts.contact) == [True] * 4
+    assert contacts.source == FootContacts.COMMANDED_HEIGHT
     assert rig.receive('/battery_state').percentage == pytest.approx(0.8)
     pairs = [(t.header.frame_id, t.child_frame_id) for t in rig.receive('/tf').transforms]
     assert pairs == [('odom', 'base_link'), ('base_link', 'base_footprint')]
@@ -88,13 +93,14 @@ def test_wrong_commands_move_nothing_and_are_reported(rig: NodeRig) -> None:
 
 
 def test_with_a_dead_imu_the_joints_are_reported_and_follow(rig: NodeRig) -> None:
-    """No /imu and no /odom, an error that says so, and a command reaches the servos."""
+    """No /imu, /odom and contacts, an error that says so, and a command reaches the servos."""
     rig.peer.behaviour.attitude = (math.nan,) * 3
     rig.wait_for_status('robot', DiagnosticStatus.ERROR, 'imu')
-    counts = len(rig.received['/imu']), len(rig.received['/odom'])
+    silent = ('/imu', '/odom', '/foot_contacts')
+    counts = [len(rig.received[topic]) for topic in silent]
     rig.stream(POSE, 1.0)
     assert list(rig.receive('/joint_states', 3).position) == pytest.approx(POSE, abs=0.01)
-    assert (len(rig.received['/imu']), len(rig.received['/odom'])) == counts
+    assert [len(rig.received[topic]) for topic in silent] == counts
     rig.peer.behaviour.attitude = (0.0, 0.0, 0.0)
     rig.receive('/imu')
 

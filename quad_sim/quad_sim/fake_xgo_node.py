@@ -16,10 +16,13 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import ok, try_shutdown
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from node_runner import init_ros, make_executor
+from quad_description import FEET
 from quad_description.rotations import Vector
+from quad_msgs.msg import FootContacts
 from quad_msgs.srv import InjectFault, Push
 
 from .board.board import POSE_TIME
@@ -35,7 +38,7 @@ SWITCH_INTERVAL = 0.0005  # [s] how long a callback may keep the robot from the 
 
 
 class FakeXgoNode(Node):
-    """Offers ``~/push``, ``~/fault``, ``~/stand`` and publishes ``~/ground_truth``."""
+    """Offers ``~/push``, ``~/fault`` and ``~/stand``, and publishes what physics knows."""
 
     def __init__(self, server: Server, simulation: Simulation) -> None:
         """Make the services.
@@ -50,6 +53,7 @@ class FakeXgoNode(Node):
         self.create_service(InjectFault, '~/fault', self._fault)
         self.create_service(Trigger, '~/stand', self._stand)
         self._truth = self.create_publisher(Odometry, '~/ground_truth', 10)
+        self._contacts = self.create_publisher(FootContacts, '~/foot_contacts', 10)
         self.create_timer(TRUTH_PERIOD, self._publish)
 
     def _push(self, request: Push.Request, response: Push.Response) -> Push.Response:
@@ -118,6 +122,14 @@ class FakeXgoNode(Node):
         twist.linear.x, twist.linear.y, twist.linear.z = truth.velocity.linear
         twist.angular.x, twist.angular.y, twist.angular.z = truth.velocity.angular
         self._truth.publish(message)
+        self._contacts.publish(
+            FootContacts(
+                header=Header(stamp=message.header.stamp),
+                name=list(FEET),
+                contact=list(truth.foot_contacts),
+                source=FootContacts.PHYSICS,
+            )
+        )
 
 
 def serve_with_ros(

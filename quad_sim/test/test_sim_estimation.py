@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import random
 
 import numpy as np
@@ -47,8 +48,13 @@ def trot(phase: float, velocity: tuple[float, float], neutral: Array) -> Array:
 
 def walk(
     velocity: tuple[float, float], duration: float, terrain: Terrain = FLAT
-) -> tuple[Array, OdometryState, float]:
-    """Trot in physics; return the true way in the first heading, the estimate, the height."""
+) -> tuple[Array, OdometryState, float, float]:
+    """Trot in physics.
+
+    Returns:
+        The true way in the first heading, the estimate, the height, and the share of contacts of
+        feet that were right.
+    """
     robot, rng = Robot(URDF, terrain=terrain), random.Random(1)
     odometry = LegOdometry(OdometrySettings(), ROBOT.foot_radius)
     standing = [STAND[name] for name in NAMES]
@@ -58,12 +64,13 @@ def walk(
     robot.set_targets(ROBOT.place(ROBOT.solve(neutral.tolist()), standing))
     robot.step(1.0)
     start, yaw = np.array(robot.base_pose.position), robot.imu.roll_pitch_yaw[2]
-    state = None
+    state, right = None, 0
     for tick in range(round(duration / PERIOD)):
         time = tick * PERIOD
         measured = [q + rng.gauss(0, math.radians(0.1)) for q in robot.joint_positions.tolist()]
         attitude = [angle + rng.gauss(0, math.radians(0.1)) for angle in robot.imu.roll_pitch_yaw]
         state = odometry.update(time, ROBOT.foot_poses(measured), from_roll_pitch_yaw(*attitude))
+        right += sum(map(operator.eq, state.standing, robot.foot_contacts))
         ramp = min(time / 0.5, 1.0)
         speed = velocity[0] * ramp, velocity[1] * ramp
         feet = trot(time / GAIT_PERIOD, speed, neutral).tolist()
@@ -75,24 +82,25 @@ def walk(
     true = np.array(
         [math.cos(yaw) * x + math.sin(yaw) * y, -math.sin(yaw) * x + math.cos(yaw) * y]
     )
-    return true, state, robot.base_pose.position[2]
+    return true, state, robot.base_pose.position[2], right / (4 * round(duration / PERIOD))
 
 
 @pytest.mark.parametrize('velocity', [(0.2, 0.0), (-0.15, 0.0), (0.0, 0.1)])
 def test_a_trot_is_followed(velocity: tuple[float, float]) -> None:
-    """Within 10 % of the way, with noise on joints and attitude; height within 5 mm."""
-    true, state, height = walk(velocity, 4.0)
+    """Within 10 % of the way, with noise; height within 5 mm; most contacts of feet."""
+    true, state, height, right = walk(velocity, 4.0)
     way = float(np.hypot(*true))
     assert way > 0.2
     assert math.hypot(state.x - true[0], state.y - true[1]) < 0.1 * way
     assert state.height == pytest.approx(height, abs=0.005)
+    assert right > 0.85
     assert state.position_variance > (0.05 * way) ** 2
 
 
 @pytest.mark.parametrize('degrees', [8.0, -8.0])
 def test_a_trot_is_followed_up_and_down_a_slope(degrees: float) -> None:
     """Feet stand on the ground and not on the horizon; they creep downhill, which no leg feels."""
-    true, state, _ = walk((0.2, 0.0), 4.0, Terrain.slope(math.radians(degrees)))
+    true, state, *_ = walk((0.2, 0.0), 4.0, Terrain.slope(math.radians(degrees)))
     assert true[0] > 0.4
     assert state.x == pytest.approx(true[0], rel=0.2)
 

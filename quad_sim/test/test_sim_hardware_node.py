@@ -16,6 +16,7 @@ import pytest
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
 from quad_hardware.joints import LimiterSettings
 from quad_hardware.joints.command import MAX_PERIOD
+from quad_msgs.msg import FootContacts
 from quad_msgs.srv import InjectFault
 from quad_node_rig import Rig, TIMEOUT
 
@@ -71,6 +72,12 @@ def test_it_stands_up(rig: XgoRig) -> None:
     assert math.hypot(below.x, below.y, below.z) == pytest.approx(
         to_base.transform.translation.z, abs=1e-6
     )
+    for topic, source in (
+        ('/foot_contacts', FootContacts.COMMANDED_HEIGHT),
+        ('/fake_xgo/foot_contacts', FootContacts.PHYSICS),
+    ):
+        contacts = rig.receive(topic)
+        assert (list(contacts.contact), contacts.source) == ([True] * 4, source)
     assert rig.receive('/imu').linear_acceleration.z == pytest.approx(9.8, abs=0.6)
 
 

@@ -52,6 +52,27 @@ def link_pose(tree: KinematicTree, link: str, positions: Mapping[str, float]) ->
     return pose
 
 
+def link_poses(tree: KinematicTree, positions: Mapping[str, float]) -> dict[str, Transform]:
+    """Return the poses of all links in the root link.
+
+    Args:
+        tree: The robot.
+        positions: Of joints in [rad] or [m]; those that are missing stand at zero.
+    """
+    poses = {tree.root: Transform()}
+    waiting = list(tree.joints)
+    while waiting:  # a joint may stand before the one that its parent hangs on
+        later: list[Joint] = []
+        for joint in waiting:
+            if joint.parent in poses:
+                place = joint_transform(joint, joint_position(joint, positions))
+                poses[joint.child] = compose(poses[joint.parent], place)
+            else:
+                later.append(joint)
+        waiting = later
+    return poses
+
+
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
     """Return the links that joints move.
 

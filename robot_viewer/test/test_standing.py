@@ -20,16 +20,19 @@ from test_web_viewer import LATCHED, TIMEOUT
 from urdf_reader import from_rpy, read_urdf
 
 from node_runner import make_executor
+from quad_msgs.msg import FootContacts
+from robot_viewer.link_poses import link_poses
 from robot_viewer.nodes.web_viewer import WebViewer
-from robot_viewer.page.body_panel import BodyPanel
+from robot_viewer.page.body_panel import BodyPanel, DOWN_COLOR
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.standing import (
     battery_text,
+    centre_of_mass,
+    Contacts,
     feet_of,
-    feet_places,
     horizon_html,
     roll_pitch,
-    standing,
+    support,
 )
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)
@@ -53,19 +56,51 @@ def test_roll_and_pitch_do_not_depend_on_the_heading(
     assert roll_pitch(from_rpy(roll, pitch, yaw)) == pytest.approx((roll, pitch), abs=1e-6)
 
 
-def test_the_lowest_feet_stand() -> None:
-    """All of them level; one that is lifted does not; on a slope the attitude counts."""
+def test_what_feet_on_the_ground_span() -> None:
+    """All round the robot, below the feet; the centre of mass over it, however the body leans."""
     feet = feet_of(TREE)
     assert len(feet) == 4
-    places = feet_places(TREE, feet, {})
-    assert standing(places, LEVEL) == ('rr_foot', 'fr_foot', 'fl_foot', 'rl_foot'), 'all round'
-    lifted = feet_places(TREE, feet, {'fl': 0.02})
-    assert 'fl_foot' not in standing(lifted, LEVEL)
-    nose_down = from_rpy(0.0, 0.2, 0.0)
-    assert standing(places, nose_down) == ('fr_foot', 'fl_foot')
-    reached = {'fl': 0.2 * math.tan(0.2), 'fr': 0.2 * math.tan(0.2)}
-    assert len(standing(feet_places(TREE, feet, reached), nose_down)) == 4
-    assert standing({}, LEVEL) == ()
+    poses = link_poses(TREE, {})
+    places = {foot: poses[foot].translation for foot in feet}
+    found = support(places, feet, LEVEL, (0.02, 0.0, 0.05), 0.01)
+    assert [corner[:2] for corner in found.corners] == [
+        (-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)
+    ]  # fmt: skip
+    assert [corner[2] for corner in found.corners] == pytest.approx([-0.11] * 4)
+    assert found.below == pytest.approx((0.02, 0.0, -0.11))
+    assert found.margin == pytest.approx(0.08)
+    three = support(places, set(feet) - {'fl_foot'}, LEVEL, (0.02, 0.02, 0.0))
+    assert three.margin == pytest.approx(-0.04 / math.sqrt(2.0))
+    two = support(places, ['fl_foot', 'rr_foot'], LEVEL, (0.0, 0.0, 0.0))
+    assert two.margin is None
+    assert two.below == pytest.approx((0.0, 0.0, -0.1))
+    nose_down = support(places, feet, from_rpy(0.0, 0.2, 0.0), (0.0, 0.0, 0.05))
+    assert nose_down.margin == pytest.approx(0.1 * math.cos(0.2) - 0.15 * math.sin(0.2))
+    assert support(places, (), LEVEL, None).corners == ()
+
+
+def test_the_centre_of_mass_moves_with_the_links() -> None:
+    """Half of it is in a foot that is lifted; none is known of links without."""
+    mass = '<inertial><mass value="1"/><origin xyz="0 0 {z}"/></inertial>'
+    text = URDF
+    for link, z in (('body', 0.2), ('fl_foot', 0.0)):
+        whole = f'<link name="{link}">{mass.format(z=z)}</link>'
+        text = text.replace(f'<link name="{link}"/>', whole)
+    tree = read_urdf(text)
+    poses = link_poses(tree, {'fl': 0.02})
+    assert centre_of_mass(tuple(tree.masses()), poses) == pytest.approx((0.05, 0.05, 0.06))
+    assert centre_of_mass((), poses) is None
+
+
+def test_contacts_say_how_they_are_known() -> None:
+    """And whether the robot would stand still."""
+    stands = Contacts(frozenset({'fl_foot', 'br_foot'}), 'commanded_height')
+    assert 'feet on the ground: br, fl<' in stands.html(None)
+    assert 'nothing senses it' in stands.html(None)
+    assert 'no support polygon' in stands.html(None)
+    assert '12 mm outside the support' in stands.html(-0.012)
+    assert 'the simulation knows' in Contacts(frozenset(), 'physics').html(0.01)
+    assert 'on the ground: none<' in Contacts(frozenset(), '').html(None)
 
 
 def test_a_robot_without_feet_has_none() -> None:
@@ -110,6 +145,8 @@ class Dog:
         self._states = node.create_publisher(JointState, 'joint_states', 10)
         self._imu = node.create_publisher(Imu, 'imu', 10)
         self._battery = node.create_publisher(BatteryState, 'battery_state', 10)
+        self._contacts = node.create_publisher(FootContacts, 'foot_contacts', 10)
+        self.sends_contacts = True
         node.create_timer(0.05, self._publish)
         self.viewer = WebViewer()
         self._executor = make_executor()
@@ -137,6 +174,11 @@ class Dog:
         x, y, z, w = from_rpy(0.1, 0.0, 0.0)
         self._imu.publish(Imu(orientation=Quaternion(x=x, y=y, z=z, w=w)))
         self._battery.publish(BatteryState(percentage=0.75, voltage=7.4))
+        if self.sends_contacts:
+            names = [f'{leg}_foot' for leg in LEGS]
+            contact = [False, True, True, True]
+            source = FootContacts.COMMANDED_HEIGHT
+            self._contacts.publish(FootContacts(name=names, contact=contact, source=source))
 
 
 def test_the_page_shows_how_it_stands(dog: Dog) -> None:
@@ -144,7 +186,12 @@ def test_the_page_shows_how_it_stands(dog: Dog) -> None:
     dog.spin_until(lambda: dog.viewer.page._body is not None, 'the panel')
     dog.spin_until(lambda: 'roll +5.7' in dog.panel._html.content, 'the attitude')
     dog.spin_until(lambda: 'battery 75 %, 7.4 V' in dog.panel._html.content, 'the battery')
-    dog.spin_until(lambda: len(dog.panel._feet) == 4, 'feet')
+    dog.spin_until(lambda: 'fr, rl, rr' in dog.panel._html.content, 'contacts')
+    feet = dog.panel._feet
+    dog.spin_until(lambda: tuple(feet['rr_foot'].color) == DOWN_COLOR, 'marks of contacts')
+    assert tuple(feet['fl_foot'].color) != DOWN_COLOR
+    dog.sends_contacts = False
+    dog.spin_until(lambda: tuple(feet['rr_foot'].color) != DOWN_COLOR, 'the end of old contacts')
     dog.spin_until(lambda: len(dog.panel._sliders) == 3, 'sliders')
     publisher = dog.viewer._body._poses
     assert publisher is not None

@@ -11,7 +11,17 @@ from .groups import find_group, JointGroup
 from .mesh_files import find_mesh, find_package
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
-from .urdf import Joint, JointKind, JointRange, KinematicTree, Mimic, MOVABLE, read_urdf, UrdfShape
+from .urdf import (
+    Joint,
+    JointKind,
+    JointRange,
+    KinematicTree,
+    Mimic,
+    MOVABLE,
+    PointMass,
+    read_urdf,
+    UrdfShape,
+)
 from .xacro_files import expand_xacro
 
 __all__ = [
@@ -27,6 +37,7 @@ __all__ = [
     'MeshFileError',
     'Mimic',
     'Pair',
+    'PointMass',
     'Quaternion',
     'SemanticDescription',
     'Transform',

@@ -170,6 +170,21 @@ class UrdfShape:
 
 
 @dataclass(frozen=True, slots=True)
+class PointMass:
+    """Where the mass of a link is.
+
+    Attributes:
+        link: Name of the link.
+        mass: In [kg].
+        centre: Its centre in the link in [m].
+    """
+
+    link: str
+    mass: float
+    centre: Vector
+
+
+@dataclass(frozen=True, slots=True)
 class KinematicTree:
     """Contents of a URDF.
 
@@ -241,6 +256,21 @@ class KinematicTree:
             DescriptionError: The origin or the color of one is not usable.
         """
         return self._shapes('visual')
+
+    def masses(self) -> Iterator[PointMass]:
+        """Go through the masses of the links that have one.
+
+        Raises:
+            DescriptionError: A number of one is not usable.
+        """
+        for link in self._robot.findall('link'):
+            inertial = link.find('inertial')
+            mass = None if inertial is None else inertial.find('mass')
+            if inertial is not None and mass is not None:
+                name = _name(link, 'link')
+                place = f'link {name}, <inertial>'
+                value = _number(mass.get('value', ''), f'{place}, <mass>')
+                yield PointMass(name, value, _origin(inertial, place).translation)
 
     def _shapes(self, tag: str) -> Iterator[UrdfShape]:
         materials = {each.get('name'): each for each in self._robot.findall('material')}

@@ -54,6 +54,7 @@ class ControlLoop:
         self._imu: ImuSample | None = None
         self._battery: float | None = None
         self._linear_velocity: Vector | None = None
+        self._foot_contacts: tuple[bool, ...] | None = None
         self._arrival: float | None = None
         self._stopping = False
         self._begin: Callable[[], None] = lambda: None
@@ -101,6 +102,11 @@ class ControlLoop:
         with self._arrived:
             self._linear_velocity = velocity
 
+    def offer_foot_contacts(self, contacts: tuple[bool, ...]) -> None:
+        """Hand in which feet are on the ground for the next step."""
+        with self._arrived:
+            self._foot_contacts = contacts
+
     def figures(self) -> LoopFigures:
         """Return how well the time is kept."""
         with self._arrived:
@@ -128,9 +134,10 @@ class ControlLoop:
                     self._imu,
                     self._battery,
                     linear_velocity=self._linear_velocity,
+                    foot_contacts=self._foot_contacts,
                 )
                 self._joints = self._imu = self._battery = self._arrival = None
-                self._linear_velocity = None
+                self._linear_velocity = self._foot_contacts = None
                 self._pacer.stepped(now, arrival)
             with self.lock:
                 output = self._controller.step(measurement, now - last)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
@@ -40,7 +41,7 @@ from node_runner import (
     spin,
 )
 from quad_description import DescriptionError
-from quad_msgs.msg import JointCommand
+from quad_msgs.msg import FootContacts, JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
 
 from ..exceptions import PolicyError, QuadControllerError
@@ -66,7 +67,8 @@ COMMAND_QOS = QoSProfile(
 )
 REQUEST_QOS = 1  # only the newest velocity and pose count
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
-ODOMETRY_WAIT = 1.0  # [s] for the first message, when a policy that needs it is loaded
+ESTIMATE_WAIT = 1.0  # [s] for the first message, when a policy that needs it is loaded
+ESTIMATES = {'odom': Odometry, 'foot_contacts': FootContacts}
 GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
@@ -132,9 +134,10 @@ class ControllerNode(Node):
         self._state = self.create_publisher(String, '~/state', LATCHED)
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', 10)
         self._subscribe()
-        self._sees_odometry, self._odometry = False, threading.Event()
-        if policy is not None and policy.needs_linear_velocity:
-            self._see_odometry()
+        self._seen: set[str] = set()  # topics of estimates
+        self._arrived = {topic: threading.Event() for topic in ESTIMATES}
+        if policy is not None:
+            self._see_estimates(_estimates_for(policy))
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
         create_deferred_service(
@@ -220,19 +223,22 @@ class ControllerNode(Node):
         self._texts[loaded.runner] = str(loaded)
         return loaded
 
-    def _wait_for_odometry(self) -> None:
-        """Wait for a velocity of the body, in another thread; without one, the refusal says so."""
-        if self.executor is None or self._odometry.is_set():
+    def _wait_for_estimates(self, policy: Policy) -> None:
+        """Wait for what a policy needs, in another thread; without it, the refusal says so."""
+        topics = [t for t in _estimates_for(policy) if not self._arrived[t].is_set()]
+        if self.executor is None or not topics:
             return
-        self.executor.create_task(self._see_odometry)
-        if self._odometry.wait(ODOMETRY_WAIT):
+        self.executor.create_task(self._see_estimates, topics)
+        if all(self._arrived[topic].wait(ESTIMATE_WAIT) for topic in topics):
             time.sleep(2.0 * self._settings.states.period)  # the controller takes it with a step
 
-    def _see_odometry(self) -> None:
-        if not self._sees_odometry:
-            self._sees_odometry = True
-            sensor = qos_profile_sensor_data
-            self.create_subscription(Odometry, 'odom', self._take_odometry, sensor)
+    def _see_estimates(self, topics: Sequence[str]) -> None:
+        """Subscribe to estimates: each message costs time, and only some policies need them."""
+        sensor = qos_profile_sensor_data
+        takers = {'odom': self._take_odometry, 'foot_contacts': self._take_contacts}
+        for topic in set(topics) - self._seen:
+            self._seen.add(topic)
+            self.create_subscription(ESTIMATES[topic], topic, takers[topic], sensor)
 
     def _subscribe(self) -> None:
         sensor = qos_profile_sensor_data
@@ -272,7 +278,15 @@ class ControllerNode(Node):
 
     def _take_odometry(self, message: Odometry) -> None:
         self._loop.offer_linear_velocity(messages.linear_velocity(message))
-        self._odometry.set()
+        self._arrived['odom'].set()
+
+    def _take_contacts(self, message: FootContacts) -> None:
+        try:
+            self._loop.offer_foot_contacts(messages.foot_contacts(message))
+        except ValueError as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
+            return
+        self._arrived['foot_contacts'].set()
 
     def _refuse(self, what: Fault, reason: str) -> None:
         with self._loop.lock:
@@ -325,8 +339,7 @@ class ControllerNode(Node):
         except PolicyError as error:
             return Answer(False, f'the policy was refused: {error.reason}')
         policy = loaded.runner
-        if policy.needs_linear_velocity:
-            self._wait_for_odometry()
+        self._wait_for_estimates(policy)
         with self._loop.lock:
             answer = self._controller.follow(policy)
         if not answer.accepted:
@@ -422,6 +435,12 @@ class ControllerNode(Node):
         self.failure = f'{type(error).__name__}: {error}'
         self.get_logger().fatal(f'the control loop ended by a defect: {self.failure}')
         self._stop.set()
+
+
+def _estimates_for(policy: Policy) -> list[str]:
+    """Return the topics of estimates that a policy needs."""
+    needs = {'odom': policy.needs_linear_velocity, 'foot_contacts': policy.needs_foot_contacts}
+    return [topic for topic, needed in needs.items() if needed]
 
 
 def main() -> int:

@@ -14,9 +14,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Header
 
-from quad_description import ImuSample
+from quad_description import FEET, ImuSample
 from quad_description.rotations import normalized, roll_pitch_yaw, Vector
-from quad_msgs.msg import JointCommand
+from quad_msgs.msg import FootContacts, JointCommand
 
 from ..gait.body import BodyPose
 from ..gait.velocity import Velocity
@@ -79,6 +79,18 @@ def linear_velocity(message: Odometry) -> Vector:
     """Return the velocity of the body in its own frame [m/s]."""
     linear = message.twist.twist.linear
     return linear.x, linear.y, linear.z
+
+
+def foot_contacts(message: FootContacts) -> tuple[bool, ...]:
+    """Return which feet are on the ground, in the order of :data:`quad_description.FEET`.
+
+    Raises:
+        ValueError: A foot is missing.
+    """
+    seen = dict(zip(message.name, message.contact, strict=False))
+    if missing := [foot for foot in FEET if foot not in seen]:
+        raise ValueError(f'foot_contacts: no contact of {", ".join(missing)}; publish all feet')
+    return tuple(bool(seen[foot]) for foot in FEET)
 
 
 def velocity(message: Twist) -> Velocity:

@@ -27,12 +27,15 @@ class PolicyInputs:
         imu: Measured attitude and turning.
         velocity: Velocity that is requested.
         linear_velocity: Of the body in its own frame in [m/s], estimated; None where nobody does.
+        foot_contacts: Which feet are on the ground, in the order of :data:`quad_description.FEET`;
+            None where nobody estimates it.
     """
 
     joints: JointSample
     imu: ImuSample
     velocity: Velocity
     linear_velocity: Vector | None = None
+    foot_contacts: tuple[bool, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +70,11 @@ class Policy(Protocol):
     @property
     def needs_linear_velocity(self) -> bool:
         """Whether it sees the linear velocity of the body, which has to be estimated."""
+        ...
+
+    @property
+    def needs_foot_contacts(self) -> bool:
+        """Whether it sees which feet are on the ground, which has to be estimated."""
         ...
 
     @property

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import time
 
-from quad_description import ImuSample, JointSample, Quadruped, Targets
+from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
@@ -199,4 +199,4 @@ def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
     """Return what a policy observes of a robot that stands."""
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
-    return runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0)))
+    return runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0), (True,) * len(FEET)))

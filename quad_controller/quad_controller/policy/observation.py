@@ -11,7 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from quad_description import ImuSample
+from quad_description import FEET, ImuSample
 from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
@@ -68,6 +68,8 @@ class Observed:
         velocity: Velocity that is requested.
         previous: The last action.
         linear_velocity: Of the body in its own frame in [m/s]; None while nobody estimates it.
+        foot_contacts: Which feet are on the ground, in the order of :data:`quad_description.FEET`;
+            None while nobody estimates it.
     """
 
     positions: Floats
@@ -76,6 +78,7 @@ class Observed:
     velocity: Velocity
     previous: Floats
     linear_velocity: Vector | None = None
+    foot_contacts: tuple[bool, ...] | None = None
 
 
 def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:
@@ -88,6 +91,11 @@ def _quaternion(imu: ImuSample, order: QuaternionOrder) -> tuple[float, ...]:
     return (w, x, y, z) if order is QuaternionOrder.WXYZ else (x, y, z, w)
 
 
+def _in_order(contacts: tuple[bool, ...] | None, feet: Sequence[str]) -> tuple[float, ...]:
+    seen = dict(zip(FEET, contacts or (), strict=False))
+    return tuple(float(seen.get(foot, False)) for foot in feet)
+
+
 MEASURED: Mapping[Source, Callable[[Observed, ObservationTerm], npt.ArrayLike]] = {
     Source.LINEAR_VELOCITY: lambda seen, term: _in_frame(seen.linear_velocity, term.frame),
     Source.ANGULAR_VELOCITY: lambda seen, term: _in_frame(seen.imu.angular_velocity, term.frame),
@@ -96,6 +104,7 @@ MEASURED: Mapping[Source, Callable[[Observed, ObservationTerm], npt.ArrayLike]] 
     Source.JOINT_POSITIONS: lambda seen, _: seen.positions,
     Source.JOINT_VELOCITIES: lambda seen, _: seen.velocities,
     Source.LAST_ACTION: lambda seen, _: seen.previous,
+    Source.FOOT_CONTACTS: lambda seen, term: _in_order(seen.foot_contacts, term.feet),
     Source.HEIGHT_SCAN: lambda _, term: term.values,
     Source.CONSTANT: lambda _, term: term.values,
 }

@@ -107,6 +107,11 @@ class PolicyRunner:
         return self._contract.needs(Source.LINEAR_VELOCITY)
 
     @property
+    def needs_foot_contacts(self) -> bool:
+        """Whether it sees which feet are on the ground, which has to be estimated."""
+        return self._contract.needs(Source.FOOT_CONTACTS)
+
+    @property
     def digest(self) -> str:
         """SHA-256 of its file."""
         return self._network.digest
@@ -127,6 +132,8 @@ class PolicyRunner:
             return 'a policy needs the angular velocity, which /imu does not have'
         if inputs.linear_velocity is None and needs(Source.LINEAR_VELOCITY):
             return 'the policy needs the linear velocity of the body, which nobody estimates'
+        if inputs.foot_contacts is None and needs(Source.FOOT_CONTACTS):
+            return 'the policy needs the contacts of the feet, and nobody publishes /foot_contacts'
         return ''
 
     def reset(self, others: Targets) -> None:
@@ -163,6 +170,7 @@ class PolicyRunner:
                 self._command(inputs.velocity),
                 self._previous,
                 inputs.linear_velocity,
+                inputs.foot_contacts,
             )
         )
 

@@ -57,8 +57,12 @@ FIELDS: Mapping[str, tuple[Kind, str]] = {
     'command': (Kind.NUMBERS, 'x, y [m/s] and yaw [rad/s] that count'),
     'observation': (Kind.NUMBERS, 'what the network was given; empty when not asked'),
     'action': (Kind.NUMBERS, 'what it answered; empty when not asked'),
+    'foot_contacts': (Kind.NUMBERS, '1 for a foot on the ground, else 0; empty when not known'),
 }
 """Kind and meaning of each field after the stamp, in the order of the message."""
+
+ADDED = frozenset({'foot_contacts'})
+"""Fields that recordings of before do not have; they stand at the end."""
 
 
 def definition() -> str:
@@ -106,6 +110,7 @@ class StepRecord:
             ),
             Velocity(*get('command').tolist()),
             _vector(get('linear_velocity')),
+            tuple(map(bool, get('foot_contacts'))) or None,
         )
 
 
@@ -134,6 +139,7 @@ def record_of(output: Output, timing: StepTiming) -> StepRecord:
         'command': (velocity.x, velocity.y, velocity.yaw),
         'observation': answer.observation if answer is not None else None,
         'action': answer.action if answer is not None else None,
+        'foot_contacts': (situation.foot_contacts if situation is not None else None) or (),
     }
     return StepRecord(timing.stamp, values)
 
@@ -159,6 +165,9 @@ def unpack(data: bytes) -> StepRecord:
         seconds, rest = struct.unpack_from('<iI', view)
         place, values = 8, {}
         for name, (kind, _) in FIELDS.items():
+            if name in ADDED and place == len(view):
+                values[name] = np.empty(0, '<f4')
+                continue
             values[name], place = UNPACK[kind](view, place)
     except (struct.error, UnicodeDecodeError) as error:
         raise ValueError(f'no {TYPE}: {error}') from error

@@ -430,6 +430,7 @@ class Controller:
             velocity=self._commands.velocity(state),
             pose=self._commands.pose,
             linear_velocity=health.linear_velocity,
+            foot_contacts=health.foot_contacts,
         )
 
     def _refusal(self, request: ModeRequest) -> str:
@@ -461,5 +462,7 @@ class Controller:
         if health.uncertainty:
             return health.uncertainty
         return policy.missing(
-            PolicyInputs(health.joints, health.imu, REST, health.linear_velocity)
+            PolicyInputs(
+                health.joints, health.imu, REST, health.linear_velocity, health.foot_contacts
+            )
         )

@@ -45,6 +45,8 @@ class Health:
         self.joints_age = self.imu_age = math.inf
         self._linear_velocity: Vector | None = None
         self._linear_velocity_age = math.inf
+        self._foot_contacts: tuple[bool, ...] | None = None
+        self._foot_contacts_age = math.inf
         self.refused = 0
         self._refusals: dict[Fault, tuple[str, float]] = {}  # reason, and its age [s]
         self._late = False
@@ -70,6 +72,9 @@ class Health:
             if age + waited <= REFUSAL_LIFE
         }
         self._linear_velocity_age += waited
+        self._foot_contacts_age += waited
+        if measurement.foot_contacts is not None:
+            self._foot_contacts, self._foot_contacts_age = measurement.foot_contacts, 0.0
         problems = [
             *self._take_joints(measurement.joints),
             *self._take_imu(measurement.imu),
@@ -108,6 +113,12 @@ class Health:
         """That of the body in [m/s], None when it is too old to act upon."""
         fresh = self._linear_velocity_age <= self._parameters.hold_age
         return self._linear_velocity if fresh else None
+
+    @property
+    def foot_contacts(self) -> tuple[bool, ...] | None:
+        """Which feet are on the ground, None when that is too old to act upon."""
+        fresh = self._foot_contacts_age <= self._parameters.hold_age
+        return self._foot_contacts if fresh else None
 
     @property
     def complete(self) -> bool:

@@ -27,6 +27,7 @@ class Situation:
         velocity: Velocity that is requested.
         pose: Pose of the body that is requested.
         linear_velocity: Of the body in its own frame in [m/s], None while nobody estimates it.
+        foot_contacts: Which feet are on the ground, None while nobody estimates it.
     """
 
     joints: JointSample | None
@@ -34,13 +35,16 @@ class Situation:
     velocity: Velocity
     pose: BodyPose
     linear_velocity: Vector | None = None
+    foot_contacts: tuple[bool, ...] | None = None
 
     @property
     def policy_inputs(self) -> PolicyInputs | None:
         """What a policy may see; None while joints or attitude are not known."""
         if self.joints is None or self.imu is None:
             return None
-        return PolicyInputs(self.joints, self.imu, self.velocity, self.linear_velocity)
+        return PolicyInputs(
+            self.joints, self.imu, self.velocity, self.linear_velocity, self.foot_contacts
+        )
 
 
 class Motion(ABC):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import math
 
 from ..rotations import Vector
-from .leg import LEGS
+from .leg import FEET
 
 MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
 
@@ -19,17 +19,17 @@ def raised_feet(feet: Sequence[Vector]) -> tuple[str, ...]:
     With one foot or a diagonal pair lifted, the robot rocks: both feet of the diagonal are raised.
 
     Args:
-        feet: Their centres in the body, in the order of LEGS [m].
+        feet: Their centres in the body, in the order of FEET [m].
     """
     raised = []
-    for index, leg in enumerate(LEGS):
+    for index, link in enumerate(FEET):
         a, b, c = (foot for other, foot in enumerate(feet) if other != index)
         normal = _cross(_difference(b, a), _difference(c, a))
         length = math.copysign(math.hypot(*normal), normal[2])  # up, in the body
         way = _difference(feet[index], a)
         height = sum(n * w for n, w in zip(normal, way, strict=True))
         if length and height / length > MAX_GAP:
-            raised.append(f'{leg}_foot')
+            raised.append(link)
     return tuple(raised)
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 import math
 from operator import itemgetter
 
@@ -43,6 +44,13 @@ _Z = itemgetter(2)
 
 SCALES = (0.1, 10.0)
 """What a scale of odometry may be; beyond, a way was given in another unit."""
+
+
+class ContactSource(Enum):
+    """How it is known which feet stand."""
+
+    COMMANDED_HEIGHT = 'commanded_height'  # where they were sent lowest, a servo's lag ago
+    MEASURED_HEIGHT = 'measured_height'  # lowest by joints and attitude: there are no commands
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +89,7 @@ class OdometryState:
         velocity_y: To the left, in base_link turned level [m/s].
         distance: Way so far [m].
         standing: Feet that are taken to stand, in URDF order.
+        contact_source: How that is known.
     """
 
     x: float
@@ -91,6 +100,7 @@ class OdometryState:
     velocity_y: float
     distance: float
     standing: tuple[bool, ...]
+    contact_source: ContactSource
 
     @property
     def velocity_in_base(self) -> Vector:
@@ -149,7 +159,7 @@ class LegOdometry:
             self._keeps_heading = False
         self._heading = yaw - self._yaw0
         rotation = multiply(about_z(-self._yaw0), attitude)
-        standing = self._standing(time, feet, rotation)
+        standing, source = self._standing(time, feet, rotation)
         turned = [
             FootPose(rotate(rotation, foot.position), multiply(rotation, foot.rotation))
             for foot in feet
@@ -163,9 +173,13 @@ class LegOdometry:
             *self._smooth,
             self._distance,
             standing,
+            source,
         )
 
-    def _standing(self, time: float, feet: Sequence[FootPose], rotation: Quaternion) -> Flags:
+    def _standing(
+        self, time: float, feet: Sequence[FootPose], rotation: Quaternion
+    ) -> tuple[Flags, ContactSource]:
+        source = ContactSource.COMMANDED_HEIGHT
         settings, commands, ground = self._settings, self._commands, self._ground
         at = time - settings.delay
         recent = [places for t, places in commands if abs(t - at) <= settings.margin]
@@ -173,6 +187,7 @@ class LegOdometry:
             recent = [p for t, p in commands if at - settings.command_age <= t <= at][-1:]
         if not recent:
             recent, ground = [[foot.position for foot in feet]], None
+            source = ContactSource.MEASURED_HEIGHT
         x, y, z = ground or rotate(conjugate(rotation), (0.0, 0.0, 1.0))
         standing = (True,) * len(feet)
         for places in recent:
@@ -182,7 +197,7 @@ class LegOdometry:
                 stands and height <= highest
                 for stands, height in zip(standing, heights, strict=True)
             )
-        return standing
+        return standing, source
 
     def _integrate(
         self, time: float, feet: Sequence[FootPose], standing: Flags, heading: float

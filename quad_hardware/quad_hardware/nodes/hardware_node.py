@@ -30,7 +30,7 @@ from node_runner import (
     spin,
 )
 from quad_description import RobotState
-from quad_msgs.msg import JointCommand
+from quad_msgs.msg import FootContacts, JointCommand
 
 from ..exceptions import CommandError, HardwareError
 from ..joints.command import NOMINAL_PERIOD
@@ -77,6 +77,9 @@ class HardwareNode(Node):
         )
         self._imu = FastPublisher(self.create_publisher(Imu, 'imu', SENSOR_DEPTH))
         self._odom = FastPublisher(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
+        self._contacts = FastPublisher(
+            self.create_publisher(FootContacts, 'foot_contacts', SENSOR_DEPTH)
+        )
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = FastPublisher(self.create_publisher(TFMessage, '/tf', 100))
         self._link = LinkDiagnostic()
@@ -118,8 +121,9 @@ class HardwareNode(Node):
         odometry = self._robot.update_odometry(state)
         if state.imu is None or odometry is None:
             self.get_logger().error(
-                f'no /imu, /odom and transforms: {self._robot.health().imu_problem}; the '
-                'joints are published, and the robot can lie down',
+                f'no /imu, /odom, /foot_contacts and transforms: '
+                f'{self._robot.health().imu_problem}; the joints are published, and the robot can '
+                'lie down',
                 throttle_duration_sec=WARN_PERIOD,
             )
             return
@@ -135,6 +139,7 @@ class HardwareNode(Node):
             stamp,
             messages.odometry_numbers(state.imu, odometry, frames),
         )
+        self._contacts.publish(messages.foot_contacts_template(odometry), stamp, ())
         if frames.publish:
             self._tf.publish(
                 messages.transforms_template(frames),

@@ -20,9 +20,10 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from quad_description import ImuSample, JointSample
+from quad_description import FEET, ImuSample, JointSample
 from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
 from quad_description.rotations import Quaternion as Rotation
+from quad_msgs.msg import FootContacts
 
 from ..estimation import Battery, OdometryState
 from .parameters import Deviations, Frames
@@ -176,6 +177,34 @@ def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Nu
     else:
         velocity = state.velocity_in_base
     return (state.x, state.y, height, *rotation, *velocity, *rate, state.position_variance)
+
+
+@dataclass(frozen=True, slots=True)
+class FootContactsTemplate:
+    """Which feet are taken to stand; one template for each combination.
+
+    Attributes:
+        contacts: Whether each does, in the order of the legs.
+        source: How that is known.
+    """
+
+    contacts: tuple[bool, ...]
+    source: str
+    count: ClassVar[int] = 0
+
+    def message(self, stamp: Time, _numbers: Numbers) -> FootContacts:
+        """Make a message."""
+        return FootContacts(
+            header=Header(stamp=stamp),
+            name=list(FEET),
+            contact=list(self.contacts),
+            source=self.source,
+        )
+
+
+def foot_contacts_template(state: OdometryState) -> FootContactsTemplate:
+    """Return the template for the feet that stand."""
+    return FootContactsTemplate(state.standing, state.contact_source.value)
 
 
 @dataclass(frozen=True, slots=True)

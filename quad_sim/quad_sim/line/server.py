@@ -34,11 +34,13 @@ class Truth:
         time: Of the robot [s].
         pose: Of base_link in the world.
         velocity: Of base_link.
+        foot_contacts: Which feet touch the ground, in the order of the legs.
     """
 
     time: float
     pose: BasePose
     velocity: BaseVelocity
+    foot_contacts: tuple[bool, ...]
 
 
 class Server:
@@ -144,5 +146,5 @@ class Server:
     def _look(self) -> None:
         self._looked_at = self.now
         plant = self._plant
-        self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity)
+        self.truth = Truth(plant.time, plant.base_pose, plant.base_velocity, plant.foot_contacts)
         self._watch()

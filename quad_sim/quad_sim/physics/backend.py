@@ -117,6 +117,7 @@ class PhysicsBackend(Backend):
             ImuSample(orientation, rates, robot.imu.specific_force),
             position=pose.position,
             linear_velocity=robot.base_velocity.linear,
+            foot_contacts=robot.foot_contacts,
             time=robot.time,
         )
 

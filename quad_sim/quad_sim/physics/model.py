@@ -14,7 +14,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quad_description import Joint, LEGS, movable_joints
+from quad_description import FEET, Joint, movable_joints
 from quad_description.urdf import JointKind, parse
 
 from ..exceptions import SetupError
@@ -27,7 +27,6 @@ IMU: Final = 'imu_link'
 FLOOR, BUMPS = 'floor', 'bumps'
 ACCELEROMETER, GYRO = 'accelerometer', 'gyro'
 
-FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
 _TOUCH_MARGIN = 0.002  # [m] how far the region that feels the ground reaches beyond the foot
 
 _ALL, _FEET_ONLY = 1, 2

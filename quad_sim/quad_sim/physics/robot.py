@@ -11,7 +11,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quad_description import movable_joints
+from quad_description import FEET, movable_joints
 from quad_description.rotations import Vector
 
 from ..exceptions import SetupError, SimulationError
@@ -21,7 +21,7 @@ from ..plant.state import Array, BasePose, BaseVelocity, Imu, Measurement
 from ..plant.targets import TargetRamp, Targets
 from ..plant.terrain import FLAT, Terrain
 from .inertial import base_rotation, InertialUnit, vector
-from .model import BASE, build_model, FEET, mjcf
+from .model import BASE, build_model, mjcf
 from .placing import place, start_positions
 from .variation import AS_MADE, Variation, VariedModel
 

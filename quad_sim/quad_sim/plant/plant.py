@@ -43,6 +43,10 @@ class Plant(Protocol):
         """How base_link moves."""
 
     @property
+    def foot_contacts(self) -> tuple[bool, ...]:
+        """Which feet touch the ground."""
+
+    @property
     def joint_targets(self) -> Array:
         """Set-points now [rad]."""
 
@@ -136,6 +140,11 @@ class KinematicRobot:
     def base_velocity(self) -> BaseVelocity:
         """None."""
         return BaseVelocity((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+    @property
+    def foot_contacts(self) -> tuple[bool, ...]:
+        """None: it is held up in the air."""
+        return (False,) * _FEET
 
     @property
     def joint_targets(self) -> Array:

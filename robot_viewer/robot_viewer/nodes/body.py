@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from importlib import import_module
+import time
+from typing import Any, Protocol
 
 from geometry_msgs.msg import Point
 from geometry_msgs.msg import Pose as PoseMessage
@@ -14,14 +16,27 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 from sensor_msgs.msg import BatteryState, Imu
-from urdf_reader import from_rpy, KinematicTree, Quaternion
+from urdf_reader import DescriptionError, from_rpy, KinematicTree, PointMass, Quaternion
 
+from ..link_poses import link_poses
 from ..page.body_panel import BodyPanel, Pose
-from ..page.standing import battery_text, feet_of, feet_places, horizon_html, standing
+from ..page.standing import (
+    battery_text,
+    centre_of_mass,
+    Contacts,
+    feet_of,
+    foot_radius,
+    horizon_html,
+    support,
+)
 from .listening import Listening
 
 NOT_MEASURED = -1.0
 """First number of a covariance where nothing is measured (REP 145)."""
+CONTACTS, CONTACTS_TYPE = 'foot_contacts', 'quad_msgs/msg/FootContacts'
+CONTACTS_AGE = 1.0
+"""After which contacts of feet are not shown any more in [s]."""
+LEVEL: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 class Page(Protocol):
@@ -52,12 +67,24 @@ class Body:
         self._panel: BodyPanel | None = None
         self._attitude: Quaternion | None = None
         self._battery = ''
+        self._masses: tuple[PointMass, ...] = ()
+        self._radius = 0.0
+        self._contacts: Contacts | None = None
+        self._contacts_at = 0.0
+        self._margin: float | None = None
         self._found: set[str] = set()
         self._poses: Publisher | None = None
 
     def describe(self, tree: KinematicTree) -> None:
         """Take another robot; the page has taken the panel away."""
         self._tree, self._feet, self._panel = tree, feet_of(tree), None
+        self._masses, self._radius = (), 0.0
+        if self._feet:
+            try:
+                self._masses = tuple(tree.masses())
+                self._radius = foot_radius(tree, self._feet[0])
+            except DescriptionError as error:
+                self._node.get_logger().warning(f'no centre of mass is shown: {error}')
 
     def look(self) -> None:
         """Find the topics of a walking robot in the namespace of the node."""
@@ -70,6 +97,12 @@ class Body:
             if topic not in self._found and self._node.count_publishers(topic):
                 self._found.add(topic)
                 self._listening.add(kind, topic, take, qos_profile_sensor_data)
+        if CONTACTS not in self._found and CONTACTS_TYPE in (
+            end.topic_type for end in self._node.get_publishers_info_by_topic(CONTACTS)
+        ):
+            self._found.add(CONTACTS)
+            kind = import_module('quad_msgs.msg').FootContacts
+            self._listening.add(kind, CONTACTS, self._take_contacts, qos_profile_sensor_data)
         if self._poses is None and self._node.count_subscribers('body_pose'):
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)
@@ -89,19 +122,38 @@ class Body:
 
     def draw(self) -> None:
         """Show how the feet are now."""
-        if self._panel is not None and self._tree is not None and self._attitude is not None:
-            places = feet_places(self._tree, self._feet, self._positions)
-            self._panel.show_feet(places, standing(places, self._attitude))
+        if self._panel is None or self._tree is None:
+            return
+        if time.monotonic() - self._contacts_at > CONTACTS_AGE:
+            self._contacts = None
+        poses = link_poses(self._tree, self._positions)
+        places = {foot: poses[foot].translation for foot in self._feet}
+        found = support(
+            places,
+            () if self._contacts is None else self._contacts.feet,
+            self._attitude or LEVEL,
+            centre_of_mass(self._masses, poses),
+            self._radius,
+        )
+        self._margin = found.margin
+        self._panel.show_feet(places, self._contacts)
+        self._panel.show_support(found)
 
     def list(self) -> None:
         """Show attitude and battery."""
         if self._panel is not None:
-            self._panel.show(horizon_html(self._attitude, self._battery))
+            feet = '' if self._contacts is None else self._contacts.html(self._margin)
+            self._panel.show(horizon_html(self._attitude, self._battery) + feet)
 
     def _take_imu(self, message: Imu) -> None:
         turn = message.orientation
         measured = message.orientation_covariance[0] != NOT_MEASURED
         self._attitude = (turn.x, turn.y, turn.z, turn.w) if measured else None
+
+    def _take_contacts(self, message: Any) -> None:  # noqa: ANN401  # quad_msgs may not be there
+        pairs = zip(message.name, message.contact, strict=False)
+        feet = frozenset(name for name, contact in pairs if contact)
+        self._contacts, self._contacts_at = Contacts(feet, message.source), time.monotonic()
 
     def _take_battery(self, message: BatteryState) -> None:
         self._battery = battery_text(message.percentage, message.voltage)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -18,13 +18,18 @@ from viser import (
     ViserServer,
 )
 
+from .standing import Contacts, Support
 from .target_panel import UNLOCK
 
 RANGES: Mapping[str, float] = {'Roll [rad]': 0.35, 'Pitch [rad]': 0.3, 'Height [m]': 0.03}
 """Of the sliders to either side; the controller has limits of its own."""
 DOWN_COLOR, UP_COLOR, LINE_COLOR = (47, 158, 68), (134, 142, 150), (25, 113, 194)
+MASS_COLOR, OUTSIDE_COLOR = (245, 159, 0), (224, 49, 49)
+"""Of the place below the centre of mass: over the support, or outside."""
 FOOT_RADIUS = 0.012
 """Of the mark of a foot in [m]."""
+MASS_RADIUS = 0.008
+"""Of the mark below the centre of mass in [m]."""
 LINE_WIDTH = 3.0
 """In [px]."""
 
@@ -51,6 +56,7 @@ class BodyPanel:
         self._unlock.on_click(lambda _: self._set_locked(locked=False))
         self._sliders: list[GuiSliderHandle[float]] = []
         self._feet: dict[str, IcosphereHandle] = {}
+        self._mass: IcosphereHandle | None = None
         self._line: LineSegmentsHandle | None = None
 
     def offer_pose(self, send: Callable[[Pose], None]) -> None:
@@ -85,7 +91,7 @@ class BodyPanel:
     def remove(self) -> None:
         """Take all of it off the page."""
         self._folder.remove()
-        for node in (*self._feet.values(), self._line):
+        for node in (*self._feet.values(), self._mass, self._line):
             if node is not None:
                 node.remove()
 
@@ -103,32 +109,46 @@ class BodyPanel:
         if self._html.content != html:
             self._html.content = html
 
-    def show_feet(self, places: Mapping[str, Vector], down: Sequence[str]) -> None:
-        """Mark the feet, and draw what those that stand span.
+    def show_feet(self, places: Mapping[str, Vector], contacts: Contacts | None) -> None:
+        """Mark the feet.
 
         Args:
             places: Of all feet in the root link in [m].
-            down: Those that stand, in their order round the robot.
+            contacts: Those on the ground; None where nobody says it.
         """
+        down = frozenset() if contacts is None else contacts.feet
         for foot, place in places.items():
             mark = self._feet.get(foot)
             if mark is None:
-                mark = self._feet[foot] = self._server.scene.add_icosphere(
-                    f'{self._path}/contact_{foot}', FOOT_RADIUS, opacity=0.8
-                )
+                mark = self._feet[foot] = self._mark(f'contact_{foot}', FOOT_RADIUS)
             mark.position = place
-            color = DOWN_COLOR if foot in down else UP_COLOR
-            if tuple(mark.color) != color:
-                mark.color = color
-        corners = np.array([places[foot] for foot in down], float).reshape(-1, 3)
+            _paint(mark, DOWN_COLOR if foot in down else UP_COLOR)
+
+    def show_support(self, support: Support) -> None:
+        """Draw on the ground what the feet span, and the place below the centre of mass.
+
+        Args:
+            support: What they span.
+        """
+        corners = np.array(support.corners, float).reshape(-1, 3)
         ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        below, centre = support.below, support.centre
+        if below is not None and centre is not None:
+            ends = np.concatenate([ends, np.array([[centre, below]])])
+            if self._mass is None:
+                self._mass = self._mark('centre_of_mass', MASS_RADIUS)
+            self._mass.position = below
+            outside = support.margin is not None and support.margin < 0.0
+            _paint(self._mass, OUTSIDE_COLOR if outside else MASS_COLOR)
+        if self._mass is not None:
+            self._mass.visible = below is not None
         if self._line is not None and len(self._line.points) == len(ends):
             self._line.points = ends.astype(np.float32)
             return
         if self._line is not None:
             self._line.remove()
             self._line = None
-        if len(down) > 1:
+        if len(ends):
             self._line = self._server.scene.add_line_segments(
                 f'{self._path}/support',
                 ends,
@@ -137,5 +157,14 @@ class BodyPanel:
                 thickness_units='screen',
             )
 
+    def _mark(self, name: str, radius: float) -> IcosphereHandle:
+        path = f'{self._path}/{name}'
+        return self._server.scene.add_icosphere(path, radius, UP_COLOR, opacity=0.8)
+
     def _set_locked(self, *, locked: bool) -> None:
         self._unlock.visible = locked
+
+
+def _paint(mark: IcosphereHandle, color: tuple[int, int, int]) -> None:
+    if tuple(mark.color) != color:
+        mark.color = color

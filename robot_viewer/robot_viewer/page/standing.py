@@ -1,26 +1,73 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""How a robot stands: its feet, what they span, its attitude; no browser, no ROS.
-
-Nobody senses the contacts of the feet: those are taken to stand that are the lowest, as they hang
-below the body by joints and attitude.
-"""
+"""How a robot stands: its feet, what they span, its attitude; no browser, no ROS."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 import math
 
-from urdf_reader import KinematicTree, Quaternion, rotate, Transform, Vector
-
-from ..link_poses import link_pose
+from urdf_reader import KinematicTree, PointMass, Quaternion, rotate, Transform, Vector
 
 FOOT = '_foot'
 """How the names of the links of feet end."""
 LEAST_FEET = 3
-DOWN_TOLERANCE = 0.008
-"""How far above the lowest foot one stands in [m]."""
+UP: Vector = (0.0, 0.0, 1.0)
+SOURCES: Mapping[str, str] = {
+    'commanded_height': 'estimated by where they were sent; nothing senses it',
+    'measured_height': 'estimated by joints and attitude; nothing senses it',
+    'physics': 'true: the simulation knows',
+}
+"""In words what quad_msgs/FootContacts has as source."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """Which feet are on the ground, as it was published.
+
+    Attributes:
+        feet: Their links.
+        source: How that is known.
+    """
+
+    feet: frozenset[str]
+    source: str
+
+    def html(self, margin: float | None) -> str:
+        """Return it in words.
+
+        Args:
+            margin: Of static stability in [m]; None where no three feet stand.
+        """
+        names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
+        source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
+        stable = 'no support polygon'  # on fewer than three feet; the line stays in its place
+        if margin is not None:
+            inside = 'inside' if margin >= 0.0 else 'outside'
+            stable = f'centre of mass {abs(margin) * 1e3:.0f} mm {inside} the support'
+        return (
+            f'<div style="margin:0.3em 1em"><div>feet on the ground: {escape(names)}</div>'
+            f'<div>{stable}</div><div style="opacity:0.7">{escape(source)}</div></div>'
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """What the feet on the ground span, in the root link in [m].
+
+    Attributes:
+        corners: On the ground below the feet, all round the robot; fewer than three span nothing.
+        centre: Of mass; None where the description has no masses.
+        below: The place on the ground below it.
+        margin: How far that is inside of the corners; below zero outside, None without a span.
+    """
+
+    corners: tuple[Vector, ...]
+    centre: Vector | None
+    below: Vector | None
+    margin: float | None
 
 
 def feet_of(tree: KinematicTree) -> tuple[str, ...]:
@@ -33,30 +80,78 @@ def feet_of(tree: KinematicTree) -> tuple[str, ...]:
     return feet if len(feet) >= LEAST_FEET else ()
 
 
-def feet_places(
-    tree: KinematicTree, feet: Sequence[str], positions: Mapping[str, float]
-) -> dict[str, Vector]:
-    """Return where feet are in the root link in [m].
+def foot_radius(tree: KinematicTree, foot: str) -> float:
+    """Return the radius of a foot that is a ball in [m]; 0 for others.
 
     Args:
         tree: The robot.
-        feet: Their links.
-        positions: Of the joints in [rad].
+        foot: Its link.
     """
-    return {foot: link_pose(tree, foot, positions).translation for foot in feet}
+    balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
+    return next((ball.lengths('radius')[0] for ball in balls), 0.0)
 
 
-def standing(places: Mapping[str, Vector], attitude: Quaternion) -> tuple[str, ...]:
-    """Return the feet that stand, all round the robot.
+def centre_of_mass(masses: Sequence[PointMass], poses: Mapping[str, Transform]) -> Vector | None:
+    """Return it in the root link in [m]; None without masses.
 
     Args:
-        places: Of the feet in the root link in [m].
-        attitude: Of the root link in a level frame.
+        masses: Of the links.
+        poses: Of the links in the root link.
     """
-    heights = {foot: rotate(attitude, place)[2] for foot, place in places.items()}
-    lowest = min(heights.values(), default=0.0)
-    down = [foot for foot, height in heights.items() if height - lowest <= DOWN_TOLERANCE]
-    return tuple(sorted(down, key=lambda foot: math.atan2(places[foot][1], places[foot][0])))
+    total, x, y, z = 0.0, 0.0, 0.0, 0.0
+    for part in masses:
+        pose = poses[part.link]
+        dx, dy, dz = rotate(pose.rotation, part.centre)
+        px, py, pz = pose.translation
+        total += part.mass
+        x += part.mass * (px + dx)
+        y += part.mass * (py + dy)
+        z += part.mass * (pz + dz)
+    return (x / total, y / total, z / total) if total > 0.0 else None
+
+
+def support(
+    places: Mapping[str, Vector],
+    on_ground: Collection[str],
+    attitude: Quaternion,
+    centre: Vector | None,
+    radius: float = 0.0,
+) -> Support:
+    """Return what the feet on the ground span, and where the centre of mass is over it.
+
+    Args:
+        places: Of all feet in the root link in [m].
+        on_ground: Those that are on the ground.
+        attitude: Of the root link in a level frame.
+        centre: Of mass, in the root link in [m].
+        radius: Of the feet in [m].
+    """
+    x, y, z, w = attitude
+    back = (-x, -y, -z, w)
+    levelled = {foot: rotate(attitude, places[foot]) for foot in on_ground if foot in places}
+    corners = [
+        (px, py, pz - radius)
+        for px, py, pz in sorted(levelled.values(), key=lambda at: math.atan2(at[1], at[0]))
+    ]
+    if centre is None or not corners:
+        return Support(tuple(rotate(back, corner) for corner in corners), centre, None, None)
+    over_x, over_y, _ = rotate(attitude, centre)
+    ground = sum(corner[2] for corner in corners) / len(corners)
+    return Support(
+        tuple(rotate(back, corner) for corner in corners),
+        centre,
+        rotate(back, (over_x, over_y, ground)),
+        _margin(corners, over_x, over_y) if len(corners) >= LEAST_FEET else None,
+    )
+
+
+def _margin(corners: Sequence[Vector], x: float, y: float) -> float:
+    """Return how far a place is inside of corners that go round counterclockwise [m]."""
+    sides = zip(corners, (*corners[1:], corners[0]), strict=True)
+    return min(
+        ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / (math.hypot(bx - ax, by - ay) or 1.0)
+        for (ax, ay, _), (bx, by, _) in sides
+    )
 
 
 def roll_pitch(attitude: Quaternion) -> tuple[float, float]:

@@ -11,6 +11,8 @@ from enum import Enum
 import math
 from typing import Any, TypeVar
 
+from quad_description import FEET
+
 from ...exceptions import PolicyError
 from .document import ContractDocument, Values
 from .model import (
@@ -47,6 +49,7 @@ MEANINGS = {
     'relative': 'true where joint positions count from the default pose, else false',
     'phase_period': 'period of the clock in [s]',
     'values': 'what it always is; for a height scan: that of a flat ground at normal height',
+    'feet': f'links of the feet in the order of the training: {", ".join(FEET)}, in any order',
     'flat': 'true: the ground counts as flat; nothing measures heights here',
     'layout': 'per_term (all steps of a term together) or frames (whole observations)',
     'newest': 'first or last',
@@ -214,8 +217,9 @@ def _terms(section: _Section, joints: int, findings: _Findings) -> tuple[Observa
 def _term(name: str, section: _Section, joints: int) -> ObservationTerm:
     source = section.required('source', _choice(Source), Source.CONSTANT)
     values: tuple[float, ...] = ()
+    feet: tuple[str, ...] = ()
     if source is Source.FOOT_CONTACTS:
-        section.required('source', _unmeasured, default=None)
+        feet = section.required('feet', _feet, FEET)
     if source is Source.HEIGHT_SCAN:
         section.required('flat', _declared, default=True)
     if source in {Source.HEIGHT_SCAN, Source.CONSTANT}:
@@ -248,6 +252,7 @@ def _term(name: str, section: _Section, joints: int) -> ObservationTerm:
         phase_period=period,
         phase_threshold=threshold,
         values=values,
+        feet=feet,
     )
     section.end()
     return term
@@ -371,8 +376,11 @@ def _flag(value: object) -> bool:
     return value
 
 
-def _unmeasured(_value: object) -> None:
-    raise _UnfitError('something that is measured: nothing here senses the contacts of feet')
+def _feet(value: object) -> tuple[str, ...]:
+    names = _words(value)
+    if sorted(names) != sorted(FEET):
+        raise _UnfitError(f'each of {", ".join(FEET)} once, in the order of the training')
+    return names
 
 
 def _declared(value: object) -> bool:

@@ -35,7 +35,7 @@ class Source(Enum):
     LAST_ACTION = 'last_action'
     """What the policy answered one step before; a number for each joint."""
     FOOT_CONTACTS = 'foot_contacts'
-    """1 for a foot on the ground; 4 numbers in the order of the legs."""
+    """1 for a foot on the ground, else 0, estimated; 4 numbers in the order of ``feet``."""
     HEIGHT_SCAN = 'height_scan'
     """Heights of the ground; nothing measures them, a flat ground has to be declared."""
     CONSTANT = 'constant'
@@ -116,6 +116,7 @@ class ObservationTerm:
         phase_period: Of the clock in [s].
         phase_threshold: A command whose norm is smaller has no phase.
         values: What a constant, or the scan of a flat ground, is.
+        feet: Links of the feet whose contacts these are, in their order.
     """
 
     name: str
@@ -131,6 +132,7 @@ class ObservationTerm:
     phase_period: float = 1.0
     phase_threshold: float = 0.0
     values: tuple[float, ...] = ()
+    feet: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
