@@ -12,6 +12,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from geometry_msgs.msg import Twist
 from isolation import Isolation
 from moving_arm import goal_to, GoalRun
 from processes import RunningProcess
@@ -19,6 +20,7 @@ import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from urdf_reader import read_urdf
 import yaml
@@ -26,6 +28,7 @@ import yaml
 from arm_bringup.description import read_description, read_semantic
 from arm_bringup.robots import find_robot
 from node_runner import LATCHED
+from quad_msgs.srv import SetMode
 
 CHECKOUT = Path(__file__).parents[1]
 ROBOTS = CHECKOUT / 'arm_bringup' / 'robots'
@@ -181,7 +184,7 @@ def test_plots_of_arms_show_all_joints(name: str) -> None:
     assert [each['value'] for each in error] == [
         f'/{controller}/controller_state.error.positions[{i}]' for i in range(len(joints))
     ]
-    assert layout(ROBOTS / name / 'foxglove.json').services == {(f'/{joints[0]}/halt', '{}')}
+    assert layout(ROBOTS / name / 'foxglove.json').services == {('/stop', '{}')}
 
 
 def type_of(kind: Any, path: str) -> str:
@@ -272,31 +275,55 @@ def test_a_running_arm_has_all_and_its_stop_stops_it(isolation: Isolation) -> No
         states = client.listen(JointState, '/joint_states')
         client.spin_until(lambda: bool(states), STARTING, 'joint states')
         here = dict(zip(states[-1].name, states[-1].position, strict=True))
-        goal = GoalRun(client, goal_to([here[joint] + 0.5 for joint in JOINTS], 60.0))
+        goal = GoalRun(client, goal_to([here[joint] + 0.5 for joint in JOINTS], 20.0))
 
         def moved() -> bool:
             there = dict(zip(states[-1].name, states[-1].position, strict=True))
-            return all(abs(there[joint] - here[joint]) > 0.005 for joint in JOINTS)
+            return all(abs(there[joint] - here[joint]) > 0.1 for joint in JOINTS)
 
         client.spin_until(moved, STARTING, 'motion of all joints')
         [(service, _)] = shown.services
-        assert client.trigger(service).success
+        stopped_by = client.trigger(service)
+        assert stopped_by.success, stopped_by.message
+        assert all(joint in stopped_by.message for joint in JOINTS)
+        assert stopped_by.message.startswith('stopped: panda_joint1, ')
         goal.wait()
         client.spin_until(
             lambda: all(abs(v) < 1e-3 for v in states[-1].velocity), STARTING, 'rest of all joints'
         )
         stopped = dict(zip(states[-1].name, states[-1].position, strict=True))
         assert all(abs(stopped[joint] - here[joint]) < 0.4 for joint in JOINTS), 'all of the way'
+        assert 'stand: panda_joint1, ' in client.trigger(service).message
 
 
 @pytest.mark.scenario
 @pytest.mark.timeout(300)
 def test_a_running_quadruped_has_all(isolation: Isolation) -> None:
-    """Topics, services, fields and frames."""
+    """Topics, services, fields and frames; its STOP ends the gait, while a velocity comes."""
     command = ['ros2', 'run', 'quad_bringup', 'bringup', '--simulate']
     with (
         RunningProcess(command, isolation.env) as bringup,
         RosClient(isolation.domain_id) as client,
     ):
         bringup.wait_for('all is ready', STARTING)
-        check(client, [layout(DOG / 'foxglove.json'), rviz(DOG / 'quad.rviz')])
+        shown = layout(DOG / 'foxglove.json')
+        check(client, [shown, rviz(DOG / 'quad.rviz')])
+        states = client.listen(String, '/controller_node/state', LATCHED)
+        velocities = client.node.create_publisher(Twist, '/cmd_vel', 1)
+        ahead = Twist()
+        ahead.linear.x = 0.1
+
+        def walks_until(state: str) -> None:
+            def there() -> bool:
+                velocities.publish(ahead)
+                return bool(states) and states[-1].data == state
+
+            client.spin_until(there, STARTING, state)
+
+        assert client.call(SetMode, '/set_mode', SetMode.Request(mode='walk')).success
+        walks_until('walk')
+        assert ('/stop', '{}') in shown.services
+        answer = client.trigger('/stop')
+        assert answer.success
+        assert answer.message == 'stopped: walk; the mode is stand'
+        walks_until('stand')

@@ -12,7 +12,7 @@ from arm_servo.teleop import CartesianJog, Frame, JointJog, KeyboardTeleop, Scal
 from arm_servo.teleop.exceptions import SettingError
 from arm_servo.teleop.jog import Jog, rest_of
 from arm_servo.teleop.key_map import HELP, JOINTS, TOOL
-from arm_servo.teleop.requests import CommandType, SwitchType, TogglePause
+from arm_servo.teleop.requests import CommandType, StopRobot, SwitchType, TogglePause
 from arm_servo.teleop.scales import Steps
 from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, Note, Quit
 
@@ -184,7 +184,8 @@ def test_every_other_key_stops() -> None:
         press(teleop, key)
         assert teleop.wanted(0.0) is None
     fresh = make()
-    press(fresh, 'space')
+    assert press(fresh, 'k') == []
+    assert press(fresh, 'space') == [StopRobot()], 'also what others move'
     assert [jog for _, jog in published(fresh, 0.0, 0.5)] == [CartesianJog()] * 3
 
 

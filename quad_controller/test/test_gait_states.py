@@ -18,7 +18,7 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
 from quad_controller.states.faults import Fault
-from quad_controller.states.modes import MODES, State
+from quad_controller.states.modes import Answer, MODES, State
 from quad_controller.states.parameters import StateParameters
 from quad_description import (
     DescriptionError,
@@ -859,3 +859,36 @@ def test_no_sequence_of_events_makes_a_target_jump(script: list[dict[str, object
                 assert limits.lower <= target <= limits.upper
                 assert abs(target - before) <= limits.velocity * min(dt, 1.5 * PERIOD) + 1e-9
             previous = targets
+
+
+def test_stop_ends_whatever_walks_at_any_time() -> None:
+    """Gait, policy and what is on its way to one; it says what, and needs no second call."""
+    rig = Rig()
+    assert rig.controller.stop() == Answer(True, 'nothing walks: relax')
+    rig.step()
+    rig.ask('walk')
+    assert 'stopped: relax; the mode is relax' in rig.controller.stop().message
+    rig.run(1.0, FORWARD)
+    assert rig.is_in(State.RELAX), 'it does not even stand up'
+    rig.ask('walk')
+    rig.until(State.WALK)
+    rig.run(1.0, FORWARD)
+    assert rig.controller.status.velocity.x > 0.05
+    assert 'stopped: walk; the mode is stand' in rig.controller.stop().message
+    rig.run(3.0, FORWARD)
+    assert rig.controller.status.title == 'stand', 'whoever goes on to command a velocity'
+    assert rig.controller.stop().message == 'nothing walks: stand'
+    rig.ask('walk')
+    rig.run(0.1)
+    assert rig.controller.status.velocity.at_rest, 'no velocity of before'
+    rig.until(State.WALK)
+    rig.imu = tilted(1.2)
+    rig.run(0.5)
+    assert rig.controller.stop().message.startswith('nothing walks: fault: ')
+    policy = StillPolicy(STAND)
+    rig = Rig(Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy))
+    rig.step()
+    rig.ask('policy')
+    rig.until(State.POLICY)
+    assert 'stopped: policy' in rig.controller.stop().message
+    rig.until(State.STAND)

@@ -76,6 +76,9 @@ NEUTRAL_KEYS = frozenset({'g', 'home'})
 STOP_KEYS = frozenset({'space', 'k'})
 """Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
 
+ROBOT_STOP_KEY = 'space'
+"""The one of them that ends the gait, too, whoever walks it."""
+
 CLEAR_KEY = 'backspace'
 """Key that clears the controller's latched faults."""
 
@@ -91,6 +94,7 @@ HELP = """\
     m  ,  .            M  <  >         a d       pitch        e c  turning
                                        r y       yaw
   1 stand  2 walk  3 turn  0 lie       g         neutral      ?    this help
-  Space, letting go, any other key stop  Backspace clears a fault  Ctrl-C quits\
+  Space STOP: the gait ends, too     letting go, any other key stop
+  Backspace clears a fault           Ctrl-C quits\
 """
 """The map, for the eye: plain characters, fits into 79 columns."""

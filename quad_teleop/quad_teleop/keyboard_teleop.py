@@ -16,11 +16,12 @@ from .key_map import (
     NEUTRAL_KEYS,
     POSES,
     QUIT_KEYS,
+    ROBOT_STOP_KEY,
     SPEEDS,
     STOP_KEYS,
     SUSPEND_KEY,
 )
-from .requests import ClearFault, ModeRequest, PoseRequest, Request
+from .requests import ClearFault, ModeRequest, PoseRequest, Request, StopRobot
 from .speeds import Speeds
 from .velocity import Velocity
 
@@ -121,6 +122,7 @@ class KeyboardTeleop:
             return [Suspend()]
         if key in STOP_KEYS:
             self._stream.stop()
+            return [StopRobot()] if key == ROBOT_STOP_KEY else []
         return []
 
     def _change_speeds(self, linear: int, angular: int) -> list[Request]:

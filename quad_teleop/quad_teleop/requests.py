@@ -39,4 +39,9 @@ class ClearFault:
     """Ask the controller to forget its latched faults."""
 
 
-Request = ModeRequest | PoseRequest | ClearFault | Note | Quit | Suspend
+@dataclass(frozen=True, slots=True)
+class StopRobot:
+    """Stop the whole robot: gait or policy end, whatever follows the velocity."""
+
+
+Request = ModeRequest | PoseRequest | ClearFault | StopRobot | Note | Quit | Suspend

@@ -37,6 +37,7 @@ class Robot:
         self.modes: list[str] = []
         client.node.create_service(SetMode, 'set_mode', self._set_mode)
         client.node.create_service(Trigger, 'controller_node/clear_fault', self._clear)
+        client.node.create_service(Trigger, 'stop', self._stop)
         self._diagnostics = client.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
 
     @property
@@ -93,6 +94,10 @@ class Robot:
             values=[KeyValue(key='state', value='fault')],
         )
         self._diagnostics.publish(DiagnosticArray(status=[status]))
+
+    def _stop(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = True, 'nothing walks: relax'
+        return response
 
     def _clear(self, _request: Any, response: Any) -> Any:
         response.success, response.message = True, 'all is well'

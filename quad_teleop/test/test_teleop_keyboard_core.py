@@ -23,7 +23,7 @@ from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
 from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.key_map import HELP, MODES, MOVES, NEUTRAL_KEYS, POSES, SPEEDS, STOP_KEYS
 from quad_teleop.keyboard_teleop import KeyboardTeleop
-from quad_teleop.requests import ModeRequest, PoseRequest, Request
+from quad_teleop.requests import ModeRequest, PoseRequest, Request, StopRobot
 from quad_teleop.velocity import rest_of, ZERO
 
 V, W = 0.15, 0.6
@@ -168,7 +168,7 @@ def test_any_other_key_stops(key: str) -> None:
 def test_stop_key_says_zero_even_when_idle(key: str) -> None:
     """Something else may be driving the robot."""
     target = teleop()
-    feed(target, key)
+    assert feed(target, key) == ([StopRobot()] if key == 'space' else [])
     assert published(target, 0.0, 1.0) == [ZERO] * 3
 
 

@@ -51,6 +51,7 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
         robot.wait_for((0.165, 0.165, 0.0), after=settled)
         pane.press('Space')
         robot.wait_until_stopped()
+        wait_on_screen(client, pane, 'stop: nothing walks')
         pane.wait_for(r'0\.17 m/s 0\.66 rad/s \| idle')
 
         pane.press('2')

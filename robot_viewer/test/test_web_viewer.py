@@ -56,6 +56,10 @@ class Robot:
         self._executor.add_node(self.node)
         self._executor.add_node(self.viewer)
 
+    def offer_stop(self) -> None:
+        """Offer to stop all of it."""
+        self.node.create_service(Trigger, 'stop', self._answer('stop'))
+
     def _answer(
         self, name: str
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
@@ -100,11 +104,17 @@ def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
 
 
 def test_stop_halts_every_drive(robot: Robot) -> None:
-    """And nothing that merely has a service of that name."""
+    """And nothing that merely has a service of that name; by one service where there is one."""
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     robot.viewer.stop()
     robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
     assert sorted(robot.calls) == ['joint1/halt', 'joint2/halt']
+    robot.offer_stop()
+    robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
+    robot.viewer.stop()
+    robot.spin_until(lambda: len(robot.calls) == 3, 'the stop of all')
+    assert robot.calls[-1] == 'stop', 'one call instead of many'
+    robot.calls.pop()
     robot.viewer.call('/joint1/enable')
     robot.spin_until(lambda: len(robot.calls) == 3, 'enable')
     assert robot.calls[-1] == 'joint1/enable'

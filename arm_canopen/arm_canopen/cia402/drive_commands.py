@@ -123,6 +123,13 @@ class DriveCommands:
         """Whether a command runs."""
         return self._task is not None and not self._task.done
 
+    @property
+    def stopping(self) -> Promise[str] | None:
+        """The command that stops the drive, while one runs."""
+        if self._leaving is not None:
+            return self._leaving
+        return self._task if self._busy and self._running in self._stopping else None
+
     def set_target(self, target: float) -> str:
         """Move to a position, at a velocity or with a torque, in the mode that is selected.
 

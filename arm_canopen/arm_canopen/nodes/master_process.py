@@ -31,6 +31,7 @@ from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
 from .output_thread import OutputThread
+from .stop_service import StopService
 from .units_service import BusFile
 
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
@@ -91,6 +92,8 @@ class MasterProcess:
         self._network.on_feedback = self._joint_states.feedback
         services = MasterServices(node, self._thread, self._output)
         services.check_owner = self._check_owner
+        commands = list(self._master.commands.values())
+        StopService(node, commands, self._thread, self._output)
         self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
         node.create_timer(diagnostics_period, self._request_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)

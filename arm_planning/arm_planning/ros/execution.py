@@ -119,6 +119,7 @@ class TrajectoryExecution:
             name: ActionClient(node, each.kind.action, each.action(name))
             for name, each in controllers.items()
         }
+        self.stops = 0
         self._running: list[Execution] = []
         self._find_out: Callable[[Execution], None] | None = None
         self._begun: Callable[[], None] | None = None
@@ -244,11 +245,12 @@ class TrajectoryExecution:
             handle.cancel_goal_async()
 
     def stop_all(self, reason: str) -> None:
-        """Have everything stopped that is on its way.
+        """Have everything stopped that is on its way; what was to follow counts :attr:`stops`.
 
         Args:
             reason: Why.
         """
+        self.stops += 1
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
 

@@ -96,6 +96,7 @@ class _Goal:
     """A goal from its acceptance to its end; why it was stopped before it is planned anew."""
 
     handle: Any
+    stops: int
     work: Future[Any] | None = None
     planned: PlannedMotion | None = None
     execution: Execution | None = None
@@ -141,7 +142,7 @@ class MotionAction:
         )
 
     def _start(self, handle: Any) -> None:  # noqa: ANN401  # rclpy has no types here
-        goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle)
+        goal = self._goals[bytes(handle.goal_id.uuid)] = _Goal(handle, self._execution.stops)
         self._begin_planning(goal)
 
     def _begin_planning(self, goal: _Goal) -> None:
@@ -185,6 +186,9 @@ class MotionAction:
 
     def _follow(self, goal: _Goal, planned: PlannedMotion) -> None:
         """Have the next trajectory of a plan followed, or end the goal after the last."""
+        if goal.stops != self._execution.stops:
+            self._end(goal, PlanningCode.PREEMPTED, 'everything was stopped meanwhile')
+            return
         if goal.begun == len(planned.trajectories):
             self._end(goal, PlanningCode.SUCCESS, '; '.join(planned.notes))
             return

@@ -46,6 +46,9 @@ SPEEDS = {'+': 1, '=': 1, '-': -1, '_': -1}
 STOP_KEYS = frozenset({'space', 'k'})
 """Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
 
+ROBOT_STOP_KEY = 'space'
+"""The one of them that stops the whole robot, also what others move."""
+
 QUIT_KEYS = frozenset({'q', 'ctrl+c', 'ctrl+d', 'ctrl+\\'})
 SUSPEND_KEY = 'ctrl+z'
 
@@ -56,7 +59,7 @@ HELP = """\
     ;  .         z                     f v  about z
   W base axes  E tool axes    + -  speed    M  single steps    P  pause, go on
   J joint, T twist commands only (MoveIt's servo needs the choice)    ?  this help
-  Space, letting go, any other key stop     Q or Ctrl-C quits\
+  Space stops the whole robot; letting go, any other key stop    Q or Ctrl-C quits\
 """
 """The map, for the eye: plain characters, fits into 82 columns."""
 

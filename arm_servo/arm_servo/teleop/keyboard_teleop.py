@@ -28,6 +28,7 @@ from .key_map import (
     plain,
     QUIT_KEYS,
     REVERSE_KEY,
+    ROBOT_STOP_KEY,
     SPEEDS,
     STEP_KEY,
     STOP_KEYS,
@@ -36,7 +37,7 @@ from .key_map import (
     TOOL_KEY,
     TWIST_TYPE_KEY,
 )
-from .requests import CommandType, Request, SwitchType, TogglePause
+from .requests import CommandType, Request, StopRobot, SwitchType, TogglePause
 from .scales import Scales, Steps
 
 SPEED_STEP_FACTOR = 1.25  # of a speed key
@@ -196,6 +197,7 @@ class KeyboardTeleop:
             self.stepping = not self.stepping
         elif key in STOP_KEYS:
             self._stream.stop()
+            return [StopRobot()] if key == ROBOT_STOP_KEY else []
         return []
 
     def _let_go(self) -> None:

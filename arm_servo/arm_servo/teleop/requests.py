@@ -33,4 +33,9 @@ class TogglePause:
     """Pause the servo, or let it go on."""
 
 
-Request = SwitchType | TogglePause | Note | Quit | Suspend
+@dataclass(frozen=True, slots=True)
+class StopRobot:
+    """Stop the whole robot, whatever moves it."""
+
+
+Request = SwitchType | TogglePause | StopRobot | Note | Quit | Suspend

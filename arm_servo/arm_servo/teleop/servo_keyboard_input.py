@@ -15,7 +15,7 @@ from operator_input.ros import KeyboardNode, run_keyboard
 from .jog import Jog, rest_of
 from .key_map import HELP
 from .keyboard_teleop import KeyboardTeleop
-from .requests import Request, SwitchType, TogglePause
+from .requests import Request, StopRobot, SwitchType, TogglePause
 from .scales import Steps
 from .screen import status, View
 from .servo_link import declare_link, ServoLink
@@ -77,6 +77,8 @@ class Session(KeyboardSession[Jog, Request]):
                 self._link.switch(command_type)
             case TogglePause():
                 self._link.toggle_pause()
+            case StopRobot():
+                self._link.stop_robot()
 
     def attend(self, now: float) -> None:
         """Learn from the servo what is not known yet."""

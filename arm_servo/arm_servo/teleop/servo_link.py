@@ -18,7 +18,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 from arm_model import ArmNames, ModelError
 from node_runner import LATCHED, ParameterReader
@@ -109,6 +109,7 @@ class ServoLink:
         self._settings = SettingsClient(node, servo, self._learn)
         self._switch = node.create_client(ServoCommandType, f'{servo}/switch_command_type')
         self._pause = node.create_client(SetBool, f'{servo}/pause_servo')
+        self._stop = node.create_client(Trigger, 'stop')
         node.create_subscription(ServoStatus, f'{servo}/status', self._take_status, 10)
         node.create_subscription(String, 'robot_description', self._take_description, LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 10)
@@ -177,6 +178,10 @@ class ServoLink:
         request = SetBool.Request(data=paused)
         self._call(self._pause, request, 'pause' if paused else 'go on', granted)
 
+    def stop_robot(self) -> None:
+        """Stop the whole robot; the jog itself has ended by its zeros."""
+        self._call(self._stop, Trigger.Request(), 'stop', lambda: None)
+
     def flush(self) -> None:
         """Wait until what was published has arrived, before the program ends."""
         for publisher in (self._twist, self._jog):
@@ -195,7 +200,7 @@ class ServoLink:
 
     def _call(self, client: Any, request: Any, what: str, granted: Callable[[], None]) -> None:  # noqa: ANN401
         if not client.service_is_ready():
-            self._say(f'{what}: there is no service {client.service_name}; is the servo running?')
+            self._say(f'{what}: there is no service {client.service_name}; is the robot running?')
             return
 
         def take(future: Any) -> None:  # noqa: ANN401  # rclpy's Future

@@ -139,6 +139,7 @@ class ControllerNode(Node):
         if policy is not None:
             self._see_estimates(_estimates_for(policy))
         self.create_service(SetMode, 'set_mode', self._set_mode)
+        self.create_service(Trigger, 'stop', self._take_stop)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
         create_deferred_service(
             self,
@@ -346,6 +347,15 @@ class ControllerNode(Node):
             del self._texts[policy]
             return answer
         return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
+
+    def _take_stop(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        with self._loop.lock:
+            answer = self._controller.stop()
+        response.success, response.message = answer.accepted, answer.message
+        self.get_logger().info(f'stop: {answer.message}')
+        return response
 
     def _clear_fault(
         self, _request: Trigger.Request, response: Trigger.Response

@@ -133,6 +133,23 @@ class Controller:
         without = ''.join(f'; in spite of {f.value}: {why}' for f, why in present.items())
         return Answer(True, f'{request.state.value}{gait}{way}{without}')
 
+    def stop(self) -> Answer:
+        """End the gait or the policy, whatever follows it; a robot that does not walk stays so.
+
+        A change of posture goes on to its end: half-way a leg may be in the air.
+        """
+        machine = self._machine
+        self._commands.set_velocity(REST)  # or the next mode would begin with the one of before
+        if machine.state is State.FAULT and machine.goal is State.FAULT:
+            return Answer(True, f'nothing walks: fault: {"; ".join(self._latch.texts)}')
+        if not {machine.state, machine.goal} & MOVING_STATES:
+            return Answer(True, f'nothing walks: {machine.title}')
+        was = machine.title
+        if machine.goal in MOVING_STATES:
+            down = machine.state in {State.LIE, State.RELAX}
+            machine.request(machine.state if down else State.STAND)
+        return Answer(True, f'stopped: {was}; the mode is {machine.goal.value}')
+
     def set_velocity(self, velocity: Velocity) -> Answer:
         """Request a velocity; it counts until the next one or the time-out."""
         return self._commands.set_velocity(velocity)

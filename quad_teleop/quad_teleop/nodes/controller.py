@@ -19,7 +19,7 @@ from .command_client import CommandClient
 
 
 class Controller:
-    """Client of ``set_mode`` and ``controller_node/clear_fault``, and listener to /diagnostics.
+    """Client of ``set_mode``, ``stop`` and ``controller_node/clear_fault``; reads /diagnostics.
 
     Attributes:
         mode: The mode that was granted last; None before.
@@ -36,6 +36,7 @@ class Controller:
         self._report: ControllerReport | None = None
         self._modes = CommandClient(node, SetMode, 'set_mode', show, self._granted)
         self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', show)
+        self._stops = CommandClient(node, Trigger, 'stop', show, self._stopped)
         node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 10)
 
     def ask_mode(self, mode: Mode, now: float) -> None:
@@ -55,6 +56,14 @@ class Controller:
         """
         self._faults.request('clear fault', Trigger.Request(), now)
 
+    def stop(self, now: float) -> None:
+        """Stop the whole robot.
+
+        Args:
+            now: Time [s].
+        """
+        self._stops.request('stop', Trigger.Request(), now)
+
     def report(self, now: float) -> ControllerReport | None:
         """Return what the controller said last; None when that is long ago.
 
@@ -72,6 +81,10 @@ class Controller:
         """
         self._modes.check(now)
         self._faults.check(now)
+        self._stops.check(now)
+
+    def _stopped(self, _: str) -> None:
+        self.mode = None  # the controller knows
 
     def _granted(self, mode: str) -> None:
         self.mode = Mode(mode)

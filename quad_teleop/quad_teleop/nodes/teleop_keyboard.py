@@ -15,7 +15,7 @@ from operator_input.ros import KeyboardNode, run_keyboard
 from ..exceptions import TeleopError
 from ..key_map import HELP
 from ..keyboard_teleop import KeyboardTeleop
-from ..requests import ClearFault, ModeRequest, PoseRequest, Request
+from ..requests import ClearFault, ModeRequest, PoseRequest, Request, StopRobot
 from ..speeds import Speeds
 from ..velocity import Velocity
 from .controller import Controller
@@ -76,6 +76,8 @@ class Session(KeyboardSession[Velocity, Request]):
         match request:
             case ModeRequest(mode):
                 self._controller.ask_mode(mode, time.monotonic())
+            case StopRobot():
+                self._controller.stop(time.monotonic())
             case ClearFault():
                 self._controller.clear_fault(time.monotonic())
             case PoseRequest(pose):

@@ -69,9 +69,10 @@ DRIVE_SERVICES = (
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
 WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax')
-STEPPING = ('walk', 'turn', 'policy')
 SET_MODE_TYPE = 'quad_msgs/srv/SetMode'
 TRIGGER = 'std_srvs/srv/Trigger'
+STOP = 'stop'
+"""Service of a robot that stops all of it."""
 
 
 class WebViewer(Node):
@@ -99,12 +100,12 @@ class WebViewer(Node):
         self._orders: deque[Callable[[], None]] = deque()
         self._trigger_clients: dict[str, Client] = {}
         self._drives: dict[str, list[str]] = {}
+        self._stops: set[str] = set()
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
         self._received_at: float | None = None
         self._own = False
         self._statuses: dict[str, Status] = {}
-        self._state = ''
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
@@ -127,7 +128,6 @@ class WebViewer(Node):
         self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
         self._listening.add(TFMessage, '/tf', self._take_transforms, sensor)
         self._listening.add(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
-        self.create_subscription(String, 'controller_node/state', self._take_state, LATCHED)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
@@ -171,9 +171,6 @@ class WebViewer(Node):
             level = int.from_bytes(status.level, 'little')
             values = {each.key: each.value for each in status.values}
             self._statuses[status.name] = Status(status.name, level, status.message, values)
-
-    def _take_state(self, message: String) -> None:
-        self._state = str(message.data)
 
     def _serve_page(self) -> None:
         while self._orders:
@@ -243,6 +240,8 @@ class WebViewer(Node):
             if f'{node}/halt' in triggers
         }
         self._drives.update(drives)
+        stops = {self.resolve_service_name(STOP), *map(_stop_beside, self._drives)}
+        self._stops |= stops & set(triggers)
         self.page.offer_drives(self._drives)
 
     def _find_jogging(self) -> None:
@@ -262,7 +261,7 @@ class WebViewer(Node):
     # -- what people do on the page, in its threads
 
     def stop(self) -> None:
-        """Halt every drive, and end the gait of a robot that walks."""
+        """Stop whatever moves."""
         self._order(self._stop)
 
     def call(self, service: str) -> None:
@@ -305,12 +304,13 @@ class WebViewer(Node):
     def _stop(self) -> None:
         self._controllers.stop()
         self._first_motion.stop()
+        for service in self._stops:
+            self._call(service)
         for drive in self._drives:
-            self._call(f'{drive}/halt')
+            if _stop_beside(drive) not in self._stops:  # of another master than ours
+                self._call(f'{drive}/halt')
         self._planning.stop()
-        if self._state.removeprefix('to ') in STEPPING:
-            self._request_mode('stand')
-        if not self._drives and self._set_mode is None:
+        if not self._drives and not self._stops:
             self.page.say('STOP: nothing here offers to be stopped', failed=True)
 
     def _call(self, service: str) -> None:
@@ -347,6 +347,11 @@ class WebViewer(Node):
         message = JointState(name=list(positions), position=list(positions.values()))
         message.header.stamp = self.get_clock().now().to_msg()
         self._joint_states.publish(message)
+
+
+def _stop_beside(node: str) -> str:
+    """Return the service that stops all of the robot in whose namespace a node is."""
+    return f'{node.rpartition("/")[0]}/{STOP}'
 
 
 def main() -> int:

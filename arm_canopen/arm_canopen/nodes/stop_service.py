@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``stop``: one service that stops the robot, whatever moves it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Future
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from ..cia402.drive_commands import DriveCommands
+from ..cia402.stop_all import stop_all, StopReport
+from ..master.runner import NetworkThread
+from .deferred_service import DeferredServices
+from .output_thread import OutputThread
+
+SERVICE = 'stop'
+EVENT_TOPIC, STOP_EVENT = 'trajectory_execution_event', 'stop'
+"""By which MoveIt's move_group, or ours, gives up what it executes, and what it was to execute."""
+
+
+class StopService:
+    """Halts all drives of a bus; it is there at any time, also while devices boot."""
+
+    def __init__(
+        self,
+        node: Node,
+        commands: Sequence[DriveCommands],
+        thread: NetworkThread,
+        output: OutputThread,
+    ) -> None:
+        """Offer it.
+
+        Args:
+            node: The master's node.
+            commands: Those of the drives.
+            thread: The thread of the network.
+            output: The thread that answers.
+        """
+        self._node, self._commands, self._thread = node, commands, thread
+        self._events = node.create_publisher(String, EVENT_TOPIC, 10)
+        DeferredServices(output).create(node, Trigger, SERVICE, self._stop, self._answer)
+
+    def _stop(self, _: Trigger.Request) -> Future[StopReport]:
+        self._events.publish(String(data=STOP_EVENT))  # or a plan would begin after the halt
+        scheduler = self._thread.network.scheduler
+        return self._thread.run_coroutine(lambda: stop_all(self._commands, scheduler))
+
+    def _answer(self, response: Any, future: Future[StopReport]) -> None:  # noqa: ANN401
+        error = future.exception()
+        if error is None:
+            report = future.result()
+            response.success, response.message = not report.failed, str(report)
+        else:
+            response.success, response.message = False, str(error)
+        log = self._node.get_logger()
+        (log.info if response.success else log.error)(f'{SERVICE}: {response.message}')
