@@ -118,6 +118,9 @@ def test_stop_halts_every_drive(robot: Robot) -> None:
     robot.viewer.call('/joint1/enable')
     robot.spin_until(lambda: len(robot.calls) == 3, 'enable')
     assert robot.calls[-1] == 'joint1/enable'
+    robot.viewer.call('/nobody/enable')  # after good answers one that fails, which is a warning
+    robot.viewer.call('/joint2/enable')
+    robot.spin_until(lambda: len(robot.calls) == 4, 'enable, after it')
 
 
 def test_who_does_not_look_takes_no_messages(

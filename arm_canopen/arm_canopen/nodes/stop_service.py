@@ -58,4 +58,8 @@ class StopService:
         else:
             response.success, response.message = False, str(error)
         log = self._node.get_logger()
-        (log.info if response.success else log.error)(f'{SERVICE}: {response.message}')
+        # a line of its own for each severity: rclpy refuses another one from the same line
+        if response.success:
+            log.info(f'{SERVICE}: {response.message}')
+        else:
+            log.error(f'{SERVICE}: {response.message}')

@@ -337,7 +337,11 @@ class WebViewer(Node):
 
     def _report(self, what: str, text: str, *, failed: bool) -> None:
         self.page.say(f'{what}: {text}', failed=failed)
-        (self.get_logger().warning if failed else self.get_logger().info)(f'{what}: {text}')
+        # a line of its own for each severity: rclpy refuses another one from the same line
+        if failed:
+            self.get_logger().warning(f'{what}: {text}')
+        else:
+            self.get_logger().info(f'{what}: {text}')
 
     def _publish_joints(self, positions: Mapping[str, float]) -> None:
         if not self._own:
