@@ -178,6 +178,21 @@ def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
     robot.node.destroy_publisher(other)
 
 
+def test_a_robot_that_is_out_of_reach_is_said_to_be(robot: Robot) -> None:
+    """A link that is cut looks like an arm that stands still; the words go when it comes back."""
+    states = robot.node.create_publisher(JointState, 'joint_states', 10)
+    robot.description.publish(String(data=ARM))
+    silence = robot.viewer.page._silence
+
+    def heard() -> bool:
+        states.publish(JointState(name=['a'], position=[0.5]))
+        return robot.viewer._received_at is not None and not silence.content
+
+    robot.spin_until(heard, 'joint states')
+    robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words')
+    robot.spin_until(heard, 'their end')
+
+
 def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
     """The last of several counts; what the page does not move stays; a stop forgets it.
 

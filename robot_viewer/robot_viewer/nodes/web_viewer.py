@@ -200,6 +200,7 @@ class WebViewer(Node):
             return
         age = None if self._received_at is None else time.monotonic() - self._received_at
         self.page.list_joints(self._positions, 0.0 if self._own else age)
+        self.page.show_silence(None if self._own else age)
         if self._statuses:
             self.page.show_statuses(list(self._statuses.values()))
         for name, controller in self._controllers.found.items():

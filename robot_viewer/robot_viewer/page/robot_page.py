@@ -59,6 +59,12 @@ TWISTS: Mapping[str, Twist] = {
 }
 """Shares of the speed of jogging, along and about the axes of the base."""
 
+SILENCE = 1.0
+"""Without joint states after which the robot counts as out of reach in [s]."""
+SILENT = (
+    'nothing from the robot for {:.0f} s: is the link cut, or has it ended? What is held here '
+    'stops by itself; STOP may not reach the rest: use the emergency stop'
+)
 REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 WALKS: Mapping[str, Velocity] = {
     'forward': (0.3, 0.0, 0.0),
@@ -149,6 +155,7 @@ class RobotPage:
         self._server.scene.set_up_direction('+z')
         self._ground = Ground(self._server.scene)
         self._answer = gui.add_html(_line('no robot description yet', COLORS[3]))
+        self._silence: GuiHtmlHandle = gui.add_html('')
         self._tabs: GuiTabGroupHandle = gui.add_tab_group()
         self._pages: dict[str, GuiTabHandle] = {}
         self._units: dict[str, str] = {}
@@ -218,6 +225,16 @@ class RobotPage:
             if name in positions
         ]
         self._joints.content = _table(rows) + (_line(old, COLORS[1]) if old else '')
+
+    def show_silence(self, age: float | None) -> None:
+        """Say it in front of everything when nothing is received from the robot any more.
+
+        Args:
+            age: Of its joint states in [s]; None where none were expected.
+        """
+        text = '' if age is None or age <= SILENCE else _line(SILENT.format(age), COLORS[2])
+        if self._silence.content != text:
+            self._silence.content = text
 
     def show_base(self, pose: Transform) -> None:
         """Show how the root link is in the world, and that it moves there."""
