@@ -51,6 +51,7 @@ setup(
     install_requires=[
         'pyserial>=3.5',
         'PyYAML>=6',
+        sibling('libraries/black_box'),
         sibling('libraries/dds_network'),
         sibling('quad_description'),
     ],

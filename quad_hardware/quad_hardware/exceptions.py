@@ -7,8 +7,9 @@
     HardwareError
     ├── CodecError (ValueError)        a value does not fit its field, or bytes are no payload
     ├── CommandError (ValueError)      a joint command or a mapping is refused; nothing was sent
-    └── LinkError (OSError)            a serial port cannot be opened, or was lost
-        └── NoAnswerError (TimeoutError)   no robot answers on a port that is open
+    ├── LinkError (OSError)            a serial port cannot be opened, or was lost
+    │   └── NoAnswerError (TimeoutError)   no robot answers on a port that is open
+    └── RecordingError (ValueError)    a serial log cannot be written, or is damaged
 
 Arguments of the wrong kind from a *programmer* stay ``ValueError``/``TypeError``.
 """
@@ -42,4 +43,12 @@ class NoAnswerError(LinkError, TimeoutError):
     """A port is open and no robot answers on it.
 
     Scenarios: the robot is off, another program reads the same port, another baud rate.
+    """
+
+
+class RecordingError(HardwareError, ValueError):
+    """A serial log cannot be written, is damaged, or has nothing that can be replayed.
+
+    Scenarios: the file exists already, a line was edited, the session went through the vendor's
+    library.
     """

@@ -6,16 +6,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 import time
 
+from black_box import BlackBox, BlackBoxSettings
 from quad_description import RobotState
 
 from .estimation import Estimator, EstimatorSettings, Health, OdometryState
 from .exceptions import CommandError
 from .joints import CommandCounters, JointCommander, JointMap, LimiterSettings, LossReaction
 from .joints.command import NOMINAL_PERIOD
-from .link import Driver, LinkOptions, LinkState, LinkStatus, STALE_TIME
+from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
+from .recording import (
+    FaultWatch,
+    LossWatch,
+    Recorder,
+    SerialLogFile,
+    SerialMemory,
+    StateEntered,
+    tapped,
+)
 from .report import Report
+
+LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
+"""What a fault is of; diagnostics have the same names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +43,8 @@ class RobotSettings:
         limiter: How fast targets may move.
         command_loss: What the robot does when commands break off with a leg in the air.
         estimator: How its reports are read.
+        black_box: How the last bytes are written when a fault happens; None for not at all.
+        serial_log: Where all bytes are written to as they pass; None for nowhere.
     """
 
     link: LinkOptions
@@ -37,6 +53,8 @@ class RobotSettings:
     limiter: LimiterSettings = field(default_factory=LimiterSettings)
     command_loss: LossReaction = LossReaction.LIE
     estimator: EstimatorSettings = field(default_factory=EstimatorSettings)
+    black_box: BlackBoxSettings | None = None
+    serial_log: Path | None = None
 
 
 class SerialRobot:
@@ -48,6 +66,7 @@ class SerialRobot:
     Attributes:
         names: Joints in the order of targets.
         timeout: Time after the last command at which :meth:`miss_commands` is to be called [s].
+        black_box: Writes the last bytes when a fault happens; None without.
     """
 
     def __init__(
@@ -70,6 +89,7 @@ class SerialRobot:
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
+            RecordingError: The serial log cannot be written.
         """
         self.names = settings.joints.names
         self._joints = settings.joints
@@ -83,14 +103,35 @@ class SerialRobot:
             raised=self._estimator.raised_feet,
             send=self._send_angles,
             obstacle=self._obstacle,
-            warn=warn,
+            warn=self._warn,
         )
-        self._driver = Driver(settings.link, self._report, self._link_changed)
+        self._warning = warn
+        self._last_note = ''
+        self._recorders: list[Recorder] = []
+        self._log_file: SerialLogFile | None = None
+        self.black_box: BlackBox | None = None
+        port = settings.link.path
+        if settings.black_box is not None:
+            memory = SerialMemory(port, settings.black_box.window)
+            self._recorders.append(memory)
+            self.black_box = BlackBox(f'serial_{port}', memory, settings.black_box)
+        if settings.serial_log is not None:
+            self._log_file = SerialLogFile(settings.serial_log)
+            self._recorders.append(self._log_file)
+        self._losses, self._faults = LossWatch(), FaultWatch()
+        self._driver = Driver(
+            settings.link,
+            self._report,
+            self._link_changed,
+            self._tapped,
+        )
         self._latest: tuple[Report, RobotState] | None = None  # while the link is running
         self.timeout = self._commander.timeout
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
         """Start looking for the robot; ``begin`` is called first in the thread of the driver."""
+        if self.black_box is not None:
+            self.black_box.start()
         self._driver.start(begin)
 
     def end(self, report_loss: Callable[[str], None]) -> None:
@@ -105,6 +146,10 @@ class SerialRobot:
             self.go_down()
             time.sleep(NOMINAL_PERIOD)
         self._driver.stop()
+        if self.black_box is not None:
+            self.black_box.close()
+        if self._log_file is not None:
+            self._log_file.close()
 
     # -- what is known of it
 
@@ -159,7 +204,10 @@ class SerialRobot:
         """
         now, latest = time.monotonic(), self._latest
         imu = latest[1].imu if latest is not None else None
-        return self._commander.miss(self._place(now), None if imu is None else imu.tilt, now)
+        loss = self._commander.miss(self._place(now), None if imu is None else imu.tilt, now)
+        if loss:
+            self.fault(COMMANDS, loss)
+        return loss
 
     def go_down(self) -> bool:
         """Send the next targets on the way down; return whether there were any."""
@@ -187,19 +235,48 @@ class SerialRobot:
             self._commander.let_go()
         return sent
 
+    # -- for the black box
+
+    def fault(self, subject: str, text: str) -> None:
+        """Have the black box written, where there is one; returns at once."""
+        if self.black_box is not None:
+            self.black_box.fault(subject, text)
+
+    def _note(self, subject: str, text: str) -> None:
+        """Keep a text for a report; what comes with each command or report, once."""
+        if self.black_box is not None and text != self._last_note:
+            self._last_note = text
+            self.black_box.note(subject, text)
+
+    def _warn(self, text: str) -> None:
+        self._note(COMMANDS, text)
+        self._warning(text)
+
     # -- in the thread of the driver
+
+    def _tapped(self, session: Session) -> Session:
+        return tapped(session, self._recorders) if self._recorders else session
 
     def _report(self, report: Report) -> str:
         """Take a report; return why it cannot be."""
         state = self._estimator.update(report)
         if state is None:
+            self._note(LINK, f'report refused: {self._estimator.refusal}')
             self._on_refusal(self._estimator.refusal)
             return self._estimator.refusal
         self._latest = report, state
         self._on_state(state)
+        if self.black_box is not None:
+            for fault in self._faults.look(report, state, self._estimator.imu_problem):
+                self.black_box.fault(ROBOT, fault)
         return ''
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
+        entered = StateEntered(time.monotonic(), state, detail)
+        for recorder in self._recorders:
+            recorder.event(entered)
+        keep = self.fault if self._losses.is_lost(state) else self._note
+        keep(LINK, f'{state.value}: {detail}')
         if state is not LinkState.RUNNING:
             self._latest = None  # the robot may be moved while nobody sees it
             self._commander.lose()

@@ -3,6 +3,7 @@
 """What the robot does not report and the controller needs: rates, odometry, height."""
 
 from .battery import Battery
+from .device_clock import BoardWatch
 from .estimator import Estimator, EstimatorSettings, Health, RateSource
 from .imu_mounting import ImuMounting
 from .odometry import OdometrySettings, OdometryState, SCALES
@@ -10,6 +11,7 @@ from .odometry import OdometrySettings, OdometryState, SCALES
 __all__ = [
     'SCALES',
     'Battery',
+    'BoardWatch',
     'Estimator',
     'EstimatorSettings',
     'Health',

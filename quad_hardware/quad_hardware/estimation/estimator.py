@@ -149,9 +149,14 @@ class Estimator:
         feet = self._robot.foot_poses(state.joints.positions)
         return self._odometry.update(state.joints.time, feet, state.imu.orientation)
 
+    @property
+    def imu_problem(self) -> str:
+        """Why the IMU is of no use, by the latest report; empty while it works."""
+        return self._plausibility.imu_problem
+
     def health(self) -> Health:
         """Return how the robot is, by its latest reports."""
-        imu_problem = self._plausibility.imu_problem
+        imu_problem = self.imu_problem
         error = None if imu_problem else self._gravity.error
         return Health(self._battery.state, error, self._refused, self.refusal, imu_problem)
 

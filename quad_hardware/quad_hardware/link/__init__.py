@@ -5,9 +5,9 @@
 from .dialect import DialectCounters
 from .driver import Driver, STALE_TIME
 from .latency import latency_problem, latency_timer
-from .port import DEFAULT_PORT, SerialPort
+from .port import DEFAULT_PORT, Port, SerialPort
 from .probe import connect, Connection, read_battery, read_firmware, send_request
-from .session import LinkOptions
+from .session import LinkOptions, Session
 from .status import LinkState, LinkStatus
 
 __all__ = [
@@ -19,7 +19,9 @@ __all__ = [
     'LinkOptions',
     'LinkState',
     'LinkStatus',
+    'Port',
     'SerialPort',
+    'Session',
     'connect',
     'latency_problem',
     'latency_timer',

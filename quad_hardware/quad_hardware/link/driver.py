@@ -46,11 +46,20 @@ class Driver:
         options: LinkOptions,
         on_state: Callable[[Report], str],
         on_change: Callable[[LinkState, str], None],
+        tap: Callable[[Session], Session] = lambda session: session,
     ) -> None:
-        """Prepare; :meth:`start` begins."""
+        """Prepare; :meth:`start` begins.
+
+        Args:
+            options: Where the robot is.
+            on_state: See above.
+            on_change: See above.
+            tap: Returns a session that was opened with a port that records what passes.
+        """
         self._options = options
         self._on_state = on_state
         self._on_change = on_change
+        self._tap = tap
         self._thread = threading.Thread(target=self._run, name='serial', daemon=True)
         self._begin: Callable[[], None] = lambda: None
         self._stopping = threading.Event()
@@ -189,7 +198,7 @@ class Driver:
             self._stopping.wait(RETRY_PERIOD)
             return
         try:
-            self._serve(session)
+            self._serve(self._tap(session))
         except LinkError as error:
             self._enter(LinkState.CONNECTING, str(error))
         finally:

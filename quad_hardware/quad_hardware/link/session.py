@@ -88,12 +88,14 @@ class Session:
         firmware: Version of the robot.
         parser: Finds frames in its bytes.
         dialect: How to talk to it.
+        model: Whose ranges scale bytes in protocol v1; None in others.
     """
 
     port: Port
     firmware: str
     parser: FrameParser[Any]
     dialect: Dialect[Any]
+    model: Model | None = None
 
 
 def open_session(options: LinkOptions) -> Session:
@@ -106,12 +108,13 @@ def open_session(options: LinkOptions) -> Session:
         return _open_vendor(options)
     connection = connect(options.path, options.protocols, options.baud)
     try:
-        dialect = _make_dialect(connection, options)
+        model = _model(connection, options)
     except LinkError:
         connection.port.close()
         raise
     parser = StreamParser(connection.protocol, ROBOT_KINDS)
-    return Session(connection.port, connection.firmware, parser, dialect)
+    dialect = make_dialect(model, time.monotonic(), options.rate)
+    return Session(connection.port, connection.firmware, parser, dialect, model)
 
 
 def _open_vendor(options: LinkOptions) -> Session:
@@ -125,14 +128,25 @@ def _open_vendor(options: LinkOptions) -> Session:
         raise
 
 
-def _make_dialect(connection: Connection, options: LinkOptions) -> Dialect[Frame]:
-    now = time.monotonic()
+def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect[Frame]:
+    """Return how to talk to a robot.
+
+    Args:
+        model: Whose ranges scale bytes in protocol v1; None speaks v2.
+        now: Time [s].
+        rate: Reports a second [Hz].
+    """
+    return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)
+
+
+def _model(connection: Connection, options: LinkOptions) -> Model | None:
+    """Return whose ranges scale bytes in protocol v1; None in v2, which has no need of them."""
     if connection.protocol is V2:
-        return V2Dialect(now, options.rate)
+        return None
     model = options.model or model_of_firmware(connection.firmware)
     if model is None:
         raise LinkError(
             f'firmware {connection.firmware!r} is of no known quadruped (M mini, L lite, W or MW '
             'wheeled); name its ranges with the parameter or option model'
         )
-    return V1Dialect(now, model, options.rate)
+    return model

@@ -14,20 +14,13 @@ from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
 from ..joints import CommandCounters
 from ..link import latency_problem, LinkState, LinkStatus
 from ..protocol import Fault, ParserCounters
+from ..recording import FAULT_TEXTS
 from ..report import Report
+from ..serial_robot import COMMANDS, LINK, ROBOT
 
 HOT_SERVO = 65.0  # [°C]
 GRAVITY_ERROR = math.radians(15.0)  # [rad] between accelerometer and attitude
 MAX_DAMAGE_RATIO = 0.01  # of the frames, above which a cable is bad
-
-FAULTS = {
-    Fault.LOW_BATTERY: 'low battery: charge it',
-    Fault.OVERLOAD: 'overload: free its legs, or let it lie down',
-    Fault.OVERHEATED: 'overheated: let it lie down and cool',
-    Fault.SERVO_SILENT: 'servo silent: look at the cable of the leg that hangs limp',
-    Fault.IMU: 'IMU: its attitude is not to be trusted, switch the robot off and on',
-}
-"""What a fault is called, and what to do."""
 
 UNCHECKED = (
     'the IMU was not compared with gravity, nor its gyro with turning by hand, so the '
@@ -47,25 +40,35 @@ _LINK_LEVELS = {
 
 
 class LinkDiagnostic:
-    """Describes the serial link, look by look: damage is judged since the last one."""
+    """Describes the serial link, look by look: damage is judged since the last one.
+
+    Attributes:
+        damage: What is wrong with its frames since the last look; empty while they are good.
+    """
 
     def __init__(self) -> None:
+        self.damage = ''
         self._frames = self._damaged = 0
 
-    def describe(self, node: str, port: str, status: LinkStatus) -> DiagnosticStatus:
+    def describe(
+        self, node: str, port: str, status: LinkStatus, recording: str = ''
+    ) -> DiagnosticStatus:
         """Describe the link, and begin to look anew.
 
         Args:
             node: Name of the node.
             port: Its serial port.
             status: The link.
+            recording: Last file of the black box; empty before one.
         """
         level, message = _LINK_LEVELS[status.state], status.detail
         parser = status.parser
         frames, damaged = self._since(parser)
-        if level == DiagnosticStatus.OK and damaged > MAX_DAMAGE_RATIO * max(frames, 100):
-            level = DiagnosticStatus.WARN
-            message = f'{damaged} damaged and {frames} good frames lately; is the cable loose?'
+        self.damage = ''
+        if damaged > MAX_DAMAGE_RATIO * max(frames, 100):
+            self.damage = f'{damaged} damaged and {frames} good frames lately; is the cable loose?'
+        if level == DiagnosticStatus.OK and self.damage:
+            level, message = DiagnosticStatus.WARN, self.damage
         if level == DiagnosticStatus.OK and (slow := latency_problem(port, status.latency)):
             level, message = DiagnosticStatus.WARN, slow
         values = {
@@ -77,12 +80,13 @@ class LinkDiagnostic:
             'report_age': '' if math.isinf(status.age) else f'{status.age:.3f}',
             'latency_timer': '' if status.latency is None else f'{status.latency:.3f}',
             'reports_refused': status.refused,
+            'black_box': recording,
             'commands_sent': status.commands,
             'commands_dropped': status.dropped,
             **asdict(parser),
             **asdict(status.dialect),
         }
-        return _status(level, f'{node}: serial link', message, port, values)
+        return _status(level, f'{node}: {LINK}', message, port, values)
 
     def _since(self, parser: ParserCounters) -> tuple[int, int]:
         """Return the valid and the damaged frames since the last look."""
@@ -93,7 +97,13 @@ class LinkDiagnostic:
 
 
 def robot_diagnostic(
-    node: str, port: str, state: Report, health: Health, *, signs_checked: bool
+    node: str,
+    port: str,
+    state: Report,
+    health: Health,
+    *,
+    signs_checked: bool,
+    recording: str = '',
 ) -> DiagnosticStatus:
     """Describe battery, servos and IMU.
 
@@ -103,6 +113,7 @@ def robot_diagnostic(
         state: The newest report.
         health: How the robot is.
         signs_checked: Somebody has compared the IMU with gravity, and a gyro with turning.
+        recording: Last file of the black box with a fault of it; empty before one.
     """
     level, message = DiagnosticStatus.OK, 'no faults'
     if not signs_checked:
@@ -128,7 +139,7 @@ def robot_diagnostic(
         message = f'{health.imu_problem}; lie down, then switch the robot off and on'
     if faults:
         level = DiagnosticStatus.ERROR
-        message = f'the robot reports {"; ".join(FAULTS[f] for f in Fault if f in faults)}'
+        message = f'the robot reports {"; ".join(FAULT_TEXTS[f] for f in Fault if f in faults)}'
     values = {
         'battery': '' if charge is None else f'{charge:.0f}',
         'voltage': '' if voltage is None else f'{voltage:.2f}',
@@ -138,8 +149,9 @@ def robot_diagnostic(
         'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
         'implausible_reports': health.refused,
         'last_implausible': health.refusal,
+        'black_box': recording,
     }
-    return _status(level, f'{node}: robot', message, port, values)
+    return _status(level, f'{node}: {ROBOT}', message, port, values)
 
 
 def command_diagnostic(node: str, port: str, counters: CommandCounters) -> DiagnosticStatus:
@@ -151,7 +163,7 @@ def command_diagnostic(node: str, port: str, counters: CommandCounters) -> Diagn
         message = f'{counters.loss}; {message}' if counters.troubled else counters.loss
     values = {k: v for k, v in asdict(counters).items() if k != 'troubled'}
     counters.troubled, counters.largest_step = False, 0.0
-    return _status(level, f'{node}: joint commands', message, port, values)
+    return _status(level, f'{node}: {COMMANDS}', message, port, values)
 
 
 def _status(

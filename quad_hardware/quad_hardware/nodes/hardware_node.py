@@ -23,6 +23,7 @@ from tf2_msgs.msg import TFMessage
 from message_templates import FastPublisher, FastReader
 from node_runner import (
     destroyed_when_refused,
+    log_as,
     notify_ready,
     raise_thread_priority,
     run_program,
@@ -35,7 +36,7 @@ from quad_msgs.msg import FootContacts, JointCommand
 from ..exceptions import CommandError, HardwareError
 from ..joints.command import NOMINAL_PERIOD
 from ..link import LinkState
-from ..serial_robot import SerialRobot
+from ..serial_robot import LINK, ROBOT, SerialRobot
 from . import messages
 from .diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
 from .parameters import declare_parameters
@@ -83,6 +84,7 @@ class HardwareNode(Node):
         self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
         self._tf = FastPublisher(self.create_publisher(TFMessage, '/tf', 100))
         self._link = LinkDiagnostic()
+        self._damage = ''
         self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
         self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
@@ -213,18 +215,34 @@ class HardwareNode(Node):
         array = DiagnosticArray()
         array.header.stamp = now
         array.status = [
-            self._link.describe(name, port, self._robot.status()),
+            self._link.describe(name, port, self._robot.status(), self._recording()),
             command_diagnostic(name, port, self._robot.counters),
         ]
+        before, self._damage = self._damage, self._link.damage
+        if self._damage and not before:
+            self._robot.fault(LINK, self._damage)
         if latest is not None:
             report, state = latest
             health = self._robot.health()
             checked = state.imu is not None and not state.imu.is_uncertain
             array.status.append(
-                robot_diagnostic(name, port, report, health, signs_checked=checked)
+                robot_diagnostic(
+                    name,
+                    port,
+                    report,
+                    health,
+                    signs_checked=checked,
+                    recording=self._recording(ROBOT),
+                )
             )
             self._battery.publish(messages.battery(health.battery, now))
         self._diagnostics.publish(array)
+
+    def _recording(self, subject: str = '') -> str:
+        """Return the last file of the black box, maybe of one subject; empty before one."""
+        box = self._robot.black_box
+        path = None if box is None else box.recording_of(subject) if subject else box.last
+        return '' if path is None else str(path)
 
 
 def _check_rest(message: JointCommand, rest: Sequence[float]) -> None:
@@ -247,6 +265,7 @@ def main() -> int:
 def _serve(stop: threading.Event) -> None:
     sys.setswitchinterval(SWITCH_INTERVAL)
     node = HardwareNode()
+    log_as(node)
     settle_process_memory(node)
     node.begin()
     try:

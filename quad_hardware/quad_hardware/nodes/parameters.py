@@ -6,10 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from rclpy.node import Node
 
-from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
+from node_runner import (
+    declare_black_box,
+    declare_thread_priority,
+    ParameterReader,
+    refuse_misspelt,
+)
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, Vector
 
@@ -132,6 +138,8 @@ def declare_parameters(node: Node) -> NodeSettings:
             'what the robot does when commands break off with a leg in the air',
         ),
         estimator=_estimator(read),
+        black_box=declare_black_box(read),
+        serial_log=_serial_log(read),
     )
     settings = NodeSettings(
         robot=robot,
@@ -142,6 +150,11 @@ def declare_parameters(node: Node) -> NodeSettings:
     )
     refuse_misspelt(node)
     return settings
+
+
+def _serial_log(read: ParameterReader) -> Path | None:
+    name = read.text('serial_log', '', 'file that all bytes are written to; empty for none')
+    return Path(name).expanduser() if name else None
 
 
 def _vendor(protocols: tuple[Protocol, ...], method: str) -> bool:

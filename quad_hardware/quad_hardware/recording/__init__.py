@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What went over a serial line: kept in memory, written as a log, read again."""
+
+from .fault_watch import FAULT_TEXTS, FaultWatch, LossWatch
+from .log_file import SerialLogFile
+from .memory import SerialMemory
+from .serial_log import Entry, Opened, read_serial_log, StateEntered, Transfer
+from .tap import Recorder, tapped
+
+__all__ = [
+    'FAULT_TEXTS',
+    'Entry',
+    'FaultWatch',
+    'LossWatch',
+    'Opened',
+    'Recorder',
+    'SerialLogFile',
+    'SerialMemory',
+    'StateEntered',
+    'Transfer',
+    'read_serial_log',
+    'tapped',
+]

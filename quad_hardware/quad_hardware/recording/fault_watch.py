@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""When something begins to be wrong with a robot or its line: what a black box is written for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import math
+
+from quad_description import RobotState
+
+from ..estimation import BoardWatch
+from ..joints import MAX_TILT
+from ..link import LinkState
+from ..protocol import Fault
+from ..report import Report
+
+FAULT_TEXTS: Mapping[Fault, str] = {
+    Fault.LOW_BATTERY: 'low battery: charge it',
+    Fault.OVERLOAD: 'overload: free its legs, or let it lie down',
+    Fault.OVERHEATED: 'overheated: let it lie down and cool',
+    Fault.SERVO_SILENT: 'servo silent: look at the cable of the leg that hangs limp',
+    Fault.IMU: 'IMU: its attitude is not to be trusted, switch the robot off and on',
+}
+"""What a fault of protocol v2 is called, and what to do."""
+
+CONFIRMATIONS = 3  # reports in a row; one damaged frame in 256 passes its checksum
+UPRIGHT = 0.8 * MAX_TILT  # [rad] below which a body that fell stands again
+_ALL_FAULTS = sum(Fault)
+_LOST = {LinkState.STALE, LinkState.REFUSED, LinkState.FAILED}
+_FOUND = {LinkState.WAITING, LinkState.RUNNING}
+
+
+class FaultWatch:
+    """Finds what begins to be wrong from one report to the next.
+
+    A fault counts when as many reports have it as :data:`CONFIRMATIONS`, and again after as many
+    without it.
+    """
+
+    def __init__(self) -> None:
+        self._boards = BoardWatch()
+        self._bits = 0  # that count
+        self._differs = 0  # reports in a row with other bits
+        self._imu_problem = ''
+        self._fallen = False
+
+    def look(self, report: Report, state: RobotState, imu_problem: str) -> list[str]:
+        """Return what has begun, in words; empty as a rule.
+
+        Args:
+            report: A report.
+            state: Its state.
+            imu_problem: Why the IMU is of no use; empty while it works.
+        """
+        begun: list[str] = []
+        # without its clock a restart is a silence, which is a fault already
+        if self._boards.restarted(report) and report.device_time is not None:
+            begun.append('the board has begun anew; is the battery empty, or a plug loose?')
+        bits = report.faults & _ALL_FAULTS
+        self._differs = 0 if bits == self._bits else self._differs + 1
+        if self._differs >= CONFIRMATIONS:
+            new, self._bits, self._differs = bits & ~self._bits, bits, 0
+            begun += [f'the robot reports {FAULT_TEXTS[bit]}' for bit in Fault if bit & new]
+        if imu_problem and not self._imu_problem:
+            begun.append(imu_problem)
+        self._imu_problem = imu_problem
+        if state.imu is not None:
+            tilt = state.imu.tilt
+            if tilt > MAX_TILT and not self._fallen:
+                begun.append(f'the robot fell: its body is tilted by {math.degrees(tilt):.0f} deg')
+            self._fallen = tilt > (UPRIGHT if self._fallen else MAX_TILT)
+        return begun
+
+
+class LossWatch:
+    """Distinguishes the loss of a robot that was there from the search for one."""
+
+    def __init__(self) -> None:
+        self._found = False
+
+    def is_lost(self, state: LinkState) -> bool:
+        """Take the state that a link has entered; return whether that is a fault."""
+        if state in _FOUND:
+            self._found = True
+            return False
+        was_found = self._found
+        if state in {LinkState.CONNECTING, LinkState.STOPPED}:
+            self._found = False
+            return was_found and state is LinkState.CONNECTING
+        return state in _LOST

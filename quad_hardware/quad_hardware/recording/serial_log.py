@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The log of a serial session: lines of text, each with its time on the wall clock in [s].
+
+::
+
+    # serial log of quad_hardware, version 1: < is from the robot, > to it
+    (1764144123.000102) open {"port": "/dev/ttyAMA0", "baud": 2000000, "protocol": "v2", ...}
+    (1764144123.000214) state {"state": "waiting", "detail": "L-2.0.0 on /dev/ttyAMA0 speaks ..."}
+    (1764144123.000391) > 5500 0A 01 ...
+    (1764144123.021776) < 5500 ...
+
+A line is what one call has read or written, not a frame. Lines that do not begin with a time are
+comments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+import json
+from pathlib import Path
+import re
+from typing import TypeAlias
+
+from ..exceptions import RecordingError
+from ..link import LinkState
+from ..protocol import Model
+
+HEADER = '# serial log of quad_hardware, version 1: < is from the robot, > to it\n'
+RECEIVED, SENT = '<', '>'
+_LINE = re.compile(r'\((\d+\.\d+)\) (<|>|open|state) (.*)')
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """Bytes that were read or written at once.
+
+    Attributes:
+        time: When [s].
+        data: The bytes.
+        sent: They went to the robot; otherwise they came from it.
+    """
+
+    time: float
+    data: bytes
+    sent: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A robot that was found; what follows is the conversation with it.
+
+    Attributes:
+        time: When [s].
+        port: Device file.
+        baud: Speed [bit/s].
+        protocol: Name of what it speaks.
+        firmware: Its version.
+        model: Whose ranges scale bytes in protocol v1; None in others.
+    """
+
+    time: float
+    port: str
+    baud: int
+    protocol: str
+    firmware: str
+    model: Model | None
+
+
+@dataclass(frozen=True, slots=True)
+class StateEntered:
+    """The state of the link has changed.
+
+    Attributes:
+        time: When [s].
+        state: What the driver does from then on.
+        detail: In words.
+    """
+
+    time: float
+    state: LinkState
+    detail: str
+
+
+Entry: TypeAlias = Transfer | Opened | StateEntered
+
+
+def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
+    """Return the line of bytes, with its end."""
+    return f'({time:.6f}) {SENT if sent else RECEIVED} {data.hex(" ")}\n'
+
+
+def format_event(event: Opened | StateEntered, time: float) -> str:
+    """Return the line of what is no transfer, with its end.
+
+    Args:
+        event: What happened.
+        time: When, on the wall clock [s].
+    """
+    if isinstance(event, StateEntered):
+        kind = 'state'
+        content: dict[str, object] = {'state': event.state.value, 'detail': event.detail}
+    else:
+        kind = 'open'
+        content = {
+            'port': event.port,
+            'baud': event.baud,
+            'protocol': event.protocol,
+            'firmware': event.firmware,
+            'model': None if event.model is None else event.model.value,
+        }
+    return f'({time:.6f}) {kind} {json.dumps(content, ensure_ascii=False)}\n'
+
+
+def read_serial_log(path: Path) -> Iterator[Entry]:
+    """Yield what a log has; times are on the wall clock.
+
+    Raises:
+        RecordingError: A line is damaged; the message has its number.
+        OSError: It cannot be read.
+    """
+    with path.open(encoding='utf-8', errors='replace') as file:
+        for number, line in enumerate(file, start=1):
+            if not line.startswith('('):
+                continue
+            try:
+                yield _parse(line.rstrip('\r\n'))
+            except (ValueError, KeyError, TypeError) as error:
+                raise RecordingError(f'{path}, line {number} is damaged: {error}') from error
+
+
+def _parse(line: str) -> Entry:
+    found = _LINE.fullmatch(line)
+    if found is None:
+        raise ValueError(f'{line[:40]!r} is no entry of a serial log')
+    time, kind, content = float(found[1]), found[2], found[3]
+    if kind in {RECEIVED, SENT}:
+        return Transfer(time, bytes.fromhex(content), kind == SENT)
+    values = json.loads(content)
+    if kind == 'state':
+        return StateEntered(time, LinkState(values['state']), str(values['detail']))
+    model = values['model']
+    return Opened(
+        time,
+        str(values['port']),
+        int(values['baud']),
+        str(values['protocol']),
+        str(values['firmware']),
+        None if model is None else Model(model),
+    )
