@@ -17,6 +17,7 @@ EXECUTABLES = [
     'doctor = quad_hardware.doctor.main:main',
     'hardware_node = quad_hardware.nodes.hardware_node:main',
     'protocol = quad_hardware.protocol.page:main',
+    'replay = quad_hardware.nodes.replay:main',
 ]
 COMMANDS = [
     'xgo-calibrate = quad_hardware.calibration.main:main',

@@ -14,12 +14,11 @@ from config_samples import BUS, load_text
 import pytest
 
 from arm_canopen.can import Frame
-from arm_canopen.exceptions import CanopenError
 from arm_canopen.library.bus_replay import BusReplay, unknown_scales
-from arm_canopen.library.log_player import LogPlayer
 from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtState
+from black_box import LogPlayer, PlaybackError
 
 PERIOD = 0.01  # [s] of SYNC
 ENABLED, FAULT = 0x1237, 0x1218  # statuswords
@@ -250,11 +249,14 @@ def test_axes_with_the_scales_of_their_drive_are_named(tmp_path: Path) -> None:
     assert unknown_scales(load_text(tmp_path, scaled)) == ['joint1']
 
 
-def player(bus: BusReplay, log: Log, *, rate: float = 100.0, start: float = 0.0) -> LogPlayer:
+def player(
+    bus: BusReplay, log: Log, *, rate: float = 100.0, start: float = 0.0
+) -> LogPlayer[Frame]:
     """Return a player of the frames of a log."""
 
-    def read() -> Iterator[Frame]:
-        yield from sorted(log.frames, key=lambda frame: frame.timestamp)
+    def read() -> Iterator[tuple[float, Frame]]:
+        for frame in sorted(log.frames, key=lambda frame: frame.timestamp):
+            yield frame.timestamp, frame
 
     return LogPlayer(bus, read, rate=rate, start=start)
 
@@ -294,14 +296,12 @@ def test_a_log_that_is_repeated_goes_on_in_time(watched: Watched) -> None:
     assert watched.texts(Severity.ERROR) == []
 
 
-@pytest.mark.parametrize(
-    ('cycles', 'start', 'reason'), [(0, 0.0, 'no frames'), (10, 9.0, '0.1 s')]
-)
+@pytest.mark.parametrize(('cycles', 'start', 'reason'), [(0, 0.0, 'is empty'), (10, 9.0, '0.1 s')])
 def test_a_log_with_nothing_to_play_is_refused(
     watched: Watched, cycles: int, start: float, reason: str
 ) -> None:
     """An empty file, or a start behind its end."""
     log = Log()
     log.cycles(cycles)
-    with pytest.raises(CanopenError, match=reason):
+    with pytest.raises(PlaybackError, match=reason):
         player(watched.bus, log, start=start).play(threading.Event(), loop=False)

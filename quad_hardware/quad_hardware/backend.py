@@ -1,22 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The robot on its serial port as a back end, in real time and without ROS."""
+"""The robot on its serial port, or in a log of it, as a back end without ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 import logging
+from pathlib import Path
 import threading
 import time
 
-from quad_description import Backend, movable_joints, RobotState
+from quad_description import Backend, movable_joints, RecordedBackend, RobotState
 
-from .estimation import EstimatorSettings, ImuMounting
-from .exceptions import CommandError, NoAnswerError
+from .estimation import EstimatorSettings, ImuMounting, OdometryState
+from .exceptions import CommandError, NoAnswerError, RecordingError
 from .joints import JointMap, servo_of
 from .link import LinkOptions, LinkState, STALE_TIME
 from .protocol import Protocol, PROTOCOLS
+from .recording import read_serial_log
+from .replayed_robot import ReplayedRobot
 from .serial_robot import RobotSettings, SerialRobot
 
 CONNECT_TIME = 10.0  # [s] in which the robot has to be found
@@ -39,11 +42,40 @@ def robot_at(
     Raises:
         CommandError: The legs of the URDF cannot be read.
     """
-    joints = JointMap(map(servo_of, movable_joints(urdf)))
-    mounting = ImuMounting(checked=imu_checked, rates_checked=imu_checked)
     link = LinkOptions(port, tuple(protocols))
-    estimator = EstimatorSettings(mounting=mounting)
-    return SerialBackend(RobotSettings(link, urdf, joints, estimator=estimator))
+    return SerialBackend(_settings_of(link, urdf, imu_checked=imu_checked))
+
+
+def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedBackend:
+    """Return the states of a serial log, in real order and without ROS.
+
+    Args:
+        log: Of a black box, or of the parameter ``serial_log`` of hardware_node.
+        urdf: What the robot is.
+        imu_checked: As of :func:`robot_at`.
+
+    Raises:
+        CommandError: The legs of the URDF cannot be read.
+        RecordingError: The log is damaged, or has no report.
+        OSError: It cannot be read.
+    """
+    states: list[RobotState] = []
+
+    def keep(state: RobotState) -> None:
+        states.append(_located(state, robot.update_odometry(state)))
+
+    robot = ReplayedRobot(
+        _settings_of(LinkOptions(str(log)), urdf, imu_checked=imu_checked),
+        on_state=keep,
+        on_change=lambda state, detail: _log.info('%s: %s', state.value, detail),
+        on_refusal=_log.warning,
+    )
+    for entry in read_serial_log(log):
+        robot.take(entry, entry.time)
+    if not states:
+        raise RecordingError(f'{log} has no report of a robot')
+    period = (states[-1].time - states[0].time) / max(len(states) - 1, 1)
+    return RecordedBackend(robot.names, states, period)
 
 
 class SerialBackend(Backend):
@@ -131,14 +163,7 @@ class SerialBackend(Backend):
     # -- in the thread of the driver
 
     def _take(self, state: RobotState) -> None:
-        odometry = self._robot.update_odometry(state)
-        if odometry is not None:
-            state = replace(
-                state,
-                position=(odometry.x, odometry.y, odometry.height),
-                linear_velocity=odometry.velocity_in_base,
-                foot_contacts=odometry.standing,
-            )
+        state = _located(state, self._robot.update_odometry(state))
         with self._arrived:
             self._state, self._count = state, self._count + 1
             self._arrived.notify_all()
@@ -164,3 +189,21 @@ class SerialBackend(Backend):
                 self._state = None
             self._arrived.notify_all()
         _log.info('%s: %s', state.value, detail)
+
+
+def _settings_of(link: LinkOptions, urdf: str, *, imu_checked: bool) -> RobotSettings:
+    joints = JointMap(map(servo_of, movable_joints(urdf)))
+    mounting = ImuMounting(checked=imu_checked, rates_checked=imu_checked)
+    return RobotSettings(link, urdf, joints, estimator=EstimatorSettings(mounting=mounting))
+
+
+def _located(state: RobotState, odometry: OdometryState | None) -> RobotState:
+    """Return a state with what is known of the body and its feet by the odometry."""
+    if odometry is None:
+        return state
+    return replace(
+        state,
+        position=(odometry.x, odometry.y, odometry.height),
+        linear_velocity=odometry.velocity_in_base,
+        foot_contacts=odometry.standing,
+    )

@@ -1,14 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The black box of a running hardware_node: a robot falls silent, and its last bytes are there."""
+"""The black box of a running hardware_node: its last bytes are there, and can be replayed."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 import re
-from typing import TYPE_CHECKING
+from statistics import median
+from typing import Any, TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from processes import executable, RunningProcess
 import pytest
 
 from quad_hardware.link import LinkState
@@ -38,30 +41,41 @@ def black_box(status: DiagnosticStatus) -> str:
     return next((pair.value for pair in status.values if pair.key == 'black_box'), '')
 
 
-def test_a_fault_is_written_with_what_came_before_and_after(
-    isolation: Isolation, tmp_path: Path
-) -> None:
-    """Log and /diagnostics have the path; both directions are in it, as they were on the line."""
-    folder, log = tmp_path / 'boxes', tmp_path / 'all.log'
-    arguments = ('-p', f'black_box_folder:={folder}', '-p', f'serial_log:={log}')
-    with NodeRig(isolation, tmp_path, *arguments) as rig:
-        rig.stream(POSE, 1.0)
-        assert black_box(rig.status('serial link')) == ''
-        rig.peer.behaviour.silent = True
-        rig.wait_for_status('serial link', DiagnosticStatus.STALE, 'no report')
-        rig.peer.behaviour.silent = False
-        line = rig.node.wait_for(r'black box: .*serial\.log')
-        found = re.search(r'black box: (\S+) \((.*)\)', line)
-        assert found is not None
-        path = Path(found[1])
-        assert found[2].startswith('serial link: stale: no report')
-        assert path.parent.parent == folder
-        rig.client.spin_until(
-            lambda: black_box(rig.status('serial link')) == str(path), 20.0, 'path in diagnostics'
-        )
-        commands = list(rig.peer.commands)
-        assert rig.node.stop() == 0
+def replay_command(log: Path, *arguments: str) -> list[str]:
+    """Return the command that replays a log."""
+    parameters = (f'log:={log}', 'diagnostics_period:=0.1', *arguments)
+    words = [word for parameter in parameters for word in ('-p', parameter)]
+    return [executable('quad_hardware', 'replay'), '--ros-args', *words]
 
+
+def period(messages: list[Any]) -> float:
+    """Return the usual time between two messages, by their stamps [s]."""
+    times = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in messages]
+    return float(median(after - before for before, after in pairwise(times)))
+
+
+def assert_replayed(rig: NodeRig, env: dict[str, str], log: Path) -> None:
+    """Replay a log; the topics have what they had, and nobody takes commands."""
+    live = {topic: list(messages) for topic, messages in rig.received.items()}
+    for messages in rig.received.values():
+        messages.clear()
+    with RunningProcess(replay_command(log, 'loop:=true', 'rate:=2.0'), env) as player:
+        rig.wait_for_status('serial link', DiagnosticStatus.STALE, 'no report')
+        rig.receive('/joint_states', 100)
+        assert player.stop() == 0, player.output
+        player.wait_for('stale: no report')
+    positions = {tuple(message.position) for message in rig.received['/joint_states']}
+    known = {tuple(message.position) for message in live['/joint_states']}
+    assert len(positions & known) >= 5  # it moves, to the bit as it did
+    for topic in ('/imu', '/odom', '/battery_state', '/tf'):
+        assert rig.received[topic], topic
+    ours, theirs = rig.received['/imu'][-1], live['/imu'][-1]
+    assert (ours.header.frame_id, ours.orientation) == (theirs.header.frame_id, theirs.orientation)
+    assert period(rig.received['/imu']) < 0.8 * period(live['/imu'])  # twice as fast
+
+
+def assert_whole(path: Path, log: Path, commands: list[dict[int, float]]) -> None:
+    """The box has robot, states, reports and commands; so has the log that was wanted."""
     entries = list(read_serial_log(path))
     opened, waiting = entries[:2]
     assert isinstance(opened, Opened)
@@ -92,9 +106,40 @@ def test_a_fault_is_written_with_what_came_before_and_after(
 
     report = (path.parent / 'report.txt').read_text('utf-8')
     assert 'L-2.0.0, protocol v2 at 2000000 baud' in report
-    assert f'less {path}' in report
+    assert f'replay --ros-args -p log:={path}' in report
     assert 'running: reports arrive' in report.partition('reported:')[2]
     # the log on demand has all that the black box has, to the byte
     everything = [e for e in read_serial_log(log) if isinstance(e, Transfer)]
     kept = [entry.data for entry in entries if isinstance(entry, Transfer)]
     assert [entry.data for entry in everything[: len(kept)]] == kept
+
+
+def test_a_fault_is_written_with_what_came_before_and_after(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """Log and /diagnostics have the path; both directions are in it, as they were on the line."""
+    folder, log = tmp_path / 'boxes', tmp_path / 'all.log'
+    arguments = ('-p', f'black_box_folder:={folder}', '-p', f'serial_log:={log}')
+    with NodeRig(isolation, tmp_path, *arguments) as rig:
+        rig.stream(POSE, 1.0)
+        assert black_box(rig.status('serial link')) == ''
+        rig.peer.behaviour.silent = True
+        rig.wait_for_status('serial link', DiagnosticStatus.STALE, 'no report')
+        rig.peer.behaviour.silent = False
+        line = rig.node.wait_for(r'black box: .*serial\.log')
+        found = re.search(r'black box: (\S+) \((.*)\)', line)
+        assert found is not None
+        path = Path(found[1])
+        assert found[2].startswith('serial link: stale: no report')
+        assert path.parent.parent == folder
+        rig.client.spin_until(
+            lambda: black_box(rig.status('serial link')) == str(path), 20.0, 'path in diagnostics'
+        )
+        commands = list(rig.peer.commands)
+        with RunningProcess(replay_command(path), isolation.env) as refused:
+            assert refused.wait(60.0) == 1, refused.output
+            refused.wait_for('runs already.*__ns:=/replay')
+        assert rig.node.stop() == 0
+        assert_replayed(rig, isolation.env, path)
+
+    assert_whole(path, log, commands)

@@ -155,6 +155,10 @@ class BusReplay:
         """Time of the log that has come."""
         return self.network.scheduler.now
 
+    def take(self, frame: Frame, now: float) -> None:
+        """Take the next frame, as if it had come now."""
+        self.receive(frame._replace(timestamp=now))
+
     def receive(self, frame: Frame) -> None:
         """Take the next frame of the log."""
         if not self._begun:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -16,14 +16,24 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-from node_runner import log_as, notify_ready, ParameterReader, refuse_misspelt, run_program, spin
+from black_box import LogPlayer, PlaybackError
+from node_runner import (
+    discover_other_nodes,
+    log_as,
+    notify_ready,
+    other_nodes,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+    spin,
+)
 
+from ..can.frame import Frame
 from ..can.frame_log import read_log
 from ..config import load_bus
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..library.bus_replay import BusReplay, unknown_scales
-from ..library.log_player import LogPlayer
 from ..master.events import Event
 from ..master.status import node_status
 from .device_topics import DeviceTopics, log_bus_event, node_options
@@ -32,7 +42,6 @@ from .joint_states import BusJointStates, DriveJointStates
 from .output_thread import OutputThread
 
 MASTER = 'master'
-DISCOVERY_TIME = 2.0  # [s] in which nodes that run are discovered
 WATCH_PERIOD = 0.5  # [s] between two looks for a master
 LISTENER_PERIOD = 0.1  # [s] in which a new subscriber gets its first message
 RATES = (0.01, 100.0)
@@ -83,7 +92,7 @@ class Parameters:
 
 def main() -> int:
     """Run until the end of the log or Ctrl-C; return the exit code."""
-    return run_program('replay', _serve, CanopenError, OSError, help_text=HELP)
+    return run_program('replay', _serve, CanopenError, PlaybackError, OSError, help_text=HELP)
 
 
 class ReplayProcess:
@@ -113,7 +122,7 @@ class ReplayProcess:
         self._bus = bus = BusReplay(config, self._report)
         self._player = LogPlayer(
             bus,
-            partial(read_log, parameters.log),
+            partial(_timed_frames, parameters.log),
             rate=parameters.rate,
             start=parameters.start,
         )
@@ -165,7 +174,8 @@ class ReplayProcess:
 
     def _look_for_master(self, stop: threading.Event) -> None:
         own = [node.get_fully_qualified_name() for node in self.nodes]
-        if found := _live_nodes(self._node, self._bus.network.config, own):
+        names = _published_by(self._node, self._bus.network.config)
+        if found := other_nodes(self._node, names, own):
             self.failure = _refusal(found)
             stop.set()
 
@@ -218,6 +228,11 @@ class ReplayProcess:
             topics.update_listeners()
 
 
+def _timed_frames(path: Path) -> Iterator[tuple[float, Frame]]:
+    for frame in read_log(path):
+        yield frame.timestamp, frame
+
+
 def _serve(stop: threading.Event) -> None:
     with ExitStack() as stack:
         first = Node('replay')
@@ -235,7 +250,9 @@ def _serve(stop: threading.Event) -> None:
                 'the drive; here they are those of bus.yml without it. Write scale_pos_to_dev and '
                 'scale_pos_from_dev into a copy of bus.yml'
             )
-        _refuse_beside_master(node, config, stop)
+        own = [node.get_fully_qualified_name()]
+        if found := discover_other_nodes(node, _published_by(node, config), own, stop):
+            raise _refusal(found)
         if stop.is_set():
             return
         process = ReplayProcess(node, config, parameters, stack)
@@ -245,15 +262,8 @@ def _serve(stop: threading.Event) -> None:
             raise process.failure
 
 
-def _refuse_beside_master(node: Node, config: BusConfig, stop: threading.Event) -> None:
-    deadline = time.monotonic() + DISCOVERY_TIME
-    while time.monotonic() < deadline and not stop.wait(LISTENER_PERIOD):
-        if found := _live_nodes(node, config, [node.get_fully_qualified_name()]):
-            raise _refusal(found)
-
-
-def _live_nodes(node: Node, config: BusConfig, own: Sequence[str]) -> list[str]:
-    """Return the nodes of others that publish what a replay of this bus publishes."""
+def _published_by(node: Node, config: BusConfig) -> set[str]:
+    """Return the nodes that publish what a replay of this bus publishes."""
     here = node.get_namespace().rstrip('/')
     # __ns of the command line goes before the namespaces of bus.yml
     moved = here != f'/{config.master.namespace.strip("/")}'.rstrip('/')
@@ -261,11 +271,7 @@ def _live_nodes(node: Node, config: BusConfig, own: Sequence[str]) -> list[str]:
     for device in config.nodes:
         space = here if moved else f'/{device.namespace.strip("/")}'.rstrip('/')
         names.add(f'{space}/{device.name}')
-    graph = [
-        f'{namespace.rstrip("/")}/{name}'
-        for name, namespace in node.get_node_names_and_namespaces()
-    ]
-    return sorted(name for name in names if graph.count(name) > own.count(name))
+    return names
 
 
 def _refusal(found: Sequence[str]) -> CanopenError:

@@ -3,6 +3,7 @@
 """What happened before a fault: kept in memory, written into a folder when it comes."""
 
 from .box import BlackBox, Contents, Pause
+from .player import LogPlayer, PlaybackError, Replay
 from .settings import BlackBoxSettings, default_folder, WINDOW, WINDOW_MAX
 
 __all__ = [
@@ -11,6 +12,9 @@ __all__ = [
     'BlackBox',
     'BlackBoxSettings',
     'Contents',
+    'LogPlayer',
     'Pause',
+    'PlaybackError',
+    'Replay',
     'default_folder',
 ]

@@ -5,6 +5,7 @@
 from .black_box_parameters import declare_black_box
 from .construction import destroyed_if_refused, destroyed_when_refused
 from .deferred_service import create_deferred_service
+from .discovery import discover_other_nodes, other_nodes
 from .exceptions import ParameterError
 from .joining import init_ros
 from .log_bridge import log_as, RosLogBridge
@@ -30,12 +31,14 @@ __all__ = [
     'declare_thread_priority',
     'destroyed_if_refused',
     'destroyed_when_refused',
+    'discover_other_nodes',
     'give_defaults',
     'given_values',
     'init_ros',
     'log_as',
     'make_executor',
     'notify_ready',
+    'other_nodes',
     'raise_thread_priority',
     'refuse_misspelt',
     'refuse_similar',

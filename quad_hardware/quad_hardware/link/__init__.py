@@ -2,20 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
-from .dialect import DialectCounters
-from .driver import Driver, STALE_TIME
+from .dialect import Dialect, DialectCounters
+from .driver import Driver, QUIET_TIME, STALE_TIME
 from .latency import latency_problem, latency_timer
 from .port import DEFAULT_PORT, Port, SerialPort
 from .probe import connect, Connection, read_battery, read_firmware, send_request
-from .session import LinkOptions, Session
+from .session import FrameParser, LinkOptions, make_dialect, Session
 from .status import LinkState, LinkStatus
 
 __all__ = [
     'DEFAULT_PORT',
+    'QUIET_TIME',
     'STALE_TIME',
     'Connection',
+    'Dialect',
     'DialectCounters',
     'Driver',
+    'FrameParser',
     'LinkOptions',
     'LinkState',
     'LinkStatus',
@@ -25,6 +28,7 @@ __all__ = [
     'connect',
     'latency_problem',
     'latency_timer',
+    'make_dialect',
     'read_battery',
     'read_firmware',
     'send_request',

@@ -114,6 +114,14 @@ class Dialect(ABC, Generic[Received]):
     def step(self, now: float) -> Step:
         """Return what is to be sent now."""
 
+    def handle_sent(self, frame: Received, now: float) -> Mapping[int, float]:
+        """Take a frame that was sent, of a session that was recorded, in the place of step.
+
+        Returns:
+            The servo angles that it sends, by motor id [deg]; none as a rule.
+        """
+        return {}
+
     @abstractmethod
     def handle_frame(self, frame: Received, now: float) -> Report | None:
         """Take a frame of the robot; return the report that it completes, if any."""

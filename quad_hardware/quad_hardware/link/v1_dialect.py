@@ -23,8 +23,10 @@ from ..protocol import (
     Kind,
     LEG_MOTORS,
     Model,
+    MOTOR_OF_REGISTER,
     Register,
     REGISTER_OF_MOTOR,
+    scatter,
     Torque,
     V1,
 )
@@ -165,6 +167,25 @@ class V1Dialect(Dialect[Frame]):
         elif self._angles is not None:
             return self._report(frame.payload, now)
         return None
+
+    def handle_sent(self, frame: Frame, now: float) -> Mapping[int, float]:
+        """Wait for what a frame that was sent requests; return the angles that it sends."""
+        if frame.kind is Kind.READ:
+            self._expect(frame, now)
+        if frame.kind is not Kind.WRITE or frame.address not in MOTOR_OF_REGISTER:
+            return {}
+        sent = [(r, data) for r, data in scatter(frame.address, frame.payload) if data]
+        motors = [(MOTOR_OF_REGISTER[r], data[0]) for r, data in sent if r in MOTOR_OF_REGISTER]
+        return {motor: self._spans[motor].decode(byte) for motor, byte in motors}
+
+    def _expect(self, request: Frame, now: float) -> None:
+        size = request.payload[:1]
+        for known in (_READ_MOTORS, _READ_IMU, _READ_BATTERY):
+            if known.register == request.address and size == bytes((known.size,)):
+                self._counters.unanswered += self._waiting is not None
+                self._waiting, self._requested_at = known, now
+                if known is _READ_MOTORS:
+                    self._angles = None
 
     def _wake(self) -> float:
         commands = self._free_at if self.pending else math.inf

@@ -99,6 +99,16 @@ class V2Dialect(Dialect[Frame]):
         self._request_at = now + REQUEST_PERIOD
         return _report(feedback, now)
 
+    def handle_sent(self, frame: Frame, now: float) -> Mapping[int, float]:
+        """Return the angles of a servo frame that was sent."""
+        if frame.kind is not Kind.WRITE or frame.address != Code.SERVOS:
+            return {}
+        try:
+            values = _SERVOS.unpack(frame.payload)
+        except CodecError:
+            return {}
+        return {int(m): a for m, a in zip(values['motor'], values['angle'], strict=True)}
+
     def _count(self, sequence: int) -> None:
         self._counters.states += 1
         if self._sequence is not None:

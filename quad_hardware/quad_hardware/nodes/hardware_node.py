@@ -8,19 +8,14 @@ from collections.abc import Sequence
 import math
 import sys
 import threading
-import time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Odometry
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_srvs.srv import SetBool
-from tf2_msgs.msg import TFMessage
 
-from message_templates import FastPublisher, FastReader
+from message_templates import FastReader
 from node_runner import (
     destroyed_when_refused,
     log_as,
@@ -31,22 +26,20 @@ from node_runner import (
     spin,
 )
 from quad_description import RobotState
-from quad_msgs.msg import FootContacts, JointCommand
+from quad_msgs.msg import JointCommand
 
 from ..exceptions import CommandError, HardwareError
 from ..joints.command import NOMINAL_PERIOD
 from ..link import LinkState
-from ..serial_robot import LINK, ROBOT, SerialRobot
-from . import messages
-from .diagnostics import command_diagnostic, LinkDiagnostic, robot_diagnostic
+from ..serial_robot import LINK, SerialRobot
+from .diagnostics import command_diagnostic
 from .parameters import declare_parameters
+from .robot_topics import log_link, RobotTopics, WARN_PERIOD
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
 )
-SENSOR_DEPTH = 10  # reliable, which best-effort subscribers can receive as well
 SWITCH_INTERVAL = 0.0005  # [s] how long one thread may keep another one from the interpreter
-WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
 
 
 class HardwareNode(Node):
@@ -73,19 +66,8 @@ class HardwareNode(Node):
             on_refusal=self._report_refused,
             warn=self._warn,
         )
-        self._joint_states = FastPublisher(
-            self.create_publisher(JointState, 'joint_states', SENSOR_DEPTH)
-        )
-        self._imu = FastPublisher(self.create_publisher(Imu, 'imu', SENSOR_DEPTH))
-        self._odom = FastPublisher(self.create_publisher(Odometry, 'odom', SENSOR_DEPTH))
-        self._contacts = FastPublisher(
-            self.create_publisher(FootContacts, 'foot_contacts', SENSOR_DEPTH)
-        )
-        self._battery = self.create_publisher(BatteryState, 'battery_state', SENSOR_DEPTH)
-        self._tf = FastPublisher(self.create_publisher(TFMessage, '/tf', 100))
-        self._link = LinkDiagnostic()
+        self._topics = RobotTopics(self, self._robot, settings.frames, settings.deviations)
         self._damage = ''
-        self._diagnostics = self.create_publisher(DiagnosticArray, 'diagnostics', SENSOR_DEPTH)
         self._reader = FastReader(JointCommand, 'position', 'velocity', 'effort')
         self.create_subscription(JointCommand, 'joint_command', self._take, COMMAND_QOS, raw=True)
         self.create_service(SetBool, '~/torque', self._set_torque)
@@ -113,59 +95,13 @@ class HardwareNode(Node):
 
     def _publish(self, state: RobotState) -> None:
         """Publish a report. Runs in the thread of the driver."""
-        # what a controller waits for comes first
-        if (joints := state.joints) is not None:
-            self._joint_states.publish(
-                messages.joint_states_template(self._robot.names, joints),
-                self._stamp(joints.time),
-                messages.joint_numbers(joints),
-            )
-        odometry = self._robot.update_odometry(state)
-        if state.imu is None or odometry is None:
-            self.get_logger().error(
-                f'no /imu, /odom, /foot_contacts and transforms: '
-                f'{self._robot.health().imu_problem}; the joints are published, and the robot can '
-                'lie down',
-                throttle_duration_sec=WARN_PERIOD,
-            )
-            return
-        settings, stamp = self._settings, self._stamp(state.time)
-        deviations, frames = settings.deviations, settings.frames
-        self._imu.publish(
-            messages.imu_template(state.imu, deviations, frames.imu),
-            stamp,
-            messages.imu_numbers(state.imu),
-        )
-        self._odom.publish(
-            messages.odometry_template(state.imu, deviations, frames),
-            stamp,
-            messages.odometry_numbers(state.imu, odometry, frames),
-        )
-        self._contacts.publish(messages.foot_contacts_template(odometry), stamp, ())
-        if frames.publish:
-            self._tf.publish(
-                messages.transforms_template(frames),
-                stamp,
-                messages.transforms_numbers(odometry, frames),
-            )
-
-    def _stamp(self, monotonic: float) -> int:
-        """Return a moment of the monotonic clock on the clock of ROS [ns]."""
-        age = round((time.monotonic() - monotonic) * 1e9)
-        return max(self.get_clock().now().nanoseconds - age, 0)
+        self._topics.publish(state)
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
         """Log how the link is; runs in the thread of the driver."""
         if state is LinkState.RUNNING:
             notify_ready()
-        if state in {LinkState.REFUSED, LinkState.FAILED}:
-            self.get_logger().error(f'{state.value}: {detail}')
-        elif state in {LinkState.STALE, LinkState.CONNECTING}:
-            self.get_logger().warning(f'{state.value}: {detail}')
-        elif state is LinkState.STOPPED:
-            self.get_logger().debug(detail)
-        else:
-            self.get_logger().info(f'{state.value}: {detail}')
+        log_link(self, state, detail)
 
     def _take(self, data: bytes) -> None:
         message, numbers = self._reader.read(data)
@@ -210,36 +146,14 @@ class HardwareNode(Node):
 
     def _diagnose(self) -> None:
         name, port = self.get_name(), self._settings.robot.link.path
-        latest = self._robot.latest
-        now = self.get_clock().now().to_msg()
-        array = DiagnosticArray()
-        array.header.stamp = now
-        array.status = [
-            self._link.describe(name, port, self._robot.status(), self._recording()),
-            command_diagnostic(name, port, self._robot.counters),
-        ]
-        before, self._damage = self._damage, self._link.damage
+        commands = command_diagnostic(name, port, self._robot.counters)
+        self._topics.publish_diagnostics(name, port, self._recording, commands)
+        before, self._damage = self._damage, self._topics.link.damage
         if self._damage and not before:
             self._robot.fault(LINK, self._damage)
-        if latest is not None:
-            report, state = latest
-            health = self._robot.health()
-            checked = state.imu is not None and not state.imu.is_uncertain
-            array.status.append(
-                robot_diagnostic(
-                    name,
-                    port,
-                    report,
-                    health,
-                    signs_checked=checked,
-                    recording=self._recording(ROBOT),
-                )
-            )
-            self._battery.publish(messages.battery(health.battery, now))
-        self._diagnostics.publish(array)
 
-    def _recording(self, subject: str = '') -> str:
-        """Return the last file of the black box, maybe of one subject; empty before one."""
+    def _recording(self, subject: str) -> str:
+        """Return the last file of the black box, or that of a subject; empty before one."""
         box = self._robot.black_box
         path = None if box is None else box.recording_of(subject) if subject else box.last
         return '' if path is None else str(path)

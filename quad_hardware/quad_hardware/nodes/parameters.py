@@ -120,11 +120,9 @@ def declare_parameters(node: Node) -> NodeSettings:
         vendor=_vendor(protocols, method),
         vendor_method=method,
     )
-    urdf = _urdf(read)
-    robot = RobotSettings(
-        link=link,
-        urdf=urdf,
-        joints=_joint_map(read, urdf),
+    described = declare_robot(read, link)
+    robot = replace(
+        described,
         limiter=LimiterSettings(
             speed=read.number('max_joint_speed', 12.0, (0.1, 100.0), 'of targets [rad/s]'),
             start_speed=read.number(
@@ -137,19 +135,31 @@ def declare_parameters(node: Node) -> NodeSettings:
             {reaction.value: reaction for reaction in LossReaction},
             'what the robot does when commands break off with a leg in the air',
         ),
-        estimator=_estimator(read),
         black_box=declare_black_box(read),
         serial_log=_serial_log(read),
     )
     settings = NodeSettings(
         robot=robot,
-        frames=_frames(read),
-        deviations=_deviations(read),
+        frames=declare_frames(read),
+        deviations=declare_deviations(read),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
         thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
     )
     refuse_misspelt(node)
     return settings
+
+
+def declare_robot(read: ParameterReader, link: LinkOptions) -> RobotSettings:
+    """Declare which robot it is and how its reports are read; return the rest as its defaults.
+
+    Raises:
+        ParameterError: One is of another kind or out of its range.
+        CommandError: They do not fit the robot; the message names the remedy.
+    """
+    urdf = _urdf(read)
+    return RobotSettings(
+        link=link, urdf=urdf, joints=_joint_map(read, urdf), estimator=_estimator(read)
+    )
 
 
 def _serial_log(read: ParameterReader) -> Path | None:
@@ -275,7 +285,8 @@ def _three(read: ParameterReader, name: str, default: Vector, meaning: str) -> V
     return x, y, z
 
 
-def _frames(read: ParameterReader) -> Frames:
+def declare_frames(read: ParameterReader) -> Frames:
+    """Declare the names of the frames."""
     modes = {'child': False, 'parent': True}
     prefix = read.text('frame_prefix', '', 'before each frame, as of robot_state_publisher')
 
@@ -297,7 +308,8 @@ def _frames(read: ParameterReader) -> Frames:
     )
 
 
-def _deviations(read: ParameterReader) -> Deviations:
+def declare_deviations(read: ParameterReader) -> Deviations:
+    """Declare what is published with the IMU."""
     span = (0.0, 10.0)
     return Deviations(
         orientation=read.number('orientation_stddev', 0.02, span, '[rad]'),

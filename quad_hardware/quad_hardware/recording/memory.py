@@ -95,7 +95,7 @@ class SerialMemory:
 
     def usage(self, path: Path) -> str:
         """Return the commands that show the log."""
-        return f'less {path}'
+        return f'less {path}\nros2 run quad_hardware replay --ros-args -p log:={path}'
 
 
 def _since(

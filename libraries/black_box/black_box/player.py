@@ -1,23 +1,40 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Plays the frames of a log to a replay of its bus, at the times at which they came."""
+"""Plays what a log has to a replay of it, at the times at which it happened."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 import threading
 import time
-
-from ..can.frame import Frame
-from ..exceptions import CanopenError
-from .bus_replay import BusReplay
+from typing import Generic, Protocol, TypeVar
 
 WAIT_MIN = 1e-3  # [s] below which frames are not worth a wait
 WAIT_MAX = 0.02  # [s] after which one looks what is missing
-GAP = 0.1  # [s] between the last frame and the first one of the next turn
+GAP = 0.1  # [s] between the last entry and the first one of the next turn
+
+Entry = TypeVar('Entry')
+Entry_contra = TypeVar('Entry_contra', contravariant=True)
 
 
-class LogPlayer:
+class PlaybackError(ValueError):
+    """A log has nothing to play: it is empty, or ends before the place where it is to begin."""
+
+
+class Replay(Protocol[Entry_contra]):
+    """What a log is played to. Times are those of the log in [s], and never go back."""
+
+    def take(self, entry: Entry_contra, now: float) -> None:
+        """Take the next entry, which happened now."""
+
+    def advance(self, now: float) -> None:
+        """Let time pass in which nothing happened."""
+
+    def restart(self) -> None:
+        """Forget what was, as the log begins again."""
+
+
+class LogPlayer(Generic[Entry]):
     """Plays a log, once or for ever.
 
     Attributes:
@@ -26,20 +43,25 @@ class LogPlayer:
     """
 
     def __init__(
-        self, bus: BusReplay, read: Callable[[], Iterable[Frame]], *, rate: float, start: float
+        self,
+        replay: Replay[Entry],
+        read: Callable[[], Iterable[tuple[float, Entry]]],
+        *,
+        rate: float,
+        start: float,
     ) -> None:
         """Prepare.
 
         Args:
-            bus: Gets the frames.
-            read: Yields the frames of the log, from the first one.
+            replay: Gets the entries.
+            read: Yields the entries of the log with their times in [s], from the first one.
             rate: How many seconds of the log go by in one.
             start: How far from its beginning it is played in time, in [s]; what comes before is
                 taken at once, so that states are known.
         """
         self.seeking = False
         self.on_tick: Callable[[], None] = lambda: None
-        self._bus = bus
+        self._replay = replay
         self._read = read
         self._rate = rate
         self._start = start
@@ -58,9 +80,7 @@ class LogPlayer:
             loop: Begin again at the end.
 
         Raises:
-            CodecError: The log is damaged.
-            CanopenError: It has no frames, or begins too late.
-            OSError: It cannot be read.
+            PlaybackError: It has no entries, or ends before the start.
         """
         shift = 0.0  # of the times of the log, so that they go on in the next turn
         while not stop.is_set():
@@ -68,17 +88,17 @@ class LogPlayer:
             if not loop:
                 return
             shift = last + GAP
-            self._bus.restart()
+            self._replay.restart()
 
     def _play_once(self, stop: threading.Event, shift: float) -> float:
         """Play it from its first frame, whose time is the shift; return the time of the last."""
         first: float | None = None
         began = False
         now = shift
-        for frame in self._read():
+        for timestamp, entry in self._read():
             if first is None:
-                first = frame.timestamp
-            at = frame.timestamp - first
+                first = timestamp
+            at = timestamp - first
             now = max(now, at + shift)  # a log may have been put together, out of order
             if not began and at >= self._start:
                 began = True
@@ -88,13 +108,13 @@ class LogPlayer:
                 self._wait(now, stop)
             if stop.is_set():
                 break
-            self._bus.receive(frame._replace(timestamp=now))
+            self._replay.take(entry, now)
         if not began and not stop.is_set():
             length = 0.0 if first is None else now - shift
-            raise CanopenError(
+            raise PlaybackError(
                 f'nothing to play: the log has {length:.1f} s, and start is {self._start:g} s'
                 if first is not None
-                else 'nothing to play: the log has no frames'
+                else 'nothing to play: the log is empty'
             )
         return now
 
@@ -105,6 +125,6 @@ class LogPlayer:
             if stop.wait(min(left, WAIT_MAX)):
                 return
             played = self._log_zero + (time.monotonic() - self._zero) * self._rate
-            self._bus.advance(min(played, log_time))
+            self._replay.advance(min(played, log_time))
             self.on_tick()
         self.on_tick()

@@ -1,0 +1,267 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run quad_hardware replay``: a serial log as the topics that hardware_node published."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+import sys
+import threading
+import time
+
+from rclpy.node import Node
+
+from black_box import LogPlayer, PlaybackError
+from node_runner import (
+    destroyed_if_refused,
+    discover_other_nodes,
+    give_defaults,
+    log_as,
+    notify_ready,
+    other_nodes,
+    ParameterReader,
+    refuse_misspelt,
+    run_program,
+    spin,
+)
+from quad_description import RobotState
+
+from ..calibration.parameter_file import read_parameters
+from ..exceptions import HardwareError, RecordingError
+from ..link import LinkOptions, LinkState
+from ..recording import Entry, read_serial_log
+from ..replayed_robot import ReplayedRobot
+from ..serial_robot import RobotSettings
+from .parameters import declare_deviations, declare_frames, declare_robot, Deviations, Frames
+from .robot_topics import log_link, RobotTopics, WARN_PERIOD
+
+RECORDED = 'hardware_node'  # whose topics these are
+CALIBRATED = ('joints', 'imu', 'odometry')  # parameters of hardware_node that belong to a robot
+WATCH_PERIOD = 0.5  # [s] between two looks for a hardware_node
+RATES = (0.01, 100.0)
+HELP = """\
+Publish what hardware_node had published while a log of its serial line was recorded; nothing is
+written to a port, and nobody commands the robot of a log.
+
+usage: ros2 run quad_hardware replay --ros-args -p log:=FILE [-p NAME:=VALUE ...]
+
+example:
+  ros2 run quad_hardware replay --ros-args -p log:=serial.log -p rate:=0.2 -p start:=40.0
+
+parameters:
+  log                 file of a black box, or of hardware_node's parameter serial_log (required)
+  rate                how many seconds of the log go by in one (default 1.0)
+  start               where it begins, in [s] after the first entry (default 0.0)
+  loop                begin again at the end (default false)
+  calibration         YAML file of `ros2 run quad_hardware calibrate` (default none)
+  diagnostics_period  time between two /diagnostics messages in [s] (default 1.0)
+
+Those of hardware_node for the robot, its frames and its estimation are there, too:
+robot_description, preset, arm, joints.*, imu.*, odometry.*, odom_frame, publish_tf ...
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameters:
+    """Parameters of the program.
+
+    Attributes:
+        log: The log.
+        rate: How many seconds of the log go by in one.
+        start: Where it begins, in [s] after the first entry.
+        loop: Begin again at the end.
+        robot: Which robot it is.
+        frames: Names of the frames.
+        deviations: Published with the IMU.
+        diagnostics_period: Time between two /diagnostics messages in [s].
+    """
+
+    log: Path
+    rate: float
+    start: float
+    loop: bool
+    robot: RobotSettings
+    frames: Frames
+    deviations: Deviations
+    diagnostics_period: float
+
+
+class Replay:
+    """The node of a log that is replayed.
+
+    Attributes:
+        failure: Why it has ended; None for the end of the log, or when it was stopped.
+    """
+
+    def __init__(self, node: Node, parameters: Parameters) -> None:
+        """Build it.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self.failure: Exception | None = None
+        self._node, self._parameters = node, parameters
+        self._robot = ReplayedRobot(
+            parameters.robot,
+            on_state=self._publish,
+            on_change=self._log_change,
+            on_refusal=self._log_refusal,
+        )
+        self._player: LogPlayer[Entry] = LogPlayer(
+            self._robot,
+            partial(_timed_entries, parameters.log),
+            rate=parameters.rate,
+            start=parameters.start,
+        )
+        self._player.on_tick = self._tick
+        self._topics = RobotTopics(
+            node, self._robot, parameters.frames, parameters.deviations, self._player.steady
+        )
+        self._diagnostics_due = 0.0
+
+    def play(self, stop: threading.Event) -> None:
+        """Play the log in a thread of its own, and serve the node meanwhile.
+
+        Args:
+            stop: Ends it; set at the end of the log.
+        """
+        self._node.create_timer(WATCH_PERIOD, partial(self._look_for_robot, stop))
+        thread = threading.Thread(target=self._run, args=(stop,), name='replay', daemon=True)
+        thread.start()
+        try:
+            spin([self._node], stop)
+        finally:
+            stop.set()
+            thread.join()
+
+    def _run(self, stop: threading.Event) -> None:
+        notify_ready()
+        try:
+            self._player.play(stop, loop=self._parameters.loop)
+        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
+            self.failure = error
+        else:
+            self._node.get_logger().info(f'{self._parameters.log.name}: end of the log')
+        stop.set()
+
+    def _look_for_robot(self, stop: threading.Event) -> None:
+        if found := other_nodes(self._node, _published_by(self._node), _own(self._node)):
+            self.failure = _refusal(found)
+            stop.set()
+
+    def _publish(self, state: RobotState) -> None:
+        if self._player.seeking:
+            self._robot.update_odometry(state)  # the way is that from the beginning
+        else:
+            self._topics.publish(state)
+
+    def _log_change(self, state: LinkState, detail: str) -> None:
+        if not self._player.seeking:
+            log_link(self._node, state, detail)
+
+    def _log_refusal(self, reason: str) -> None:
+        if not self._player.seeking:
+            self._node.get_logger().warning(
+                f'report refused: {reason}', throttle_duration_sec=WARN_PERIOD
+            )
+
+    def _tick(self) -> None:
+        now = time.monotonic()
+        if now >= self._diagnostics_due:
+            self._diagnostics_due = now + self._parameters.diagnostics_period
+            log = str(self._parameters.log)
+            self._topics.publish_diagnostics(
+                RECORDED, self._parameters.log.name, lambda subject: '' if subject else log
+            )
+
+
+def main() -> int:
+    """Run until the end of the log or Ctrl-C; return the exit code."""
+    return run_program('replay', _serve, HardwareError, PlaybackError, OSError, help_text=HELP)
+
+
+def _serve(stop: threading.Event) -> None:
+    node = Node('replay')
+    with destroyed_if_refused(node):
+        log_as(node)
+        parameters = _declare(node)
+        if found := discover_other_nodes(node, _published_by(node), _own(node), stop):
+            raise _refusal(found)
+    try:
+        if stop.is_set():
+            return
+        replay = Replay(node, parameters)
+        node.get_logger().info(f'replay of {parameters.log}')
+        replay.play(stop)
+        if replay.failure is not None:
+            raise replay.failure
+    finally:
+        node.destroy_node()
+
+
+def _timed_entries(path: Path) -> Iterator[tuple[float, Entry]]:
+    for entry in read_serial_log(path):
+        yield entry.time, entry
+
+
+def _own(node: Node) -> list[str]:
+    return [str(node.get_fully_qualified_name())]
+
+
+def _published_by(node: Node) -> set[str]:
+    """Return the nodes that publish what this one does."""
+    return {f'{node.get_namespace().rstrip("/")}/{RECORDED}', *_own(node)}
+
+
+def _refusal(found: list[str]) -> RecordingError:
+    return RecordingError(
+        f'{found[0]} runs already, so topics would have messages of both: end it, or replay into '
+        'a namespace of its own by -r __ns:=/replay'
+    )
+
+
+def _declare(node: Node) -> Parameters:
+    read = ParameterReader(node)
+    log = read.text('log', '', 'file of a black box, or of serial_log of hardware_node')
+    rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
+    start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first entry [s]')
+    loop = read.flag('loop', 'begin again at the end', default=False)
+    calibration = read.text('calibration', '', 'YAML file that quad_hardware calibrate has made')
+    if calibration:
+        give_defaults(node, dict(_calibrated(Path(calibration).expanduser())))
+    robot = declare_robot(read, LinkOptions(log))
+    frames, deviations = declare_frames(read), declare_deviations(read)
+    period = read.number(
+        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+    )
+    refuse_misspelt(node)
+    if not log:
+        raise RecordingError('give a log: --ros-args -p log:=FILE')
+    path = Path(log).expanduser()
+    if not path.is_file():
+        raise RecordingError(f'{path}: there is no such file')
+    return Parameters(path, rate, start, loop, robot, frames, deviations, period)
+
+
+def _calibrated(path: Path) -> Iterator[tuple[str, object]]:
+    """Yield what a file has of a robot, by the names of parameters."""
+    if not path.is_file():
+        raise RecordingError(f'calibration: {path}: there is no such file')
+    tree = read_parameters(path)
+    yield from _flat({name: tree[name] for name in CALIBRATED if name in tree}, '')
+    yield from ((n, v) for n, v in tree.items() if n.partition('.')[0] in CALIBRATED and '.' in n)
+
+
+def _flat(tree: object, name: str) -> Iterator[tuple[str, object]]:
+    if not isinstance(tree, dict):
+        yield name, tree
+        return
+    for key, value in tree.items():
+        yield from _flat(value, f'{name}.{key}' if name else str(key))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
