@@ -39,7 +39,10 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/quad_bringup']),
         ('share/quad_bringup', ['package.xml']),
         ('share/quad_bringup/launch', ['launch/bringup.launch.py']),
-        ('share/quad_bringup/view', ['view/foxglove.json', 'view/quad.rviz']),
+        (
+            'share/quad_bringup/view',
+            ['view/foxglove.json', 'view/plotjuggler.xml', 'view/quad.rviz'],
+        ),
     ],
     install_requires=[
         'rich>=13',

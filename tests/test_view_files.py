@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Layouts of Foxglove and files of RViz name what is there: frames, topics, fields, services."""
+"""Files of Foxglove, RViz, PlotJuggler name what is there: frames, topics, fields, services."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import json
 from pathlib import Path
 import re
 from typing import Any
+from xml.etree import ElementTree as ET
 
 from geometry_msgs.msg import Twist
 from isolation import Isolation
@@ -28,6 +29,7 @@ import yaml
 from arm_bringup.description import read_description, read_semantic
 from arm_bringup.robots import find_robot
 from node_runner import LATCHED
+from quad_description import movable_joints, robot_urdf
 from quad_msgs.srv import SetMode
 
 CHECKOUT = Path(__file__).parents[1]
@@ -37,6 +39,7 @@ DOG = CHECKOUT / 'quad_bringup' / 'view'
 LAYOUTS = [*(ROBOTS / name / 'foxglove.json' for name in ARMS), DOG / 'foxglove.json']
 RVIZ = [ROBOTS / name / file for name in ARMS for file in (f'{name}.rviz', 'moveit.rviz')]
 RVIZ.append(DOG / 'quad.rviz')
+CURVES = [*(ROBOTS / name / 'plotjuggler.xml' for name in ARMS), DOG / 'plotjuggler.xml']
 STARTING = 120.0
 """Longest time in [s] until all is ready on a busy machine."""
 
@@ -103,6 +106,48 @@ def layout(file: Path) -> Named:
     calls = {(p['serviceName'], p['requestPayload']) for p in panels if 'serviceName' in p}
     frames = {value for key, value in found if key in {'followTf', 'frameId'}}
     return Named(frozenset(frames), frozenset(topics), fields, frozenset(calls))
+
+
+TYPES = {
+    'battery_state': 'sensor_msgs/msg/BatteryState',
+    'cmd_vel': 'geometry_msgs/msg/Twist',
+    'controller_state': 'control_msgs/msg/JointTrajectoryControllerState',
+    'imu': 'sensor_msgs/msg/Imu',
+    'joint_command': 'quad_msgs/msg/JointCommand',
+    'joint_states': 'sensor_msgs/msg/JointState',
+    'odom': 'nav_msgs/msg/Odometry',
+}
+"""Types of the topics of which PlotJuggler draws curves, by the last part of their names."""
+
+
+def curves(file: Path) -> Iterator[tuple[str, str]]:
+    """Yield topic and field of each curve of PlotJuggler.
+
+    It names a field as ROS does, with slashes; the fields of joint states by the joint, and roll,
+    pitch and yaw beside a quaternion (plotjuggler_ros, parser of each type).
+    """
+    for curve in ET.parse(file).iter('curve'):  # noqa: S314  # of this repository
+        found = re.fullmatch(rf'(/(?:\w+/)*?(?:{"|".join(TYPES)}))/(.+)', curve.attrib['name'])
+        assert found is not None, curve.attrib['name']
+        yield found[1], found[2]
+
+
+def plotjuggler(file: Path, joints: list[str]) -> Named:
+    """Read a layout of PlotJuggler.
+
+    Args:
+        file: The layout.
+        joints: Joints of the robot, in their order.
+    """
+    fields = set()
+    for topic, path in curves(file):
+        field = re.sub(r'/(roll|pitch|yaw)$', '/x', path)
+        if topic.endswith('joint_states'):
+            joint, _, name = path.partition('/')
+            field = f'{name}[{joints.index(joint)}]'
+        fields.add((topic, field.replace('/', '.')))
+    topics = frozenset(topic for topic, _ in fields)
+    return Named(frozenset(), topics, frozenset(fields), frozenset())
 
 
 def rviz(file: Path) -> Named:
@@ -207,6 +252,50 @@ def class_of(name: str, folder: str) -> Any:
     return getattr(import_module(f'{parts[0]}.{folder}'), parts[-1])
 
 
+def joints_of(file: Path) -> list[str]:
+    """Return the joints of the robot of a layout, in the order of its messages."""
+    if file.parent == DOG:
+        return [joint.name for joint in movable_joints(robot_urdf())]
+    return list(read_urdf(read_description(find_robot(file.parent.name, ROBOTS))).ranges())
+
+
+@pytest.mark.parametrize('file', CURVES, ids=lambda file: file.parent.name)
+def test_each_curve_is_a_number_of_a_message(file: Path) -> None:
+    """All joints are there, measured and wanted; the controller is the robot's own."""
+    joints = joints_of(file)
+    named = plotjuggler(file, joints)
+    for topic, path in named.fields:
+        kind = TYPES[topic.rpartition('/')[2]]
+        assert type_of(class_of(kind, 'msg'), path) in {'double', 'float'}, f'{topic}.{path}'
+    if file.parent == DOG:
+        wanted = {f'position[{index}]' for index in range(len(joints))}
+        commands = {path for topic, path in named.fields if topic == '/joint_command'}
+    else:
+        shown = layout(file.with_name('foxglove.json')).fields
+        wanted = {path for topic, path in shown if topic.endswith('controller_state')}
+        commands = {p for topic, p in named.fields if (topic, p) in shown}
+    assert wanted <= commands
+    shown_joints = {p.partition('/')[0] for topic, p in curves(file) if topic == '/joint_states'}
+    assert shown_joints == set(joints)
+
+
+@pytest.mark.parametrize('file', CURVES, ids=lambda file: file.parent.name)
+def test_a_layout_of_plotjuggler_has_its_parts(file: Path) -> None:
+    """Tabs, each with as many plots as it says, and a curve once in each plot."""
+    root = ET.parse(file).getroot()  # noqa: S314  # of this repository
+    tabs = root.findall('./tabbed_widget/Tab')
+    assert tabs
+    for tab in tabs:
+        [splitter] = tab.findall('./Container/DockSplitter')
+        plots = splitter.findall('./DockArea/plot')
+        assert len(plots) == int(splitter.attrib['count'])
+        assert sum(map(float, splitter.attrib['sizes'].split(';'))) == pytest.approx(1.0, abs=1e-3)
+        for plot in plots:
+            names = [curve.attrib['name'] for curve in plot.iter('curve')]
+            assert names
+            assert len(names) == len(set(names))
+
+
 def missing(client: RosClient, named: Named, frames: set[str]) -> list[str]:
     """Return what a file names and the running robot has not."""
     topics = dict(client.node.get_topic_names_and_types())
@@ -271,7 +360,9 @@ def test_a_running_arm_has_all_and_its_stop_stops_it(isolation: Isolation) -> No
     ):
         bringup.wait_for('drives are enabled', STARTING)
         shown = layout(robot / 'foxglove.json')
-        check(client, [shown, rviz(robot / 'panda.rviz'), rviz(robot / 'moveit.rviz')])
+        curves_of_arm = plotjuggler(robot / 'plotjuggler.xml', JOINTS)
+        shown_by_rviz = [rviz(robot / name) for name in ('panda.rviz', 'moveit.rviz')]
+        check(client, [shown, curves_of_arm, *shown_by_rviz])
         states = client.listen(JointState, '/joint_states')
         client.spin_until(lambda: bool(states), STARTING, 'joint states')
         here = dict(zip(states[-1].name, states[-1].position, strict=True))
@@ -306,8 +397,9 @@ def test_a_running_quadruped_has_all(isolation: Isolation) -> None:
         RosClient(isolation.domain_id) as client,
     ):
         bringup.wait_for('all is ready', STARTING)
-        shown = layout(DOG / 'foxglove.json')
-        check(client, [shown, rviz(DOG / 'quad.rviz')])
+        shown, plotted = layout(DOG / 'foxglove.json'), DOG / 'plotjuggler.xml'
+        files = [shown, plotjuggler(plotted, joints_of(plotted)), rviz(DOG / 'quad.rviz')]
+        check(client, files)
         states = client.listen(String, '/controller_node/state', LATCHED)
         velocities = client.node.create_publisher(Twist, '/cmd_vel', 1)
         ahead = Twist()
