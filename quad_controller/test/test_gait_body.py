@@ -27,7 +27,8 @@ from quad_description.rotations import Vector
 
 ROBOT = quadruped(urdf())
 CENTRE = ROBOT.hip_centre
-FEET = ROBOT.footprint(0.085, [0.0] * 12)
+STILL = (0.0,) * 12
+FEET = ROBOT.footprint(0.085, STILL)
 poses = st.builds(BodyPose, *[st.floats(-0.03, 0.03)] * 3, *[st.floats(-0.4, 0.4)] * 3)
 
 
@@ -213,6 +214,17 @@ def test_a_soft_servo_is_pushed_against_the_weight() -> None:
             assert torque == pytest.approx(-rise * share, abs=1e-4)
             lifted += abs(torque)
     assert lifted > 0.1
+
+
+def test_a_wide_stance_has_its_feet_outwards() -> None:
+    """By as much as it says, on both sides; what no leg reaches is refused."""
+    usual = GaitParameters().stance(ROBOT, STILL)
+    wide = GaitParameters(stance_widening=0.02).stance(ROBOT, STILL)
+    for one, other in zip(usual, wide, strict=True):
+        assert abs(other[1]) == pytest.approx(abs(one[1]) + 0.02)
+        assert other[::2] == pytest.approx(one[::2])
+    with pytest.raises(ParameterError, match=r'stance_widening 0\.2: the legs do not reach'):
+        GaitGenerator(ROBOT, GaitParameters(stance_widening=0.2))
 
 
 @pytest.mark.parametrize(

@@ -133,6 +133,23 @@ def test_a_push_is_survived(kick: tuple[float, float, float]) -> None:
     assert travel.tilt < LEVEL
 
 
+def test_a_lower_wider_stance_survives_more_pushes() -> None:
+    """Pushes to each side of which half tip the gait tip no more than one with it."""
+    falls = []
+    for gait in (GaitParameters(), GaitParameters(nominal_height=0.07, stance_widening=0.025)):
+        rigs = [PhysicsRig(gait=gait) for _ in range(8)]
+        for side, rig in enumerate(rigs):
+            angle = math.tau * side / len(rigs)
+            rig.mode('walk')
+            rig.run(2.0, Velocity(0.2))
+            rig.robot.kick((1.3 * math.cos(angle), 1.3 * math.sin(angle), 0.0))
+            rig.run(1.5, Velocity(0.2))
+        falls.append(sum(rig.faulted for rig in rigs))
+    usual, wide = falls
+    assert usual >= 3
+    assert wide <= 1
+
+
 def test_a_whole_outing() -> None:
     """It stands up, walks about with every change of direction, and lies down where it stands."""
     rig = PhysicsRig()

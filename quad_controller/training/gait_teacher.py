@@ -22,7 +22,7 @@ class GaitTeacher:
         """Use the trot of some parameters."""
         self._robot, self._parameters = robot, parameters
         self.schedule = parameters.schedule(Gait.TROT)
-        self._neutral = robot.footprint(parameters.nominal_height, [0.0] * len(robot.names))
+        self._neutral = parameters.stance(robot, [0.0] * len(robot.names))
         self._lift = SwingLift(robot, self._neutral, self.schedule, parameters.swing_height)
 
     @property

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from quad_description import Feet, Quadruped, Targets
+from quad_description import Quadruped, Targets
 from quad_description.rotations import Vector
 
 from .body import BodyPose, feet_in_body, Leveller, UPRIGHT
@@ -64,13 +64,14 @@ class GaitGenerator:
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
+            ParameterError: They do not reach so far outwards.
         """
         self._robot = robot
         self._parameters = parameters
         self.others: Targets = tuple(others or [0.0] * len(robot.names))
         self._limits = parameters.velocity_limits
         self._centre = robot.hip_centre
-        self._neutral = self._stance()
+        self._neutral = parameters.stance(robot, self.others)
         self.gait = self.wanted_gait = Gait.TROT
         self._lifts = {
             gait: SwingLift(
@@ -178,9 +179,3 @@ class GaitGenerator:
     @property
     def _schedule(self) -> Schedule:
         return self._stepper.schedule
-
-    def _stance(self) -> Feet:
-        shift = self._parameters.com_x_translation
-        feet = self._robot.footprint(self._parameters.nominal_height, self.others)
-        one, two, three, four = ((foot[0] + shift, foot[1], foot[2]) for foot in feet)
-        return one, two, three, four

@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 import math
+
+from quad_description import Feet, Quadruped
 
 from ..exceptions import ParameterError
 from .body import BodyLimits
@@ -25,6 +28,8 @@ class GaitParameters:
         linear_acceleration: Change of the linear velocity in [m/s^2].
         angular_acceleration: Change of the turning in [rad/s^2].
         nominal_height: Hip axes above the centres of the feet in [m].
+        stance_widening: Feet outwards from below the hips in [m]; pushes tip a wide stance less
+            often, and it goes less exactly as commanded.
         com_x_translation: Feet ahead of the centre of mass in [m], when the URDF's is not true.
         swing_height: How high a foot is lifted in [m].
         stance_depth: How far a standing foot is pushed below the ground in [m].
@@ -43,6 +48,7 @@ class GaitParameters:
     linear_acceleration: float = 1.0
     angular_acceleration: float = 4.0
     nominal_height: float = 0.085
+    stance_widening: float = 0.0
     com_x_translation: float = 0.0
     swing_height: float = 0.02
     stance_depth: float = 0.0
@@ -86,6 +92,30 @@ class GaitParameters:
         """Return how fast a gait goes straight ahead at most [m/s]."""
         return min(self.max_linear_velocity_x, self.schedule(gait).speed)
 
+    def stance(self, robot: Quadruped, others: Sequence[float]) -> Feet:
+        """Return where the feet of a robot at rest are, in base_link in [m].
+
+        Args:
+            robot: The robot.
+            others: Positions of all joints, for those that are no legs' in [rad].
+
+        Raises:
+            DescriptionError: The legs do not reach the nominal height.
+            ParameterError: They do not reach so far outwards.
+        """
+        shift, widening = self.com_x_translation, self.stance_widening
+        one, two, three, four = (
+            (x + shift, y + math.copysign(widening, y), z)
+            for x, y, z in robot.footprint(self.nominal_height, others)
+        )
+        feet = one, two, three, four
+        if not all(solution.reachable for solution in robot.solve(feet)):
+            raise ParameterError(
+                f'stance_widening {widening}: the legs do not reach so far outwards at '
+                f'nominal_height {self.nominal_height}; reduce one of them'
+            )
+        return feet
+
     def schedule(self, gait: Gait) -> Schedule:
         """Return a gait with what was tuned of it."""
         schedule = SCHEDULES[gait]
@@ -106,6 +136,7 @@ RANGES: dict[str, tuple[float, float]] = {
     'linear_acceleration': (0.05, 20.0),
     'angular_acceleration': (0.1, 100.0),
     'nominal_height': (0.02, 1.0),
+    'stance_widening': (0.0, 0.5),
     'com_x_translation': (-0.2, 0.2),
     'swing_height': (0.0, 0.2),
     'stance_depth': (0.0, 0.05),

@@ -28,6 +28,7 @@ GAIT_MEANINGS: Mapping[str, str] = {
     'linear_acceleration': 'change of the linear velocity [m/s2]',
     'angular_acceleration': 'change of the turning [rad/s2]',
     'nominal_height': "hip axes above the feet's centres [m]",
+    'stance_widening': 'feet outwards from below the hips [m]',
     'com_x_translation': "feet ahead of the URDF's centre of mass [m]",
     'swing_height': 'lift of a foot [m]',
     'stance_depth': 'how far a standing foot is pushed down [m]',
