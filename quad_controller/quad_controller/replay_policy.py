@@ -6,36 +6,35 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 import signal
 import sys
 
 from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf
-from rosbag_files import BagError, BagReader
 
 from .exceptions import PolicyError, QuadControllerError
 from .gait.generator import GaitGenerator
 from .gait.parameters import GaitParameters
 from .policy.load import load_policy, LoadedPolicy
-from .policy.options import PolicyOptions
 from .policy.shipped import find_policy
 from .policy.statistics import ObservationStatistics, STATISTICS_KEY
 from .recording.replay import MAX_DIFFERENCE, read_recording, Replay, replay, statistics_of
-from .states.parameters import StateParameters
+from .recording.run import PolicyRun
 
 
 def run(arguments: Sequence[str]) -> int:
     """Replay; return 0 when the answers are the recorded ones, in the distribution of training."""
     options = _parser().parse_args(arguments)
     try:
-        steps = read_recording(options.recording)
+        steps, recorded = read_recording(options.recording), PolicyRun.of(options.recording)
         robot = quadruped(robot_urdf(options.preset, arm=options.arm))
         loaded = load_policy(
-            find_policy(options.model or _recorded_model(options.recording)),
+            find_policy(options.model or _model_of(recorded, options.recording)),
             robot,
             GaitGenerator(robot, GaitParameters()).stand_targets,
-            PolicyOptions(contract=options.contract),
-            StateParameters().period,
+            replace(recorded.options, contract=options.contract or recorded.options.contract),
+            recorded.period,
         )
         reference, origin = _reference(loaded, options.reference)
         found = replay(loaded.runner, loaded.contract, steps, reference)
@@ -54,7 +53,7 @@ def report(found: Replay, loaded: LoadedPolicy, origin: str) -> list[str]:
         f'{found.steps} steps, asked in {found.asked}',
     ]
     if found.compared:
-        differs = f'NOT the same, more than {MAX_DIFFERENCE:g}; were parameters policy_* set?'
+        differs = f'NOT the same, more than {MAX_DIFFERENCE:g}'
         verdict = 'the same' if found.agrees else differs
         lines.append(
             f'{found.compared} answers compared with the recorded ones: actions differ by '
@@ -109,19 +108,15 @@ def _reference(
     )
 
 
-def _recorded_model(recording: Path) -> str:
+def _model_of(recorded: PolicyRun, recording: Path) -> str:
     """Return the policy that a recording was begun with.
 
     Raises:
         PolicyError: There was none.
     """
-    try:
-        name = (BagReader(recording).metadata.custom or {}).get('policy', '')
-    except BagError as error:
-        raise PolicyError(f'recording {recording}: {error}') from error
-    if not name:
+    if not recorded.policy:
         raise PolicyError(f'recording {recording} was begun without a policy; name the model')
-    return name
+    return recorded.policy
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -137,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--reference', type=Path, metavar='RECORDING', help='instead of what the model says'
     )
-    parser.add_argument('--contract', type=Path, metavar='FILE', help='contract of the policy')
+    parser.add_argument('--contract', type=Path, metavar='FILE', help='not the recorded one')
     parser.add_argument('--preset', choices=list(PRESETS), default='lite', help='the robot')
     parser.add_argument('--arm', action='store_true', help='the robot has its arm')
     return parser

@@ -20,12 +20,13 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy import onnx_file
 from quad_controller.policy.load import load_policy
-from quad_controller.policy.options import PolicyOptions
+from quad_controller.policy.options import GravitySource, PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.policy.shipped import find_policy
 from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_controller.recording.recorder import Recorder, TOPIC
 from quad_controller.recording.replay import feed, read_recording, statistics_of
+from quad_controller.recording.run import PolicyRun
 from quad_controller.recording.step import definition, FIELDS, pack, record_of, StepTiming, unpack
 from quad_controller.states.controller import Controller
 from quad_controller.states.parameters import StateParameters
@@ -42,21 +43,30 @@ FORWARD = Velocity(0.15)
 TIMING = StepTiming(1_700_000_000_123_456_789, 0.0201, 0.0007, None)
 
 
-def shipped(path: Path | None = None) -> PolicyRunner:
-    """Return the policy that is shipped, or one in another file, anew."""
+AS_SHIPPED = PolicyOptions()
+
+
+def shipped(options: PolicyOptions = AS_SHIPPED) -> PolicyRunner:
+    """Return the policy that is shipped, anew."""
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    file = path or find_policy('trot_imitation')
-    return load_policy(file, MODEL, stand, PolicyOptions(), PERIOD).runner
+    return load_policy(find_policy('trot_imitation'), MODEL, stand, options, PERIOD).runner
 
 
 def walk(
-    folder: Path, policy: PolicyRunner, seconds: float, terrain: Terrain | None = None
+    folder: Path,
+    seconds: float,
+    *,
+    options: PolicyOptions = AS_SHIPPED,
+    terrain: Terrain | None = None,
 ) -> Path:
-    """Record a walk in physics: standing up by the gait, then by a policy."""
+    """Record a walk in physics: standing up by the gait, then by the policy that is shipped."""
+    policy = shipped(options)
     robot = Robot(robot_urdf()) if terrain is None else Robot(robot_urdf(), terrain=terrain)
     backend = PhysicsBackend(robot, PERIOD)
     controller = Controller(MODEL, GaitParameters(), StateParameters(), policy=policy)
-    recorder = Recorder(folder, {'policy': 'trot_imitation'}, backlog=10_000)
+    run = PolicyRun('trot_imitation', options, PERIOD)
+    recorder = Recorder(folder, run.about, backlog=10_000)
+    run.keep_contract(folder)
     state = backend.observe()
     for step in range(round(seconds / PERIOD)):
         controller.set_velocity(FORWARD)
@@ -141,7 +151,7 @@ def test_a_recorded_walk_is_answered_the_same(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Observations and actions are recomputed from what was measured; other answers are seen."""
-    folder = walk(tmp_path / 'walk', shipped(), 5.0)
+    folder = walk(tmp_path / 'walk', 5.0)
     reader = BagReader(folder)
     assert [(each.topic.name, each.count) for each in reader.metadata.topics] == [(TOPIC, 250)]
     assert replay_policy.run([str(folder)]) == 0
@@ -161,12 +171,37 @@ def test_a_recorded_walk_is_answered_the_same(
 
 
 @pytest.mark.slow
+def test_a_policy_is_replayed_as_it_was_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its parameters and its contract's file are in the recording."""
+    contract = tmp_path / 'own.yaml'
+    contract.write_text('period: 0.02\ncommands: {x: [-0.05, 0.05]}\n', encoding='utf-8')
+    options = PolicyOptions(contract, phase_period=0.4, gravity_source=GravitySource.EULER)
+    folder = walk(tmp_path / 'walk', 3.0, options=options)
+    contract.unlink()
+    assert replay_policy.run([str(folder)]) == 0
+    assert 'the same' in capsys.readouterr().out
+    other = tmp_path / 'other.yaml'
+    other.write_text('period: 0.02\n', encoding='utf-8')
+    assert replay_policy.run([str(folder), '--contract', str(other)]) == 1
+    assert 'NOT the same' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('text', ['', '[]', '{}', '{"low_pass": -1}', 'no'])
+def test_options_that_are_none_are_refused(text: str) -> None:
+    """A recording may come from elsewhere."""
+    with pytest.raises(ParameterError, match='options of a policy'):
+        PolicyOptions.from_json(text)
+
+
+@pytest.mark.slow
 def test_a_slope_leaves_what_was_seen_on_the_level(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """By a reference recording, and by statistics in the model: gravity is what differs."""
-    level = walk(tmp_path / 'level', shipped(), 5.0)
-    slope = walk(tmp_path / 'slope', shipped(), 5.0, Terrain(angle=0.2))
+    level = walk(tmp_path / 'level', 5.0)
+    slope = walk(tmp_path / 'slope', 5.0, terrain=Terrain(angle=0.2))
     model = str(find_policy('trot_imitation'))
     assert replay_policy.run([str(level), model, '--reference', str(level)]) == 0
     assert 'LEAVES' not in capsys.readouterr().out

@@ -50,6 +50,7 @@ from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
 from ..policy.shipped import find_policy
 from ..recording.recorder import Recorder
+from ..recording.run import PolicyRun
 from ..recording.step import StepTiming
 from ..states.controller import Controller
 from ..states.faults import Fault
@@ -181,8 +182,10 @@ class ControllerNode(Node):
         settings, now = self._settings, datetime.now(tz=timezone.utc)
         folder = Path(settings.record).expanduser() / now.strftime('quad_%Y%m%d_%H%M%S_%f')
         names = ','.join(settings.robot.names)
-        about = {'joint_names': names, 'policy': settings.policy}
-        return Recorder(folder, about)
+        run = PolicyRun(settings.policy, settings.policy_options, settings.states.period)
+        recorder = Recorder(folder, {'joint_names': names, **run.about})
+        run.keep_contract(folder)
+        return recorder
 
     def _record(self, output: Output, dt: float, computing: float, latency: float | None) -> None:
         if self._recorder is not None:

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+import json
 import math
 from pathlib import Path
+from typing import Any
 
 from ..exceptions import ParameterError
 from .gains import ServoResponse
@@ -68,6 +70,27 @@ class PolicyOptions:
             if not (math.isfinite(value) and least <= value <= most):
                 raise ParameterError(f'policy_{name} {value} is not within {least} to {most}')
 
+    def to_json(self) -> str:
+        """Return all that decides about observations and targets, but the contract's file."""
+        numbers = {name: getattr(self, name) for name in OPTION_RANGES}
+        words = {name: getattr(self, name).value for name in OPTION_WORDS}
+        return json.dumps({**numbers, **words, 'hold_missing': self.hold_missing})
+
+    @classmethod
+    def from_json(cls, text: str, contract: Path | None = None) -> PolicyOptions:
+        """Return what :meth:`to_json` wrote, with a file of the contract.
+
+        Raises:
+            ParameterError: It is something else.
+        """
+        try:
+            values: dict[str, Any] = json.loads(text)
+            for name, kind in OPTION_WORDS.items():
+                values[name] = kind(values[name])
+            return cls(contract=contract, **values)
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
+            raise ParameterError(f'options of a policy {text!r}: {error}') from error
+
 
 OPTION_RANGES: dict[str, tuple[float, float]] = {
     'phase_period': (0.0, 10.0),
@@ -75,3 +98,6 @@ OPTION_RANGES: dict[str, tuple[float, float]] = {
     'low_pass': (0.0, 100.0),
 }
 """Range of each number, both ends included; units as in :class:`PolicyOptions`."""
+
+OPTION_WORDS: dict[str, type[Enum]] = {'imu_frame': ImuFrame, 'gravity_source': GravitySource}
+"""Kind of each choice."""

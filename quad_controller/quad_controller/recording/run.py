@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How a policy was run, kept with the recording of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+import shutil
+
+from rosbag_files import BagError, BagReader
+
+from ..exceptions import ParameterError, PolicyError
+from ..policy.options import PolicyOptions
+from ..states.parameters import StateParameters
+
+CONTRACT_FILE = 'contract.yaml'  # in the folder of a recording
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyRun:
+    """What the steps do not say, and the answers depend on.
+
+    Attributes:
+        policy: As it was named; empty for the gait.
+        options: How it was run.
+        period: Of the control loop in [s].
+    """
+
+    policy: str
+    options: PolicyOptions
+    period: float
+
+    @property
+    def about(self) -> Mapping[str, str]:
+        """What is written down with the recording."""
+        return {
+            'policy': self.policy,
+            'policy_options': self.options.to_json(),
+            'period': repr(self.period),
+        }
+
+    def keep_contract(self, folder: Path) -> None:
+        """Copy the contract of the options, when there is one, into the folder of the recording.
+
+        Raises:
+            ParameterError: It cannot be read or written.
+        """
+        if self.options.contract is None:
+            return
+        try:
+            shutil.copyfile(self.options.contract, folder / CONTRACT_FILE)
+        except OSError as error:
+            raise ParameterError(f'record: {error}') from error
+
+    @classmethod
+    def of(cls, recording: Path) -> PolicyRun:
+        """Return that of a recording; what an older one does not say has its default.
+
+        Args:
+            recording: Its folder, or its MCAP file.
+
+        Raises:
+            PolicyError: It cannot be read.
+        """
+        try:
+            about = BagReader(recording).metadata.custom or {}
+        except BagError as error:
+            raise PolicyError(f'recording {recording}: {error}') from error
+        contract = (recording if recording.is_dir() else recording.parent) / CONTRACT_FILE
+        kept = contract if contract.is_file() else None
+        try:
+            options = (
+                PolicyOptions.from_json(about['policy_options'], kept)
+                if 'policy_options' in about
+                else PolicyOptions(contract=kept)
+            )
+            period = float(about.get('period', StateParameters().period))
+        except (ParameterError, ValueError) as error:
+            raise PolicyError(f'recording {recording}: {error}') from error
+        return cls(about.get('policy', ''), options, period)
