@@ -184,13 +184,13 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(robot: Robot) -> None:
     robot.description.publish(String(data=ARM))
     silence = robot.viewer.page._silence
 
-    def heard() -> bool:
+    def received() -> bool:
         states.publish(JointState(name=['a'], position=[0.5]))
         return robot.viewer._received_at is not None and not silence.content
 
-    robot.spin_until(heard, 'joint states')
+    robot.spin_until(received, 'joint states')
     robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words')
-    robot.spin_until(heard, 'their end')
+    robot.spin_until(received, 'their end')
 
 
 def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:

@@ -47,7 +47,7 @@ def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
 
 
 def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
-    """Two people press it: both hear that the drive stands, and it was stopped once."""
+    """Two people press it: both answers are right, and it was stopped once."""
     net = VirtualNetwork(bus_config(drive_config(MOVES, 2)))
     net.boot()
     net.do(MOVES, 'init')
