@@ -122,13 +122,24 @@ class StopSequence:
                 lambda: objects.state is not DriveState.OPERATION_ENABLED,
             )
             if not await self._within(deadline - self._scheduler.now, self._rests):
-                self._report('did not come to rest in time')
+                self._report_motion()
             await self._lead(DriveState.SWITCH_ON_DISABLED, lambda: self.disabled)
             if not await self._within(STOP_TIMEOUT, lambda: self.disabled):
                 error = f' ({self._sdo_error})' if self._sdo_error else ''
                 self._report(f'does not show that it is disabled{error}', '. Cut its power')
         finally:
             self.goal = None
+
+    def _report_motion(self) -> None:
+        """Report that it is not seen to rest: it moves, or sends nothing any more."""
+        silence = self._scheduler.now - self._view.objects.timestamp
+        if self._view.objects.fresh(self._scheduler.now):
+            self._report('did not come to rest in time')
+        else:
+            self._report(
+                f'has sent no TPDO for {silence:.1f} s, and is not seen to come to rest; last',
+                '. Check its power and cable',
+            )
 
     def _report(self, what: str, remedy: str = '') -> None:
         if not self._quiet:

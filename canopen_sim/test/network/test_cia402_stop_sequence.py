@@ -153,6 +153,18 @@ def test_a_drive_that_could_not_be_stopped_is_stopped_by_the_next_request(
     assert abs(failing.device.velocity) / SCALE < STANDING
 
 
+def test_a_drive_that_is_gone_is_not_said_to_move_on() -> None:
+    """As long as its heartbeat is not overdue, it is silent: that is what is reported."""
+    failing = MovingDrive(6)
+    others = {0x180 + NODE_ID, 0x280 + NODE_ID, 0x380 + NODE_ID, 0x480 + NODE_ID, 0x580 + NODE_ID}
+    failing.net.wire.loses = lambda sender, frame: frame.can_id in others
+    with pytest.raises(DriveError, match='no TPDOs for'):
+        failing.net.do(JOINT, 'shutdown', preempt=True)
+    assert not [text for text in failing.net.reported() if 'did not come to rest' in text]
+    (silent,) = [text for text in failing.errors if 'has sent no TPDO for' in text]
+    assert 'Check its power and cable' in silent
+
+
 def test_a_stop_by_sdo_waits_for_no_other_sdo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither for those in the queue nor for answers that get lost."""
     failing = MovingDrive(6)
