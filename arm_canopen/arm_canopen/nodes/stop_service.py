@@ -12,10 +12,11 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from node_runner import create_deferred_service
+
 from ..cia402.drive_commands import DriveCommands
 from ..cia402.stop_all import stop_all, StopReport
 from ..master.runner import NetworkThread
-from .deferred_service import DeferredServices
 from .output_thread import OutputThread
 
 SERVICE = 'stop'
@@ -43,23 +44,24 @@ class StopService:
         """
         self._node, self._commands, self._thread = node, commands, thread
         self._events = node.create_publisher(String, EVENT_TOPIC, 10)
-        DeferredServices(output).create(node, Trigger, SERVICE, self._stop, self._answer)
+        create_deferred_service(node, Trigger, SERVICE, self._stop, self._answer, post=output.post)
 
     def _stop(self, _: Trigger.Request) -> Future[StopReport]:
         self._events.publish(String(data=STOP_EVENT))  # or a plan would begin after the halt
         scheduler = self._thread.network.scheduler
         return self._thread.run_coroutine(lambda: stop_all(self._commands, scheduler))
 
-    def _answer(self, response: Any, future: Future[StopReport]) -> None:  # noqa: ANN401
+    def _answer(self, response: Any, future: Future[StopReport]) -> Any:  # noqa: ANN401
         error = future.exception()
         if error is None:
             report = future.result()
             response.success, response.message = not report.failed, str(report)
         else:
             response.success, response.message = False, str(error)
-        log = self._node.get_logger()
+        words = f'{SERVICE}: {response.message}'
         # a line of its own for each severity: rclpy refuses another one from the same line
         if response.success:
-            log.info(f'{SERVICE}: {response.message}')
+            self._node.get_logger().info(words)
         else:
-            log.error(f'{SERVICE}: {response.message}')
+            self._node.get_logger().error(words)
+        return response

@@ -77,12 +77,14 @@ class UnitsService:
     def _read(self, _request: ReadUnits.Request) -> Future[FactorGroup]:
         return self._thread.run_coroutine(self._drive.view.cache.factor_group)
 
-    def _answer(self, response: ReadUnits.Response, future: Future[FactorGroup]) -> None:
+    def _answer(
+        self, response: ReadUnits.Response, future: Future[FactorGroup]
+    ) -> ReadUnits.Response:
         error = future.exception()
         response.success = error is None
         if error is not None:
             response.message = str(error)
-            return
+            return response
         factors, drive = future.result(), self._drive
         response.gear = factors.gear or 0.0
         response.factor_scale = factors.position_scale
@@ -94,3 +96,4 @@ class UnitsService:
         config = drive.node.config
         response.device = config.name
         response.channel = drive.config.channel if len(config.axes) > 1 else -1
+        return response

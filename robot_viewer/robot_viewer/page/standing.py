@@ -14,7 +14,6 @@ from urdf_reader import KinematicTree, PointMass, Quaternion, rotate, Transform,
 FOOT = '_foot'
 """How the names of the links of feet end."""
 LEAST_FEET = 3
-UP: Vector = (0.0, 0.0, 1.0)
 SOURCES: Mapping[str, str] = {
     'commanded_height': 'estimated by where they were sent; nothing senses it',
     'measured_height': 'estimated by joints and attitude; nothing senses it',
