@@ -16,7 +16,7 @@ import argparse
 
 from quad_controller.exceptions import CheckError
 from quad_controller.policy.shipped import shipped_policies
-from quad_controller.policy_check.conditions import AS_MADE, Conditions
+from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table, text_of
 from quad_controller.policy_check.trial import (
@@ -27,14 +27,13 @@ from quad_controller.policy_check.trial import (
     Trial,
 )
 
-PUSH = 1.3  # [m/s] four of ten such pushes tip the gait
 GROUNDS = {
     'level': AS_MADE,
-    f'pushed by {PUSH:g} m/s': Conditions(push=PUSH),
+    f'pushed by {TIPPING_PUSH:g} m/s': Conditions(push=TIPPING_PUSH),
     'rough, 2 cm': Conditions(roughness=0.02),
     '20 % heavier': Conditions(trunk_mass=1.2),
     'wire of 20 ms': Conditions(delay=0.02),
-    'rough and pushed': Conditions(roughness=0.02, push=PUSH),
+    'rough and pushed': Conditions(roughness=0.02, push=TIPPING_PUSH),
 }
 HEADINGS = (
     *('', 'ground', 'forward [m/s]', 'lateral [m/s]', 'turn [rad/s]'),

@@ -18,6 +18,7 @@ from quad_controller.exceptions import CheckError
 from quad_controller.gait.velocity import REST, Velocity
 from quad_controller.policy.contract.model import CommandRanges, Gains
 from quad_controller.policy.gains import gain_rows, ServoResponse
+from quad_controller.policy.shipped import find_policy
 from quad_controller.policy_check.arenas import (
     PatientBackend,
     PhysicsArena,
@@ -27,7 +28,7 @@ from quad_controller.policy_check.arenas import (
     servo_response,
 )
 from quad_controller.policy_check.chart import Line, line_chart
-from quad_controller.policy_check.conditions import Conditions, SWEEPS
+from quad_controller.policy_check.conditions import Conditions, SWEEPS, TIPPING_PUSH
 from quad_controller.policy_check.course import (
     course_for,
     CourseFigures,
@@ -45,7 +46,7 @@ from quad_controller.policy_check.findings import (
 from quad_controller.policy_check.html_report import html_report
 from quad_controller.policy_check.judgement import against_gait, is_too_late, timing_notes
 from quad_controller.policy_check.main import ExitCode, run
-from quad_controller.policy_check.trial import chain_duration
+from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
 from quad_controller.policy_check.walk import WalkingRobot
 from quad_description import RecordedBackend, RobotState
 from quad_gait_policies import joined, metadata, write_policy
@@ -101,6 +102,19 @@ def test_falls_are_counted_and_walked_on_after() -> None:
     assert toppled.falls > 0
     assert [each.time > 0.0 for each in toppled.passages] == [True, True]
     assert math.isnan(toppled.passages[1].cost_of_transport)
+
+
+@pytest.mark.slow
+def test_the_trained_policy_falls_less_than_half_as_often_as_the_gait() -> None:
+    """Under pushes that tip the gait; on the level it goes as it is commanded."""
+    policy, commands = Candidate(find_policy('trot_ppo')), (Velocity(0.2), Velocity(yaw=1.0))
+    pushed = Conditions(push=TIPPING_PUSH)
+    trials = [Trial(who, commands, 16.0, pushed) for who in (Candidate(), policy)]
+    gait, trained, level = run_trials([*trials, Trial(policy, course_for(None), 3.0)])
+    assert gait.falls > 3
+    assert trained.falls <= 0.5 * gait.falls
+    assert level.falls == 0
+    assert level.error < 0.03
 
 
 class Interrupted(PhysicsArena):

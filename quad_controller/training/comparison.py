@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from quad_controller.gait.velocity import Velocity
-from quad_controller.policy_check.conditions import AS_MADE, Conditions
+from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import CourseFigures
 from quad_controller.policy_check.trial import Candidate, run_trials, Trial
 
@@ -26,7 +26,7 @@ COMMANDS = (
 
 GROUNDS = {
     'level': AS_MADE,
-    'pushed': Conditions(push=1.2),
+    'pushed': Conditions(push=TIPPING_PUSH),
     '20 % heavier, smooth ground': Conditions(trunk_mass=1.2, friction=0.4),
 }
 

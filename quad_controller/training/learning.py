@@ -24,7 +24,7 @@ from quad_description import quadruped, robot_urdf
 from quad_sim.env import ProcessVectorEnv, Randomization
 
 RANDOMIZATION = Randomization(
-    friction=(0.35, 1.3), trunk_mass=(0.9, 1.3), kick=(-1.0, 1.0), kick_interval=3.0
+    friction=(0.35, 1.3), trunk_mass=(0.9, 1.3), kick=(-1.6, 1.6), kick_interval=2.0
 )
 """What differs in the end."""
 OBSERVED_STEPS = 500  # of each environment, for the ranges that replay_policy compares with

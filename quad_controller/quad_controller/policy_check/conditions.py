@@ -33,6 +33,9 @@ class Conditions:
 AS_MADE = Conditions()
 """The robot as it is, on level ground."""
 
+TIPPING_PUSH = 1.3
+"""A push that tips the gait in about half of the cases, in [m/s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
@@ -67,7 +70,7 @@ SWEEPS = (
     Sweep('delay', 'delay of targets', 'ms', (0.0, 0.02, 0.04, 0.08), 1e3),
     Sweep('gyro_bias', 'bias of the gyro', 'rad/s', (0.0, 0.3, 0.6, 1.2)),
     Sweep('level_bias', 'bias of roll and pitch', 'mrad', (0.0, 0.06, 0.12, 0.24), 1e3),
-    Sweep('push', 'pushes every 2 s', 'm/s', (0.0, 0.8, 1.2, 1.6)),
+    Sweep('push', 'pushes every 2 s', 'm/s', (0.0, 0.8, 1.2, 1.6, 2.0)),
     Sweep('roughness', 'rough ground', 'mm', (0.0, 0.01, 0.02, 0.03), 1e3),
 )
 """What is tried: up to where the gait or what was trained for it has trouble."""
