@@ -88,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--policy',
         metavar='FILE',
         type=Path,
-        help='ONNX policy to load and check, a file or trot_imitation; mode "policy" lets it walk',
+        help='ONNX policy to load and check, a file or trot_ppo; mode "policy" lets it walk',
     )
     parser.add_argument(
         '--record',

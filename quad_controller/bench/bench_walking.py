@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 
 from quad_controller.exceptions import CheckError
+from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.policy.shipped import shipped_policies
 from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
@@ -61,7 +62,7 @@ def main() -> None:
     parser.add_argument('--duration', type=float, default=4.0, help='of each command [s]')
     parser.add_argument('--chain-minutes', type=float, default=0.8, help='0: leave it out')
     options = parser.parse_args()
-    walkers = {'gait': Candidate()}
+    walkers = {'gait': Candidate(), 'gait, low, wide': Candidate(gait=LOW_AND_WIDE)}
     walkers |= {name: Candidate(path) for name, path in shipped_policies().items()}
     commands = course_for(None)
     trials = {

@@ -17,6 +17,7 @@ from .exceptions import PolicyError, QuadControllerError
 from .gait.generator import GaitGenerator
 from .gait.parameters import GaitParameters
 from .policy.load import load_policy, LoadedPolicy
+from .policy.options import PolicyOptions
 from .policy.shipped import find_policy
 from .policy.statistics import ObservationStatistics, STATISTICS_KEY
 from .recording.replay import MAX_DIFFERENCE, read_recording, Replay, replay, statistics_of
@@ -33,7 +34,7 @@ def run(arguments: Sequence[str]) -> int:
             find_policy(options.model or _model_of(recorded, options.recording)),
             robot,
             GaitGenerator(robot, GaitParameters()).stand_targets,
-            replace(recorded.options, contract=options.contract or recorded.options.contract),
+            _options_for(options.model, options.contract, recorded),
             recorded.period,
         )
         reference, origin = _reference(loaded, options.reference)
@@ -106,6 +107,12 @@ def _reference(
         f'none: the file has no {STATISTICS_KEY}; give a recording of a run in simulation by '
         '--reference'
     )
+
+
+def _options_for(model: str | None, contract: Path | None, recorded: PolicyRun) -> PolicyOptions:
+    """Return how a policy is run: as it was recorded, unless it is another one."""
+    options = recorded.options if model in {None, recorded.policy} else PolicyOptions()
+    return options if contract is None else replace(options, contract=contract)
 
 
 def _model_of(recorded: PolicyRun, recording: Path) -> str:

@@ -11,7 +11,7 @@ import math
 import pytest
 
 from quad_controller.gait.body import BodyPose
-from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.parameters import AS_TUNED, GaitParameters, LOW_AND_WIDE
 from quad_controller.gait.servo_compensation import ServoModel
 from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
@@ -136,7 +136,7 @@ def test_a_push_is_survived(kick: tuple[float, float, float]) -> None:
 def test_a_lower_wider_stance_survives_more_pushes() -> None:
     """Pushes to each side of which half tip the gait tip no more than one with it."""
     falls = []
-    for gait in (GaitParameters(), GaitParameters(nominal_height=0.07, stance_widening=0.025)):
+    for gait in (AS_TUNED, LOW_AND_WIDE):
         rigs = [PhysicsRig(gait=gait) for _ in range(8)]
         for side, rig in enumerate(rigs):
             angle = math.tau * side / len(rigs)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 from pathlib import Path
+import shutil
 import struct
 
 import numpy as np
@@ -66,7 +67,7 @@ def walk(
     controller = Controller(MODEL, GaitParameters(), StateParameters(), policy=policy)
     run = PolicyRun('trot_imitation', options, PERIOD)
     recorder = Recorder(folder, run.about, backlog=10_000)
-    run.keep_contract(folder)
+    assert not run.keep_contract(folder)
     state = backend.observe()
     for step in range(round(seconds / PERIOD)):
         controller.set_velocity(FORWARD)
@@ -180,19 +181,34 @@ def test_a_policy_is_replayed_as_it_was_run(
     options = PolicyOptions(contract, phase_period=0.4, gravity_source=GravitySource.EULER)
     folder = walk(tmp_path / 'walk', 3.0, options=options)
     contract.unlink()
+    assert 'own.yaml' in PolicyRun('', options, PERIOD).keep_contract(folder)
     assert replay_policy.run([str(folder)]) == 0
     assert 'the same' in capsys.readouterr().out
     other = tmp_path / 'other.yaml'
     other.write_text('period: 0.02\n', encoding='utf-8')
     assert replay_policy.run([str(folder), '--contract', str(other)]) == 1
     assert 'NOT the same' in capsys.readouterr().out
+    # a model that is named is another one: what was set for the recorded one is not its
+    named = shutil.copy(find_policy('trot_imitation'), tmp_path / 'named.onnx')
+    assert replay_policy.run([str(folder), str(named)]) == 1
+    assert 'NOT the same' in capsys.readouterr().out
 
 
-@pytest.mark.parametrize('text', ['', '[]', '{}', '{"low_pass": -1}', 'no'])
-def test_options_that_are_none_are_refused(text: str) -> None:
-    """A recording may come from elsewhere."""
-    with pytest.raises(ParameterError, match='options of a policy'):
+@pytest.mark.parametrize(
+    ('text', 'reason'),
+    [
+        ('no', 'options of a policy'),
+        ('[]', 'options of a policy'),
+        ('{"low_pass": -1}', 'policy_low_pass -1 is not within'),
+        ('{"imu_frame": "none"}', 'options of a policy'),
+        ('{"unknown": 1}', 'options of a policy'),
+    ],
+)
+def test_options_that_are_none_are_refused(text: str, reason: str) -> None:
+    """A recording may come from elsewhere; what it does not say has its default."""
+    with pytest.raises(ParameterError, match=reason):
         PolicyOptions.from_json(text)
+    assert PolicyOptions.from_json('{"low_pass": 5.0}') == PolicyOptions(low_pass=5.0)
 
 
 @pytest.mark.slow

@@ -34,6 +34,7 @@ from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.policy_check.conditions import Conditions
 from quad_controller.policy_check.course import CourseFigures, Passage
+from quad_controller.policy_check.trial import Candidate
 from quad_controller.states.controller import Controller
 from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
@@ -166,7 +167,7 @@ def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
 def test_figures_distinguish_a_walker_that_falls() -> None:
     """On the same way with the same pushes."""
     grounds = {'pushed': Conditions(push=0.5), 'hit': Conditions(push=4.0)}
-    compared = compare({'gait': None}, 6.0, grounds=grounds, commands=(Velocity(0.2),))
+    compared = compare({'gait': Candidate()}, 6.0, (1, 2), grounds, (Velocity(0.2),))
     walked, toppled = compared['gait'].values()
     assert walked.falls == 0
     assert walked.error < 0.05

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
@@ -30,23 +29,26 @@ GROUNDS = {
     '20 % heavier, smooth ground': Conditions(trunk_mass=1.2, friction=0.4),
 }
 
+SEEDS = (1, 2, 3, 4)
+"""Of the pushes: falls of one seed are too few to compare."""
+
 Results = Mapping[str, Mapping[str, CourseFigures]]
 """By the name of the walker and the title of the ground."""
 
 
 def compare(
-    walkers: Mapping[str, Path | None],
+    walkers: Mapping[str, Candidate],
     duration: float,
-    seed: int = 1,
+    seeds: tuple[int, ...] = SEEDS,
     grounds: Mapping[str, Conditions] = GROUNDS,
     commands: tuple[Velocity, ...] = COMMANDS,
 ) -> dict[str, dict[str, CourseFigures]]:
     """Let walkers walk, on all cores.
 
     Args:
-        walkers: Files of policies by their names; None is the gait.
+        walkers: Who walks, by their names.
         duration: Of each way in [s].
-        seed: Of the pushes; the same for all.
+        seeds: Of the pushes; the same for all. Where nobody is pushed, the first one is enough.
         grounds: What differs, by a title for people.
         commands: One after the other.
 
@@ -54,13 +56,28 @@ def compare(
         CheckError: The physics failed.
         PolicyError: A policy does not fit the robot.
     """
-    trials = [
-        Trial(Candidate(path), commands, duration, ground, seed)
-        for path in walkers.values()
-        for ground in grounds.values()
-    ]
-    found = iter(run_trials(trials))
-    return {name: {title: next(found) for title in grounds} for name in walkers}
+    ways = {
+        (name, title, seed): Trial(who, commands, duration, ground, seed)
+        for name, who in walkers.items()
+        for title, ground in grounds.items()
+        for seed in (seeds if ground.push else seeds[:1])
+    }
+    found = dict(zip(ways, run_trials(list(ways.values())), strict=True))
+    return {name: {title: _all(found, name, title) for title in grounds} for name in walkers}
+
+
+def _all(
+    found: Mapping[tuple[str, str, int], CourseFigures], name: str, title: str
+) -> CourseFigures:
+    """Return what came of a walker on a ground with all seeds."""
+    return CourseFigures(
+        tuple(
+            passage
+            for (who, where, _), figures in found.items()
+            if (who, where) == (name, title)
+            for passage in figures.passages
+        )
+    )
 
 
 def best(compared: Results) -> str:

@@ -18,7 +18,7 @@ from gymnasium import spaces
 import numpy as np
 from trained_contract import contract_of, contract_values, PERIOD, SCALE, Values
 
-from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.contract.model import RecurrentState, Source
 from quad_controller.policy.interface import PolicyInputs
@@ -33,13 +33,9 @@ IMITATED = 'imitation of the trot (DAgger in quad_sim/Walk-v0, firm servos)'
 PRACTISED = 'imitation of the trot, then PPO (quad_sim/Walk-v0, firm servos)'
 
 
-TAUGHT = GaitParameters(nominal_height=0.07, stance_widening=0.025)
-"""Lower and wider than the gait goes by itself: less falls, and practice finds the lost speed."""
-
-
 def teacher_of(robot: Quadruped) -> GaitTeacher:
     """Return the gait as the teacher of a robot."""
-    return GaitTeacher(robot, TAUGHT)
+    return GaitTeacher(robot, LOW_AND_WIDE)
 
 
 def values_for(robot: Quadruped, kind: str = '') -> Values:

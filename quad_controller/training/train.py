@@ -21,13 +21,15 @@ import time
 from comparison import best, compare, table
 from progress import Progress
 
+from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.policy.shipped import shipped_policies
 from quad_controller.policy_check.main import run as check_policy
+from quad_controller.policy_check.trial import Candidate
 
 TASKS = ('walk',)
 CHECKED_WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
 """Velocities with which check_policy lets it walk: x, y in [m/s], yaw in [rad/s]."""
-GAIT = 'gait'
+GAIT, LOW_GAIT = 'gait', 'gait, low and wide'
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -65,8 +67,10 @@ def judge(folder: Path, policies: dict[str, Path], progress: Progress, way: floa
     Returns:
         What check_policy returns.
     """
-    progress.say(f'comparing, {len(policies) + len(shipped_policies()) + 1} walkers ...')
-    compared = compare({GAIT: None, **shipped_policies(), **policies}, way)
+    progress.say('comparing ...')
+    walkers = {GAIT: Candidate(), LOW_GAIT: Candidate(gait=LOW_AND_WIDE)}
+    walkers |= {name: Candidate(path) for name, path in (shipped_policies() | policies).items()}
+    compared = compare(walkers, way)
     text = table(compared)
     (folder / 'figures.txt').write_text(f'{text}\n', encoding='utf-8')
     chosen = best({name: compared[name] for name in policies})

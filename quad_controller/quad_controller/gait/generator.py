@@ -64,7 +64,7 @@ class GaitGenerator:
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
-            ParameterError: They do not reach so far outwards.
+            ParameterError: They do not reach as far outwards or ahead.
         """
         self._robot = robot
         self._parameters = parameters

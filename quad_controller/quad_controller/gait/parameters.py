@@ -101,7 +101,7 @@ class GaitParameters:
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
-            ParameterError: They do not reach so far outwards.
+            ParameterError: They do not reach as far outwards or ahead.
         """
         shift, widening = self.com_x_translation, self.stance_widening
         one, two, three, four = (
@@ -111,8 +111,8 @@ class GaitParameters:
         feet = one, two, three, four
         if not all(solution.reachable for solution in robot.solve(feet)):
             raise ParameterError(
-                f'stance_widening {widening}: the legs do not reach so far outwards at '
-                f'nominal_height {self.nominal_height}; reduce one of them'
+                f'stance_widening {widening}, com_x_translation {shift}: the legs do not reach so '
+                f'far at nominal_height {self.nominal_height}; reduce one of them'
             )
         return feet
 
@@ -147,3 +147,9 @@ RANGES: dict[str, tuple[float, float]] = {
     'heading_gain': (0.0, 10.0),
 }
 """Range of each parameter, both ends included; units as in :class:`GaitParameters`."""
+
+AS_TUNED = GaitParameters()
+"""The gait as it is when nothing is set."""
+
+LOW_AND_WIDE = GaitParameters(nominal_height=0.07, stance_widening=0.025)
+"""A stance of the XGO that pushes hardly tip, and that is slower; what is trained begins there."""

@@ -184,7 +184,8 @@ class ControllerNode(Node):
         names = ','.join(settings.robot.names)
         run = PolicyRun(settings.policy, settings.policy_options, settings.states.period)
         recorder = Recorder(folder, {'joint_names': names, **run.about})
-        run.keep_contract(folder)
+        if problem := run.keep_contract(folder):
+            self.get_logger().warning(f'record: {problem}; replay_policy needs --contract')
         return recorder
 
     def _record(self, output: Output, dt: float, computing: float, latency: float | None) -> None:

@@ -85,10 +85,10 @@ class PolicyOptions:
         """
         try:
             values: dict[str, Any] = json.loads(text)
-            for name, kind in OPTION_WORDS.items():
-                values[name] = kind(values[name])
+            for name in OPTION_WORDS.keys() & values.keys():
+                values[name] = OPTION_WORDS[name](values[name])
             return cls(contract=contract, **values)
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except (ValueError, TypeError, AttributeError) as error:
             raise ParameterError(f'options of a policy {text!r}: {error}') from error
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from quad_description import Backend, Quadruped, RobotState
 
 from ..exceptions import CheckError, QuadControllerError
+from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.contract.model import CommandRanges
 from ..policy.interface import Policy
@@ -188,16 +189,23 @@ class CourseWalker:
         interruptions: Walks that the machine cut off, and not the robot.
     """
 
-    def __init__(self, arena: Arena, robot: Quadruped, policy: Policy | None) -> None:
+    def __init__(
+        self,
+        arena: Arena,
+        robot: Quadruped,
+        policy: Policy | None,
+        gait: GaitParameters = AS_TUNED,
+    ) -> None:
         """Put the robot on its feet.
 
         Args:
             arena: Where.
             robot: The model of the robot.
             policy: What walks; None for the gait.
+            gait: Tuning of the gait.
         """
         self._arena, self.interruptions = arena, 0
-        self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand())
+        self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand(), gait)
 
     def walk(
         self, commands: Sequence[Velocity], duration: float, *, push: float = 0.0, seed: int = 1

@@ -16,7 +16,7 @@ from quad_sim import SimulationError
 
 from ..exceptions import CheckError
 from ..gait.generator import GaitGenerator
-from ..gait.parameters import GaitParameters
+from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import Velocity
 from ..policy.load import load_policy, LoadedPolicy
 from ..policy.options import PolicyOptions
@@ -35,11 +35,13 @@ class Candidate:
         path: An ONNX file; None for the gait.
         options: How the policy is run.
         robot: Which robot walks.
+        gait: Tuning of the gait.
     """
 
     path: Path | None = None
     options: PolicyOptions = field(default_factory=PolicyOptions)
     robot: RobotChoice = field(default_factory=RobotChoice)
+    gait: GaitParameters = AS_TUNED
 
     def load(self) -> LoadedPolicy | None:
         """Return its policy, checked; None for the gait.
@@ -50,7 +52,7 @@ class Candidate:
         if self.path is None:
             return None
         robot = quadruped(self.robot.urdf)
-        stand = GaitGenerator(robot, GaitParameters()).stand_targets
+        stand = GaitGenerator(robot, self.gait).stand_targets
         return load_policy(self.path, robot, stand, self.options, StateParameters().period)
 
 
@@ -83,7 +85,7 @@ class Trial:
         policy = None if loaded is None else loaded.runner
         try:
             arena = PhysicsArena(self.who.robot, self.conditions)
-            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy)
+            walker = CourseWalker(arena, quadruped(self.who.robot.urdf), policy, self.who.gait)
             push = self.conditions.push
             return walker.walk(self.commands, self.duration, push=push, seed=self.seed)
         except SimulationError as error:
@@ -123,7 +125,7 @@ def run_chain(
         loaded = who.load()
         policy = None if loaded is None else loaded.runner
         with serial_arena(who.robot) as arena:
-            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy)
+            walker = CourseWalker(arena, quadruped(who.robot.urdf), policy, who.gait)
             figures.append(walker.walk(commands, duration))
     return figures
 

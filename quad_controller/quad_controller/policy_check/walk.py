@@ -12,7 +12,7 @@ import numpy as np
 from quad_description import Backend, Quadruped, RobotState
 
 from ..exceptions import QuadControllerError
-from ..gait.parameters import GaitParameters
+from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy
 from ..states.controller import Controller
@@ -50,7 +50,12 @@ class WalkingRobot:
     """
 
     def __init__(
-        self, backend: Backend, robot: Quadruped, policy: Policy | None, state: RobotState
+        self,
+        backend: Backend,
+        robot: Quadruped,
+        policy: Policy | None,
+        state: RobotState,
+        gait: GaitParameters = AS_TUNED,
     ) -> None:
         """Begin with a robot on the ground.
 
@@ -59,8 +64,9 @@ class WalkingRobot:
             robot: The model of the robot.
             policy: What walks; None for the gait.
             state: What was observed last.
+            gait: Tuning of the gait.
         """
-        self._backend, self._robot, self._policy = backend, robot, policy
+        self._backend, self._robot, self._policy, self._gait = backend, robot, policy, gait
         self.restart(state)
 
     def restart(self, state: RobotState) -> None:
@@ -71,7 +77,7 @@ class WalkingRobot:
         """
         self._state, self._dt = state, self._backend.period
         states = StateParameters(period=self._backend.period)
-        self.controller = Controller(self._robot, GaitParameters(), states, policy=self._policy)
+        self.controller = Controller(self._robot, self._gait, states, policy=self._policy)
         self.forget()
 
     def forget(self) -> None:

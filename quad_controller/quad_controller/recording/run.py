@@ -41,18 +41,18 @@ class PolicyRun:
             'period': repr(self.period),
         }
 
-    def keep_contract(self, folder: Path) -> None:
+    def keep_contract(self, folder: Path) -> str:
         """Copy the contract of the options, when there is one, into the folder of the recording.
 
-        Raises:
-            ParameterError: It cannot be read or written.
+        Returns:
+            Why not; empty when all is well.
         """
-        if self.options.contract is None:
-            return
-        try:
-            shutil.copyfile(self.options.contract, folder / CONTRACT_FILE)
-        except OSError as error:
-            raise ParameterError(f'record: {error}') from error
+        if self.options.contract is not None:
+            try:
+                shutil.copyfile(self.options.contract, folder / CONTRACT_FILE)
+            except OSError as error:
+                return f'the contract is not kept: {error}'
+        return ''
 
     @classmethod
     def of(cls, recording: Path) -> PolicyRun:
