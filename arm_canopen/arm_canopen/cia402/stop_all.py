@@ -5,12 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from enum import Enum
 
-from ..exceptions import CanopenError
+from ..exceptions import CanopenError, DriveError
 from ..master.scheduler import Promise, Scheduler
+from ..standard.drive import DriveState
 from .drive_commands import DriveCommands
 from .drive_view import FAULTY, POWERED
+from .stop_commands import BRAKED_TIMEOUT
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +22,7 @@ class StopReport:
     """What became of the drives, by name.
 
     Attributes:
-        stopped: They moved, and stand now; still enabled.
+        stopped: They moved, and stand now; still under power.
         standing: They did not move visibly, and no target of before moves them any more.
         unpowered: They are not enabled, so nothing moves them.
         failed: Why it is not known that they stand, each with its name.
@@ -40,8 +44,17 @@ class StopReport:
         return '. '.join(f'{what}: {names}' for what, names in named if names) or 'no drives'
 
 
+class _Outcome(Enum):
+    """What became of one drive; the attributes of a StopReport."""
+
+    STOPPED = 'stopped'
+    STANDING = 'standing'
+    UNPOWERED = 'unpowered'
+    FAILED = 'failed'
+
+
 async def stop_all(commands: Sequence[DriveCommands], scheduler: Scheduler) -> StopReport:
-    """Halt all drives, whatever moves them, and wait until each stands.
+    """Halt all drives, whatever moves them, and wait until each stands or has no power.
 
     One that does not come to rest keeps no other from it.
 
@@ -49,27 +62,29 @@ async def stop_all(commands: Sequence[DriveCommands], scheduler: Scheduler) -> S
         commands: Those of the drives.
         scheduler: Time.
     """
-    moving = {each.drive.name for each in commands if not each.drive.view.stands}
-    halts = [each.request('halt') for each in commands]
-    stopped: list[str] = []
-    standing: list[str] = []
-    unpowered: list[str] = []
-    failed: list[str] = []
-    for each, halt in zip(commands, halts, strict=True):
-        view, name = each.drive.view, each.drive.name
+    ends = [scheduler.spawn(_stopped(each, scheduler)) for each in commands]
+    outcomes = [await end for end in ends]
+    return StopReport(*(tuple(text for is_, text in outcomes if is_ is each) for each in _Outcome))
+
+
+async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[_Outcome, str]:
+    """Halt a drive; return what became of it, and its name or why that is not known."""
+    view = commands.drive.view
+    moved = not view.stands
+    try:
         try:
-            await _to_its_end(halt, each, scheduler)
-        except CanopenError as error:
-            if view.fresh and view.state in FAULTY:  # its own reaction has ended its motion
-                unpowered.append(f'{name} (faulted)')
-            else:
-                failed.append(str(error))
-        else:
-            if view.state not in POWERED:
-                unpowered.append(name)
-            else:
-                (stopped if name in moving else standing).append(name)
-    return StopReport(tuple(stopped), tuple(standing), tuple(unpowered), tuple(failed))
+            await _to_its_end(commands.request('halt'), commands, scheduler)
+        except CanopenError:
+            if not (view.fresh and view.state in FAULTY):
+                raise
+        await _at_rest(commands, scheduler)
+    except CanopenError as error:
+        return _Outcome.FAILED, str(error)
+    if view.state is DriveState.FAULT:  # its own reaction has ended its motion
+        return _Outcome.UNPOWERED, f'{view.name} (faulted)'
+    if view.state not in POWERED:
+        return _Outcome.UNPOWERED, view.name
+    return _Outcome.STOPPED if moved else _Outcome.STANDING, view.name
 
 
 async def _to_its_end(halt: Promise[str], commands: DriveCommands, scheduler: Scheduler) -> None:
@@ -89,3 +104,24 @@ async def _to_its_end(halt: Promise[str], commands: DriveCommands, scheduler: Sc
             halt = other
         else:
             return
+
+
+async def _at_rest(commands: DriveCommands, scheduler: Scheduler) -> None:
+    """Wait for the end of what a halt leaves alone: a quick stop, the reaction to a fault.
+
+    Raises:
+        DriveError: It does not end, or the drive is not seen any more.
+    """
+    drive = commands.drive
+    view = drive.view
+
+    def rests() -> bool:
+        if view.state in POWERED:
+            return view.stands
+        return view.fresh and view.state is not DriveState.FAULT_REACTION_ACTIVE
+
+    timeout = BRAKED_TIMEOUT + drive.stop.ramp_time()
+    with suppress(TimeoutError):
+        await scheduler.until(lambda: rests() or not view.node.operational, timeout)
+    if not rests():
+        raise DriveError(f'{drive.name} is not seen to come to rest: {drive.describe()}')

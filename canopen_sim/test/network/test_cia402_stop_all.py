@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
-from drive_samples import bus_config, drive_config, SCALE
+from drive_samples import bus_config, drive_config, PERIOD, SCALE
+from moving_drive import JOINT, MovingDrive, STANDING
 import pytest
 from virtual_network import VirtualNetwork
 
 from arm_canopen.cia402.stop_all import stop_all, StopReport
+from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.standard.drive import DriveState, OperationMode
 
 pytestmark = pytest.mark.slow
@@ -61,6 +63,55 @@ def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
     second = scheduler.spawn(stop_all(commands, scheduler))
     assert net.result(second).stopped == (MOVES,)
     assert net.result(first) == StopReport((MOVES,), (), (), ())
+
+
+def test_a_quick_stop_in_progress_is_waited_for() -> None:
+    """A halt leaves it alone; the answer comes when the motor stands, and not before."""
+    moving = MovingDrive(option=6)  # stays in Quick Stop Active
+    moving.net.do(JOINT, 'quick_stop', preempt=True)
+    assert abs(moving.device.velocity) > 0.8 * SCALE
+    report = stop(moving.net)
+    assert abs(moving.device.velocity) < STANDING * SCALE
+    assert report == StopReport((JOINT,), (), (), ())
+    assert moving.net.drives[JOINT].view.state is DriveState.QUICK_STOP_ACTIVE
+
+
+def test_the_reaction_to_a_fault_is_waited_for() -> None:
+    """It brakes by itself, under power; only then nothing moves it."""
+    moving = MovingDrive()
+    moving.device.raise_fault(0x2310, moving.net.now)
+    moving.net.run(3 * PERIOD)
+    assert moving.net.drives[JOINT].view.state is DriveState.FAULT_REACTION_ACTIVE
+    report = stop(moving.net)
+    assert abs(moving.device.velocity) < STANDING * SCALE
+    assert report == StopReport((), (), (f'{JOINT} (faulted)',), ())
+    assert stop(moving.net) == report
+
+
+@pytest.mark.parametrize('begins', ['quick_stop', 'fault'])
+def test_what_does_not_come_to_rest_is_said(begins: str) -> None:
+    """A ramp that takes a minute: within some seconds the answer is that it moves."""
+    moving = MovingDrive(6, (0x6085, 0, round(SCALE / 60)))
+    if begins == 'fault':
+        moving.device.raise_fault(0x2310, moving.net.now)
+    else:
+        moving.net.do(JOINT, 'quick_stop', preempt=True)
+    moving.net.run(3 * PERIOD)
+    report = stop(moving.net)
+    assert abs(moving.device.velocity) > 0.5 * SCALE
+    assert report.failed[0].startswith(f'{JOINT} is not seen to come to rest: ')
+    assert report == StopReport((), (), (), report.failed)
+
+
+def test_it_is_there_before_and_while_devices_boot() -> None:
+    """What is not booted yet is not known to stand, and is not enabled by what came before."""
+    net = VirtualNetwork(bus_config(drive_config(MOVES, 2), drive_config(RESTS, 3)))
+    net.start()
+    assert len(stop(net).failed) == 2
+    net.run_until(lambda: net.drives[MOVES].node.phase is BootPhase.CONFIGURING)
+    assert f'NOT known to stand: {MOVES} is not operational' in str(stop(net))
+    net.run_until(net.all_ready)
+    assert stop(net) == StopReport((), (), (MOVES, RESTS), ())
 
 
 def stop(net: VirtualNetwork) -> StopReport:
