@@ -330,13 +330,6 @@ def _cancels_and_stops(arm: MovingArm) -> None:
         GoalStatus.STATUS_ABORTED,
         MoveItErrorCodes.PREEMPTED,
     ), result.error_code
-    run = move(arm, move_goal([-0.4, *READY[1:]]))  # what is still being planned is not begun
-    publisher.publish(String(data='stop'))
-    status, result = run.wait()
-    assert (status, result.error_code.val) == (
-        GoalStatus.STATUS_ABORTED,
-        MoveItErrorCodes.PREEMPTED,
-    ), result.error_code
 
 
 def _back_to_ready(arm: MovingArm) -> None:

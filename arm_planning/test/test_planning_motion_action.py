@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+import threading
 import time
 from types import SimpleNamespace
 from typing import Any
@@ -37,13 +38,16 @@ class Bench:
         self.stale = 0
         self.refusal: PlanningError | None = None
         self.executions: list[Done] = []
+        self.may_plan = threading.Event()
+        self.may_plan.set()
         self.background = Background(client.node, 'planning')
         planning: Any = SimpleNamespace(
             prepare=partial(self._prepare, 1),
             prepare_sequence=partial(self._prepare, 2),
             display=lambda _: None,
         )
-        execution: Any = SimpleNamespace(start=self._start, stop=self._stop)
+        execution: Any = SimpleNamespace(start=self._start, stop=self._stop, stops=0)
+        self.execution = execution
         self.actions = [
             MotionAction(client.node, kind, planning, self.background, execution)
             for kind in (single_motion(planning), sequence(planning))
@@ -56,7 +60,12 @@ class Bench:
         if self.refusal is not None:
             raise self.refusal
         self.plans += 1
-        return lambda: PlannedMotion(RobotState(), [RobotTrajectory()] * count, 0.0)
+
+        def plan() -> PlannedMotion:
+            assert self.may_plan.wait(TIMEOUT)
+            return PlannedMotion(RobotState(), [RobotTrajectory()] * count, 0.0)
+
+        return plan
 
     def _start(self, _trajectory: Any, done: Done) -> Done:
         self.executions.append(done)
@@ -106,6 +115,7 @@ def make_bench(isolation: Isolation) -> Iterator[Bench]:
     with RosClient(isolation.domain_id) as client:
         bench = Bench(client)
         yield bench
+        bench.may_plan.set()
         bench.background.close()
 
 
@@ -167,6 +177,28 @@ def test_no_part_begins_after_a_cancel(bench: Bench, stops: bool) -> None:
         PlanningCode.PREEMPTED,
     )
     assert len(bench.executions) == 1
+
+
+@pytest.mark.parametrize(
+    ('kind', 'name'),
+    [(MoveGroup, 'move_action'), (MoveGroupSequence, 'sequence_move_group')],
+    ids=['motion', 'sequence'],
+)
+def test_what_is_planned_while_everything_is_stopped_is_not_begun(
+    bench: Bench, kind: Any, name: str
+) -> None:
+    """The plan would move the arm after the stop; the next goal does again."""
+    bench.may_plan.clear()
+    handle = bench.send(kind, name, kind.Goal())
+    bench.client.spin_until(lambda: bench.plans == 1, TIMEOUT, 'the plan')
+    bench.execution.stops += 1
+    bench.may_plan.set()
+    status, result = bench.result(handle)
+    code = getattr(result, 'response', result).error_code
+    assert (status, code.val) == (GoalStatus.STATUS_ABORTED, PlanningCode.PREEMPTED)
+    assert code.message == 'everything was stopped meanwhile'
+    assert not bench.executions
+    bench.begin(kind, name, kind.Goal())
 
 
 def test_a_sequence_is_not_planned_anew(bench: Bench) -> None:
