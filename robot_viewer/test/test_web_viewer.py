@@ -14,6 +14,7 @@ import pytest
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.service import Service
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -56,9 +57,22 @@ class Robot:
         self._executor.add_node(self.node)
         self._executor.add_node(self.viewer)
 
-    def offer_stop(self) -> None:
+    def offer_stop(self) -> Service:
         """Offer to stop all of it."""
-        self.node.create_service(Trigger, 'stop', self._answer('stop'))
+        return self.node.create_service(Trigger, 'stop', self._answer('stop'))
+
+    def called_until_enable(self) -> list[str]:
+        """Return what the page has called, in order of names, when it has enabled both drives.
+
+        What it requested before has come by then, and was served, as it was offered before.
+        """
+        enables = {'joint1/enable', 'joint2/enable'}
+        for service in enables:
+            self.viewer.call(f'/{service}')
+        self.spin_until(lambda: enables <= set(self.calls), 'enable')
+        called = sorted(each for each in self.calls if each not in enables)
+        self.calls.clear()
+        return called
 
     def _answer(
         self, name: str
@@ -104,23 +118,27 @@ def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
 
 
 def test_stop_halts_every_drive(robot: Robot) -> None:
-    """And nothing that merely has a service of that name; by one service where there is one."""
+    """And nothing that merely has a service of that name."""
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     robot.viewer.stop()
-    robot.spin_until(lambda: len(robot.calls) == 2, 'halts')
-    assert sorted(robot.calls) == ['joint1/halt', 'joint2/halt']
-    robot.offer_stop()
-    robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
-    robot.viewer.stop()
-    robot.spin_until(lambda: len(robot.calls) == 3, 'the stop of all')
-    assert robot.calls[-1] == 'stop', 'one call instead of many'
-    robot.calls.pop()
-    robot.viewer.call('/joint1/enable')
-    robot.spin_until(lambda: len(robot.calls) == 3, 'enable')
-    assert robot.calls[-1] == 'joint1/enable'
+    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
     robot.viewer.call('/nobody/enable')  # after good answers one that fails, which is a warning
-    robot.viewer.call('/joint2/enable')
-    robot.spin_until(lambda: len(robot.calls) == 4, 'enable, after it')
+    assert not robot.called_until_enable()
+
+
+def test_stop_calls_one_service_that_stops_all(robot: Robot) -> None:
+    """The drives one by one only where it is gone: a master that ends, or a cut link."""
+    service = robot.offer_stop()
+    robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    robot.viewer.stop()
+    robot.spin_until(lambda: 'stop' in robot.calls, 'the stop')
+    assert robot.called_until_enable() == ['stop']
+    robot.node.destroy_service(service)
+    client = robot.viewer._trigger_clients['/stop']
+    robot.spin_until(lambda: not client.service_is_ready(), 'its end')
+    robot.viewer.stop()
+    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
 
 
 def test_who_does_not_look_takes_no_messages(

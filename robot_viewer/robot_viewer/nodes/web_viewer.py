@@ -97,7 +97,7 @@ class WebViewer(Node):
         port = read.whole('port', PORT, (1, 65535), 'of the page; else the next free one')
         self._prefix = read.text('frame_prefix', '', 'before each frame, as of the robot on /tf')
         refuse_misspelt(self)
-        self._orders: deque[Callable[[], None]] = deque()
+        self._orders: deque[Callable[[], object]] = deque()
         self._trigger_clients: dict[str, Client] = {}
         self._drives: dict[str, list[str]] = {}
         self._stops: set[str] = set()
@@ -243,6 +243,8 @@ class WebViewer(Node):
         self._drives.update(drives)
         stops = {self.resolve_service_name(STOP), *map(_stop_beside, self._drives)}
         self._stops |= stops & set(triggers)
+        for service in (*self._stops, *(f'{drive}/halt' for drive in self._drives)):
+            self._client(service)  # it takes time to find its server, which a STOP has not
         self.page.offer_drives(self._drives)
 
     def _find_jogging(self) -> None:
@@ -299,29 +301,33 @@ class WebViewer(Node):
         """Send joints to targets."""
         self._order(partial(self._controllers.aim, controller, targets, share))
 
-    def _order(self, order: Callable[[], None]) -> None:
+    def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
 
     def _stop(self) -> None:
         self._controllers.stop()
         self._first_motion.stop()
-        for service in self._stops:
-            self._call(service)
+        called = {service for service in self._stops if self._call(service)}
         for drive in self._drives:
-            if _stop_beside(drive) not in self._stops:  # of another master than ours
+            if _stop_beside(drive) not in called:  # of another master than ours, or it is gone
                 self._call(f'{drive}/halt')
         self._planning.stop()
         if not self._drives and not self._stops:
             self.page.say('STOP: nothing here offers to be stopped', failed=True)
 
-    def _call(self, service: str) -> None:
-        client = self._trigger_clients.get(service)
-        if client is None:
-            client = self._trigger_clients[service] = self.create_client(Trigger, service)
+    def _client(self, service: str) -> Client:
+        if service not in self._trigger_clients:
+            self._trigger_clients[service] = self.create_client(Trigger, service)
+        return self._trigger_clients[service]
+
+    def _call(self, service: str) -> bool:
+        """Call a Trigger service; return whether it is there."""
+        client = self._client(service)
         if not client.service_is_ready():
             self._report(service, 'is not there', failed=True)
-            return
+            return False
         client.call_async(Trigger.Request()).add_done_callback(partial(self._answered, service))
+        return True
 
     def _request_mode(self, mode: str) -> None:
         if self._set_mode is not None:
