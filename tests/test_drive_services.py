@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Homing, halting, streaming and single moves of a drive, over DDS and a real bus."""
+"""Homing, halting, streaming, moves, units and STOP of drives, over DDS and a real bus."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
 from action_msgs.msg import GoalStatus
@@ -11,11 +12,11 @@ from canopen_interfaces.srv import COTargetDouble
 import pytest
 from rclpy.action.client import ActionClient
 from sensor_msgs.msg import JointState
-from simulated_arm import SimulatedArm
-from std_msgs.msg import Float64
+from simulated_arm import panda_bus, SimulatedArm
+from std_msgs.msg import Float64, String
 
 from arm_msgs.action import Home
-from arm_msgs.srv import Move, WriteObject
+from arm_msgs.srv import InjectFault, Move, ReadUnits, WriteObject
 
 if TYPE_CHECKING:
     from isolation import Isolation
@@ -101,9 +102,45 @@ def test_many_homings_at_a_time_harm_nobody(isolation: Isolation) -> None:
         assert arm.client.trigger(f'{JOINT}/enable').success
 
 
+def reads_units(arm: SimulatedArm) -> None:
+    """Read how the joint counts, and where that is written: the very file of the master."""
+    bus, stat = panda_bus(), panda_bus().stat()
+    answer = arm.client.call(ReadUnits, f'{JOINT}/read_units', ReadUnits.Request())
+    assert answer.success, answer.message
+    scale = answer.scale_pos_to_dev
+    assert scale > 0.0
+    assert answer.scale_pos_from_dev == pytest.approx(1.0 / scale)
+    assert answer.scale_vel_from_dev == pytest.approx(1.0 / answer.scale_vel_to_dev)
+    assert (answer.device, answer.channel) == (JOINT[1:], -1)
+    assert Path(answer.bus_config) == bus
+    assert (answer.bus_config_inode, answer.bus_config_changed) == (stat.st_ino, stat.st_mtime_ns)
+
+
+def stops_all(arm: SimulatedArm) -> None:
+    """STOP: what moves stands, also for move_group; without success where that is not known."""
+    events = arm.client.listen(String, '/trajectory_execution_event')
+    target = COTargetDouble.Request(target=3.0)
+    assert arm.client.call(COTargetDouble, f'{JOINT}/target', target).success
+    answer = arm.client.trigger('/stop')
+    assert answer.success, answer.message
+    others = ', '.join(name for name in arm.joints if name != JOINT[1:])
+    assert answer.message in {
+        f'{what}: {JOINT[1:]}. not enabled: {others}' for what in ('stopped', 'stand')
+    }
+    arm.client.spin_until(lambda: [each.data for each in events] == ['stop'], 10.0, 'the event')
+    lost = InjectFault.Request(fault='power_off')
+    assert arm.client.call(InjectFault, '/fake_slaves/panda_joint5/fault', lost).success
+    arm.master.wait_for('panda_joint5: heartbeat lost')
+    answer = arm.client.trigger('/stop')
+    assert not answer.success
+    assert answer.message.startswith('NOT known to stand: panda_joint5 is not operational: ')
+    assert f'stand: {JOINT[1:]}. not enabled: ' in answer.message
+
+
 def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
     """Halt keeps the drive enabled, quick stop does not; moves add up; streams end in a stop."""
     with SimulatedArm(isolation) as arm:
+        reads_units(arm)
         for service in ('init', 'position_mode'):
             assert arm.client.trigger(f'{JOINT}/{service}').success
         request = COTargetDouble.Request(target=3.0)
@@ -135,6 +172,7 @@ def test_halt_quick_stop_moves_and_streams(isolation: Isolation) -> None:
 
         arm.client.spin_until(send, 20.0, 'position 0.0')
         arm.master.wait_for('the stream of targets has paused')
+        stops_all(arm)
         stopped = arm.client.trigger(f'{JOINT}/quick_stop')
         assert stopped.success, stopped.message
         stream.publish(Float64(data=0.5))

@@ -81,7 +81,6 @@ class UnitsService:
         self, response: ReadUnits.Response, future: Future[FactorGroup]
     ) -> ReadUnits.Response:
         error = future.exception()
-        response.success = error is None
         if error is not None:
             response.message = str(error)
             return response
@@ -96,4 +95,5 @@ class UnitsService:
         config = drive.node.config
         response.device = config.name
         response.channel = drive.config.channel if len(config.axes) > 1 else -1
+        response.success = True  # last: an answer of which one part fails is sent, too
         return response
