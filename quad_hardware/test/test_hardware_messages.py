@@ -18,9 +18,10 @@ from nav_msgs.msg import Odometry
 import pytest
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu
+from tf2_msgs.msg import TFMessage
 
 from message_templates import MessageTemplate, SerializedTemplate
-from quad_description import ImuSample, JointSample, movable_joints, robot_urdf
+from quad_description import FEET, ImuSample, JointSample, movable_joints, robot_urdf
 from quad_description.rotations import (
     from_roll_pitch_yaw,
     IDENTITY,
@@ -36,16 +37,16 @@ from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_hardware.estimation.odometry import ContactSource
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
 from quad_hardware.link import DialectCounters, LinkState, LinkStatus
-from quad_hardware.nodes import messages
+from quad_hardware.nodes import messages, robot_topics
 from quad_hardware.nodes.diagnostics import (
     command_diagnostic,
     LinkDiagnostic,
     robot_diagnostic,
 )
-from quad_hardware.nodes.hardware_node import HardwareNode
 from quad_hardware.nodes.parameters import Deviations, Frames
 from quad_hardware.protocol import Fault, LEG_MOTORS, ParserCounters
 from quad_hardware.report import Report
+from quad_msgs.msg import FootContacts
 
 STAMP = Time(sec=1)
 FRAMES = Frames('odom', 'base_link', 'base_footprint', 'imu_link', False, True)
@@ -112,27 +113,32 @@ def odometry(state: OdometryState, frames: Frames) -> Odometry:
     return message
 
 
-def test_joints_are_stamped_when_they_were_measured() -> None:
+def test_joints_are_stamped_when_they_were_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """Protocol v1 asks for them 8 ms before the IMU; who differentiates must know."""
     urdf = robot_urdf('lite')
     joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
     angles = dict.fromkeys(LEG_MOTORS, 0.0)
     state = Report(5.0, 0.0, (0.0, 0.0, 0.0), None, angles, {}, joints_age=0.008)
-    stamps: dict[str, int] = {}
+    stamps: dict[str, float] = {}
 
-    def stream(name: str) -> Any:
-        return SimpleNamespace(publish=lambda _, stamp, __: stamps.update({name: stamp}))
+    def create_publisher(kind: Any, topic: str, _: int) -> Any:
+        def publish(data: bytes) -> None:
+            message = deserialize_message(data, kind)
+            header = message.transforms[0].header if kind is TFMessage else message.header
+            stamps[topic] = header.stamp.sec + header.stamp.nanosec * 1e-9
 
-    node: Any = object.__new__(HardwareNode)
+        return SimpleNamespace(publish=publish)
+
+    clock = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=100_000_000_000))
+    node: Any = SimpleNamespace(create_publisher=create_publisher, get_clock=lambda: clock)
     estimator = Estimator(urdf, joints, EstimatorSettings())
-    node._robot = SimpleNamespace(names=joints.names, update_odometry=estimator.update_odometry)
-    node._settings = SimpleNamespace(deviations=DEVIATIONS, frames=FRAMES)
-    node._joint_states, node._imu, node._odom = map(stream, ('joints', 'imu', 'odom'))
-    node._contacts = stream('contacts')
-    node._tf = stream('tf')
-    node._stamp = lambda monotonic: round(monotonic * 1e3)
-    node._publish(estimator.update(state))
-    assert stamps == {'joints': 4992, 'imu': 5000, 'odom': 5000, 'contacts': 5000, 'tf': 5000}
+    robot: Any = SimpleNamespace(names=joints.names, update_odometry=estimator.update_odometry)
+    monkeypatch.setattr(robot_topics, 'time', SimpleNamespace(monotonic=lambda: 5.5))
+    measured = estimator.update(state)
+    assert measured is not None
+    robot_topics.RobotTopics(node, robot, FRAMES, DEVIATIONS).publish(measured)
+    assert stamps.pop('joint_states') == pytest.approx(99.492)
+    assert stamps == dict.fromkeys(('imu', 'odom', 'foot_contacts', '/tf'), 99.5)
 
 
 def test_a_differentiated_rate_says_so_by_its_covariance() -> None:
@@ -195,6 +201,15 @@ def test_every_form_takes_its_numbers(
         deserialize_message(SerializedTemplate(template).fill(time, numbers), type(message))
         == message
     )
+
+
+@pytest.mark.parametrize('source', ContactSource)
+def test_each_source_of_contacts_is_one_of_the_message(source: ContactSource) -> None:
+    """By the name of its constant; those who subscribe compare with that."""
+    assert getattr(FootContacts, source.name) == source.value
+    odometry = replace(PLACE, contact_source=source)
+    message = messages.foot_contacts_template(odometry).message(STAMP, ())
+    assert (message.source, list(message.name)) == (source.value, list(FEET))
 
 
 def test_an_unknown_charge_is_nan() -> None:
