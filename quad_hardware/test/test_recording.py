@@ -171,6 +171,26 @@ def test_a_log_file_has_all_that_passed_and_replaces_none(tmp_path: Path) -> Non
         SerialLogFile(tmp_path / 'missing' / 'walk.log')
 
 
+def test_a_full_disk_ends_the_log_and_nothing_is_kept_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With a warning; what comes later takes no memory, and the program can end."""
+    with Path('/dev/full').open('w', encoding='utf-8') as full:
+        monkeypatch.setattr(Path, 'open', lambda *_, **__: full)
+        file = SerialLogFile(tmp_path / 'walk.log')
+        for number in range(100):
+            file.transfer(float(number), bytes(90), False)
+        file._thread.join(30.0)
+    assert not file._thread.is_alive()
+    (record,) = caplog.records
+    assert 'walk.log: No space left on device; the serial log ends here' in record.getMessage()
+    file.transfer(101.0, bytes(90), True)
+    file.event(StateEntered(102.0, LinkState.STALE, 'no report'))
+    assert file._lines.empty()
+    file.close()
+    assert file._lines.empty()
+
+
 def looks(
     watch: FaultWatch,
     *,

@@ -15,6 +15,7 @@ from ..exceptions import RecordingError
 from .serial_log import format_event, format_transfer, HEADER, Opened, StateEntered
 
 FLUSH_PERIOD = 0.5  # [s] of which a program that is killed loses at most
+CLOSE_TIMEOUT = 10.0  # [s] for what is still to be written when the program ends
 _log = logging.getLogger(__name__)
 
 
@@ -29,6 +30,7 @@ class SerialLogFile:
         """
         self._path = path
         self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self._ended = False  # nobody takes lines out of the queue any more
         # one offset for all: the log runs evenly also when somebody sets the clock
         self._offset = time.time() - time.monotonic()
         try:
@@ -43,23 +45,41 @@ class SerialLogFile:
 
     def transfer(self, now: float, data: bytes, sent: bool) -> None:
         """Take bytes that were read, or written."""
-        self._lines.put(format_transfer(now + self._offset, data, sent=sent))
+        if not self._ended:
+            self._lines.put(format_transfer(now + self._offset, data, sent=sent))
 
     def event(self, event: Opened | StateEntered) -> None:
         """Take a robot that was found, or a change of the link's state."""
-        self._lines.put(format_event(event, event.time + self._offset))
+        if not self._ended:
+            self._lines.put(format_event(event, event.time + self._offset))
 
     def close(self) -> None:
         """Write what is left, and close the file; never raises."""
-        self._lines.put(None)
-        self._thread.join()
+        if not self._ended:
+            self._lines.put(None)
+        self._thread.join(CLOSE_TIMEOUT)
+        if self._thread.is_alive():
+            _log.warning(
+                '%s: the disk did not take the end of the serial log within %g s',
+                self._path,
+                CLOSE_TIMEOUT,
+            )
 
     def _run(self) -> None:
         try:
             with self._file as file:
                 self._write(file)
         except OSError as error:
-            _log.warning('%s: %s; the serial log ends here', self._path, error.strerror)
+            _log.warning(
+                '%s: %s; the serial log ends here. Make room, or choose another disk by the '
+                'parameter serial_log',
+                self._path,
+                error.strerror,
+            )
+        finally:
+            self._ended = True
+            while not self._lines.empty():
+                self._lines.get()
 
     def _write(self, file: TextIO) -> None:
         while (line := self._lines.get()) is not None:
