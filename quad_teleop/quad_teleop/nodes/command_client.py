@@ -34,6 +34,8 @@ class CommandClient:
         service: str,
         show: Callable[[str], None],
         granted: Callable[[str], None] = lambda _: None,
+        *,
+        drops_repeats: bool = True,
     ) -> None:
         """Make the client.
 
@@ -43,11 +45,13 @@ class CommandClient:
             service: Its name.
             show: Receives the answers, and why there is none.
             granted: Receives what was requested, when it was granted.
+            drops_repeats: The same request is not sent again while a key repeats it.
         """
         self._client = node.create_client(service_type, service)
         self._name = node.resolve_service_name(service)
         self._show = show
         self._granted = granted
+        self._drops_repeats = drops_repeats
         self._question: _Question | None = None  # the last one
         self._future: Future | None = None
         self._is_waiting = False  # for the service to be found
@@ -61,12 +65,23 @@ class CommandClient:
             now: Time [s].
         """
         last = self._question
-        if last is not None and last.what == what and now - last.requested_at < KEY_REPEAT_TIME:
+        if (
+            self._drops_repeats
+            and last is not None
+            and last.what == what
+            and now - last.requested_at < KEY_REPEAT_TIME
+        ):
             return
+        self.cancel()
         self._question = _Question(what, request, now)
-        self._forget()
         self._is_waiting = True
         self.check(now)
+
+    def cancel(self) -> None:
+        """Drop a question that is still open: it is not sent any more, or its answer ignored."""
+        self._question = None
+        self._is_waiting = False
+        self._forget()
 
     def check(self, now: float) -> None:
         """Send what waits for the service; give up what is overdue.

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -15,7 +16,7 @@ from quad_msgs.srv import SetMode
 
 from ..controller_report import ControllerReport, read_report
 from ..modes import Mode
-from .command_client import CommandClient
+from .command_client import CommandClient, KEY_REPEAT_TIME
 
 
 class Controller:
@@ -34,9 +35,13 @@ class Controller:
         """
         self.mode: Mode | None = None
         self._report: ControllerReport | None = None
-        self._modes = CommandClient(node, SetMode, 'set_mode', show, self._granted)
-        self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', show)
-        self._stops = CommandClient(node, Trigger, 'stop', show, self._stopped)
+        self._show = show
+        self._shown, self._shown_at = '', -math.inf
+        self._modes = CommandClient(node, SetMode, 'set_mode', self._show_once, self._granted)
+        self._faults = CommandClient(node, Trigger, 'controller_node/clear_fault', self._show_once)
+        self._stops = CommandClient(
+            node, Trigger, 'stop', self._show_once, self._stopped, drops_repeats=False
+        )
         node.create_subscription(DiagnosticArray, 'diagnostics', self._take, 10)
 
     def ask_mode(self, mode: Mode, now: float) -> None:
@@ -57,11 +62,12 @@ class Controller:
         self._faults.request('clear fault', Trigger.Request(), now)
 
     def stop(self, now: float) -> None:
-        """Stop the whole robot.
+        """Stop the whole robot, each time; a mode that was requested before is not any more.
 
         Args:
             now: Time [s].
         """
+        self._modes.cancel()
         self._stops.request('stop', Trigger.Request(), now)
 
     def report(self, now: float) -> ControllerReport | None:
@@ -82,6 +88,13 @@ class Controller:
         self._modes.check(now)
         self._faults.check(now)
         self._stops.check(now)
+
+    def _show_once(self, text: str) -> None:
+        """Show an answer, but not again for each repetition of a key that is held."""
+        now = time.monotonic()
+        if text != self._shown or now - self._shown_at >= KEY_REPEAT_TIME:
+            self._show(text)
+        self._shown, self._shown_at = text, now
 
     def _stopped(self, _: str) -> None:
         self.mode = None  # the controller knows
