@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from statistics import median
@@ -14,7 +14,8 @@ import pytest
 
 from quad_description import movable_joints, robot_urdf, RobotState
 from quad_hardware.backend import recorded_in
-from quad_hardware.estimation import EstimatorSettings, ImuMounting
+from quad_hardware.estimation import EstimatorSettings, ImuMounting, OdometryState
+from quad_hardware.estimation.odometry import ContactSource
 from quad_hardware.exceptions import RecordingError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions, LinkState
@@ -41,16 +42,52 @@ def settings_at(port: Path, log: Path) -> RobotSettings:
     )
 
 
-def session(peer: PtyPeer, log: Path) -> list[RobotState]:
-    """Have a robot swing its legs in turn, while its body turns; return its states."""
+def located(state: RobotState, odometry: OdometryState | None) -> RobotState:
+    """Return a state with what the odometry has found."""
+    assert odometry is not None
+    return replace(
+        state,
+        position=(odometry.x, odometry.y, odometry.height),
+        foot_contacts=odometry.standing,
+    )
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What was published of a robot, live or replayed.
+
+    Attributes:
+        states: All states.
+        sources: How the contacts of each are known.
+        commands: How many commands were sent.
+    """
+
+    states: list[RobotState]
+    sources: list[ContactSource]
+    commands: int
+
+    def contact_ratios(self) -> list[float]:
+        """Return the ratio of the states in which each foot stands."""
+        contacts = [state.foot_contacts for state in self.states if state.foot_contacts]
+        return [sum(foot) / len(contacts) for foot in zip(*contacts, strict=True)]
+
+    def ratio_of(self, source: ContactSource) -> float:
+        """Return the ratio of the states whose contacts are known so."""
+        return self.sources.count(source) / len(self.sources)
+
+
+def session(peer: PtyPeer, log: Path) -> Seen:
+    """Have a robot swing its legs in turn, while its body turns."""
     states: list[RobotState] = []
+    sources: list[ContactSource] = []
     arrived = threading.Condition()
 
     def take(state: RobotState) -> None:
-        located = robot.update_odometry(state)
-        assert located is not None
+        odometry = robot.update_odometry(state)
+        assert odometry is not None
         with arrived:
-            states.append(replace(state, position=(located.x, located.y, located.height)))
+            sources.append(odometry.contact_source)
+            states.append(located(state, odometry))
             arrived.notify_all()
 
     robot = SerialRobot(
@@ -73,7 +110,7 @@ def session(peer: PtyPeer, log: Path) -> list[RobotState]:
             robot.command(targets)
     finally:
         robot.end(lambda loss: None)
-    return states
+    return Seen(states, sources, robot.status().commands)
 
 
 def comparable(state: RobotState) -> tuple[object, ...]:
@@ -83,20 +120,29 @@ def comparable(state: RobotState) -> tuple[object, ...]:
     return (state.joints.positions, state.imu.orientation, state.imu.acceleration, state.battery)
 
 
+@pytest.fixture(scope='module', params=[V2, V1], ids=lambda protocol: protocol.name)
+def recorded(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Protocol, Path, Seen]:
+    """Return the log of a session in a protocol, and what was seen live."""
+    folder = tmp_path_factory.mktemp('session')
+    with PtyPeer(folder / 'port', request.param) as peer:
+        return request.param, folder / 'serial.log', session(peer, folder / 'serial.log')
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize('protocol', [V2, V1], ids=lambda protocol: protocol.name)
-def test_the_states_of_a_log_are_those_of_the_robot(tmp_path: Path, protocol: Protocol) -> None:
+def test_the_states_of_a_log_are_those_of_the_robot(
+    recorded: tuple[Protocol, Path, Seen],
+) -> None:
     """Measured values are the same; what needs times is as near as the times are."""
-    log = tmp_path / 'serial.log'
-    with PtyPeer(tmp_path / 'port', protocol) as peer:
-        live = session(peer, log)
+    _, log, live = recorded
     with recorded_in(log, URDF, imu_checked=True) as backend:
         replayed = [backend.reset()]
         while not backend.finished:
             replayed.append(backend.step(None))
         assert backend.names == tuple(joint.name for joint in movable_joints(URDF))
     by_measured = {comparable(state): state for state in reversed(replayed)}
-    first_live = {comparable(state): state for state in reversed(live)}
+    first_live = {comparable(state): state for state in reversed(live.states)}
     assert len(first_live) > 20
     assert first_live.keys() <= by_measured.keys()
     pairs = [(state, by_measured[measured]) for measured, state in first_live.items()]
@@ -109,38 +155,59 @@ def test_the_states_of_a_log_are_those_of_the_robot(tmp_path: Path, protocol: Pr
     assert replayed[-1].position != replayed[0].position
 
 
-def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkState], int]:
-    """Replay a log; return the robot, the states of its link, and how many reports came."""
-    reports: list[RobotState] = []
+def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkState], Seen]:
+    """Replay a log; return the robot, the states of its link, and what was published."""
+    seen = Seen([], [], 0)
     changes: list[LinkState] = []
+
+    def take(state: RobotState) -> None:
+        odometry = robot.update_odometry(state)
+        assert odometry is not None
+        seen.sources.append(odometry.contact_source)
+        seen.states.append(located(state, odometry))
+
     robot = ReplayedRobot(
         replace(settings_at(path, path), serial_log=None),
-        on_state=reports.append,
+        on_state=take,
         on_change=lambda state, _: changes.append(state),
         on_refusal=lambda reason: None,
     )
     for entry in read_serial_log(path):
         robot.take(entry, entry.time)
     robot.advance(entry.time + pause)
-    return robot, changes, len(reports)
+    return robot, changes, replace(seen, commands=robot.status().commands)
 
 
 @pytest.mark.slow
-def test_status_is_that_of_the_link_and_a_second_turn_begins_anew(tmp_path: Path) -> None:
+def test_commands_and_the_feet_that_they_let_stand_are_those_of_the_robot(
+    recorded: tuple[Protocol, Path, Seen],
+) -> None:
+    """Each command of the log counts, and the contacts are known by them as they were live."""
+    _, log, live = recorded
+    _, _, replayed = fed(log)
+    assert replayed.commands == live.commands
+    assert live.commands >= 40
+    for source in ContactSource:
+        assert replayed.ratio_of(source) == pytest.approx(live.ratio_of(source), abs=0.1)
+    assert live.ratio_of(ContactSource.COMMANDED_HEIGHT) > 0.3
+    assert replayed.contact_ratios() == pytest.approx(live.contact_ratios(), abs=0.1)
+    assert max(live.contact_ratios()) < 1.0
+
+
+@pytest.mark.slow
+def test_status_is_that_of_the_link_and_a_second_turn_begins_anew(
+    recorded: tuple[Protocol, Path, Seen],
+) -> None:
     """Protocol, firmware, counters, age; after the last entry the reports become old."""
-    log = tmp_path / 'serial.log'
-    with PtyPeer(tmp_path / 'port') as peer:
-        session(peer, log)
-        sent = len(peer.commands)
-    robot, changes, reports = fed(log, pause=2.0)
+    protocol, log, live = recorded
+    robot, changes, replayed = fed(log, pause=2.0)
     status = robot.status()
     assert changes[0] is LinkState.WAITING
     assert LinkState.RUNNING in changes
     assert changes[-1] is LinkState.STOPPED
-    assert (status.protocol, status.firmware, status.baud) == ('v2', 'L-2.0.0', V2.baud)
-    assert reports > 50
-    assert sent > 20
-    assert status.commands >= sent
+    assert (status.protocol, status.firmware) == (protocol.name, 'L-2.0.0')
+    assert status.baud == protocol.baud
+    assert len(replayed.states) >= len(live.states) >= 50
     assert status.parser.damaged == status.parser.skipped == 0
     assert status.age >= 2.0
     robot.restart()
