@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 import math
 from pathlib import Path
 import struct
@@ -18,7 +17,7 @@ from arm_canopen.library.bus_replay import BusReplay, unknown_scales
 from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.standard.drive import DriveState
 from arm_canopen.standard.nmt import NmtState
-from black_box import LogPlayer, PlaybackError
+from black_box import LogPlayer
 
 PERIOD = 0.01  # [s] of SYNC
 ENABLED, FAULT = 0x1237, 0x1218  # statuswords
@@ -249,40 +248,18 @@ def test_axes_with_the_scales_of_their_drive_are_named(tmp_path: Path) -> None:
     assert unknown_scales(load_text(tmp_path, scaled)) == ['joint1']
 
 
-def player(
-    bus: BusReplay, log: Log, *, rate: float = 100.0, start: float = 0.0
-) -> LogPlayer[Frame]:
-    """Return a player of the frames of a log."""
-
-    def read() -> Iterator[tuple[float, Frame]]:
-        for frame in sorted(log.frames, key=lambda frame: frame.timestamp):
-            yield frame.timestamp, frame
-
-    return LogPlayer(bus, read, rate=rate, start=start)
-
-
-def test_a_log_is_played_in_time_and_its_beginning_is_skipped(watched: Watched) -> None:
-    """What is before the start is taken at once; the rest needs the time that the rate makes."""
-    log = Log()
-    log.cycles(1000, position=200)
-    playing = player(watched.bus, log, start=4.0)
-    sought: list[bool] = []
-    watched.bus.network.on_feedback = lambda sync_time: sought.append(playing.seeking)
-    ticks: list[float] = []
-    playing.on_tick = lambda: ticks.append(watched.bus.now)
-    playing.play(threading.Event(), loop=False)
-    assert sum(sought) == pytest.approx(400, abs=3)
-    assert sum(not each for each in sought) == pytest.approx(600, abs=3)
-    assert ticks[0] >= 3.9
-    assert playing.steady(9.99) - playing.steady(4.0) == pytest.approx(0.0599)
-
-
 def test_a_log_that_is_repeated_goes_on_in_time(watched: Watched) -> None:
     """Each turn begins with unknown drives; nothing is missed between two turns."""
     log = Log()
     log.cycles(100, position=300)
     stop = threading.Event()
-    playing = player(watched.bus, log)
+    frames = sorted(log.frames, key=lambda frame: frame.timestamp)
+    playing = LogPlayer(
+        watched.bus,
+        lambda: ((frame.timestamp, frame) for frame in frames),
+        rate=100.0,
+        start=0.0,
+    )
     operational: list[Event] = []
 
     def note(sync_time: float) -> None:
@@ -294,14 +271,3 @@ def test_a_log_that_is_repeated_goes_on_in_time(watched: Watched) -> None:
     playing.play(stop, loop=True)
     assert len(operational) == 3
     assert watched.texts(Severity.ERROR) == []
-
-
-@pytest.mark.parametrize(('cycles', 'start', 'reason'), [(0, 0.0, 'is empty'), (10, 9.0, '0.1 s')])
-def test_a_log_with_nothing_to_play_is_refused(
-    watched: Watched, cycles: int, start: float, reason: str
-) -> None:
-    """An empty file, or a start behind its end."""
-    log = Log()
-    log.cycles(cycles)
-    with pytest.raises(PlaybackError, match=reason):
-        player(watched.bus, log, start=start).play(threading.Event(), loop=False)

@@ -35,7 +35,7 @@ class Replay(Protocol[Entry_contra]):
 
 
 class LogPlayer(Generic[Entry]):
-    """Plays a log, once or for ever.
+    """Plays a log, once or again and again.
 
     Attributes:
         seeking: What comes is before the place at which it is to begin.
@@ -85,7 +85,7 @@ class LogPlayer(Generic[Entry]):
         shift = 0.0  # of the times of the log, so that they go on in the next turn
         while not stop.is_set():
             last = self._play_once(stop, shift)
-            if not loop:
+            if not loop or stop.is_set():
                 return
             shift = last + GAP
             self._replay.restart()
