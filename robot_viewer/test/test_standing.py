@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 import math
+import sys
+from types import SimpleNamespace
+from typing import Any
 
 from geometry_msgs.msg import Pose, Quaternion
 from hypothesis import given
@@ -17,11 +20,12 @@ from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
 from test_web_viewer import LATCHED, TIMEOUT
-from urdf_reader import from_rpy, read_urdf
+from urdf_reader import from_rpy, read_urdf, Vector
 
 from node_runner import make_executor
 from quad_msgs.msg import FootContacts
 from robot_viewer.link_poses import link_poses
+from robot_viewer.nodes.body import Body
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.body_panel import BodyPanel, DOWN_COLOR
 from robot_viewer.page.robot_page import RobotPage
@@ -32,6 +36,7 @@ from robot_viewer.page.standing import (
     feet_of,
     horizon_html,
     roll_pitch,
+    SOURCES,
     support,
 )
 
@@ -46,6 +51,8 @@ URDF = f"""<robot name="dog"><link name="body"/>{
     )
 }</robot>"""
 TREE = read_urdf(URDF)
+SOURCE_CONSTANTS = [name for name, value in vars(FootContacts).items() if isinstance(value, str)]
+SOURCE_CONSTANTS = [name for name in SOURCE_CONSTANTS if name.isupper()]
 
 
 @given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0))
@@ -93,14 +100,29 @@ def test_the_centre_of_mass_moves_with_the_links() -> None:
 
 
 def test_contacts_say_how_they_are_known() -> None:
-    """And whether the robot would stand still."""
-    stands = Contacts(frozenset({'fl_foot', 'br_foot'}), 'commanded_height')
-    assert 'feet on the ground: br, fl<' in stands.html(None)
-    assert 'nothing senses it' in stands.html(None)
-    assert 'no support polygon' in stands.html(None)
-    assert '12 mm outside the support' in stands.html(-0.012)
-    assert 'the simulation knows' in Contacts(frozenset(), 'physics').html(0.01)
-    assert 'on the ground: none<' in Contacts(frozenset(), '').html(None)
+    """And whether the robot would stand still, or why nobody knows."""
+    places = {foot: link_poses(TREE, {})[foot].translation for foot in feet_of(TREE)}
+    two = {'fl_foot', 'rr_foot'}
+
+    def text(feet: Collection[str], centre: Vector | None, source: str = 'physics') -> str:
+        return Contacts(frozenset(feet), source).html(support(places, feet, LEVEL, centre))
+
+    stands = text(two, (0.0, 0.0, 0.0), 'commanded_height')
+    assert 'feet on the ground: fl, rr<' in stands
+    assert 'nothing senses it' in stands
+    assert 'no support polygon' in stands
+    assert '12 mm outside the support' in text(places, (0.112, 0.0, 0.0))
+    assert 'the simulation knows' in text(places, (0.0, 0.0, 0.0))
+    assert 'centre of mass unknown' in text(places, None)
+    assert 'no support polygon' in text(two, None)
+    assert 'on the ground: none<' in text((), None, '')
+
+
+@pytest.mark.parametrize('name', SOURCE_CONSTANTS)
+def test_each_source_of_contacts_has_words(name: str) -> None:
+    """Those of the message are those of the page."""
+    assert getattr(FootContacts, name) in SOURCES
+    assert len(SOURCES) == len(SOURCE_CONSTANTS)
 
 
 def test_a_robot_without_feet_has_none() -> None:
@@ -117,6 +139,61 @@ def test_what_is_not_measured_is_not_shown() -> None:
     shown = horizon_html(from_rpy(0.1, -0.2, 1.0), '')
     assert 'roll +5.7°, pitch -11.5°' in shown
     assert 'rotate(-5.7) translate(0 11.5)' in shown
+
+
+class Watched:
+    """A body whose robot publishes contacts of feet, without ROS.
+
+    Attributes:
+        warnings: What it warned of.
+        topics: What it listens to.
+    """
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+        self.topics: list[str] = []
+        publisher = SimpleNamespace(topic_type='quad_msgs/msg/FootContacts')
+        node: Any = SimpleNamespace(
+            get_logger=lambda: SimpleNamespace(warning=self.warnings.append),
+            count_publishers=lambda topic: 0,
+            count_subscribers=lambda topic: 0,
+            get_publishers_info_by_topic=lambda topic: [publisher],
+        )
+        listening: Any = SimpleNamespace(add=lambda kind, topic, *_: self.topics.append(topic))
+        page: Any = SimpleNamespace(offer_body=lambda: None)
+        self.body = Body(node, page, listening, {})
+
+
+def test_a_machine_without_the_messages_shows_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The robot may be elsewhere; it is said once what is missing."""
+    monkeypatch.setitem(sys.modules, 'quad_msgs.msg', None)
+    without, watched = Watched(), Watched()
+    for _ in range(2):
+        without.body.describe(TREE)
+        without.body.look()
+    (warning,) = without.warnings
+    assert 'install quad_msgs' in warning
+    assert without.topics == []
+    monkeypatch.undo()
+    watched.body.describe(TREE)
+    watched.body.look()
+    assert watched.topics == ['foot_contacts']
+
+
+def test_another_robot_has_nothing_of_the_one_before() -> None:
+    """Contacts are gone; a damaged foot costs its radius, and not the centre of mass."""
+    watched = Watched()
+    watched.body.describe(TREE)
+    watched.body._take_contacts(FootContacts(name=['fl_foot'], contact=[True], source='physics'))
+    assert watched.body._contacts is not None
+    sphere = '<collision><geometry><sphere radius="big"/></geometry></collision>'
+    mass = '<inertial><mass value="1"/></inertial>'
+    text = URDF.replace('<link name="fl_foot"/>', f'<link name="fl_foot">{mass}{sphere}</link>')
+    watched.body.describe(read_urdf(text))
+    assert watched.body._contacts is None
+    (warning,) = watched.warnings
+    assert 'feet’s centres' in warning
+    assert len(watched.body._masses) == 1
 
 
 @pytest.fixture

@@ -27,6 +27,7 @@ from ..page.standing import (
     feet_of,
     foot_radius,
     horizon_html,
+    Support,
     support,
 )
 from .listening import Listening
@@ -71,7 +72,7 @@ class Body:
         self._radius = 0.0
         self._contacts: Contacts | None = None
         self._contacts_at = 0.0
-        self._margin: float | None = None
+        self._support: Support | None = None
         self._found: set[str] = set()
         self._poses: Publisher | None = None
 
@@ -79,12 +80,17 @@ class Body:
         """Take another robot; the page has taken the panel away."""
         self._tree, self._feet, self._panel = tree, feet_of(tree), None
         self._masses, self._radius = (), 0.0
-        if self._feet:
-            try:
-                self._masses = tuple(tree.masses())
-                self._radius = foot_radius(tree, self._feet[0])
-            except DescriptionError as error:
-                self._node.get_logger().warning(f'no centre of mass is shown: {error}')
+        self._contacts = self._support = None
+        if not self._feet:
+            return
+        try:
+            self._masses = tuple(tree.masses())
+        except DescriptionError as error:
+            self._node.get_logger().warning(f'no centre of mass is shown: {error}')
+        try:
+            self._radius = foot_radius(tree, self._feet[0])
+        except DescriptionError as error:
+            self._node.get_logger().warning(f'the ground is shown at the feet’s centres: {error}')
 
     def look(self) -> None:
         """Find the topics of a walking robot in the namespace of the node."""
@@ -101,8 +107,7 @@ class Body:
             end.topic_type for end in self._node.get_publishers_info_by_topic(CONTACTS)
         ):
             self._found.add(CONTACTS)
-            kind = import_module('quad_msgs.msg').FootContacts
-            self._listening.add(kind, CONTACTS, self._take_contacts, qos_profile_sensor_data)
+            self._listen_to_contacts()
         if self._poses is None and self._node.count_subscribers('body_pose'):
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)
@@ -111,6 +116,16 @@ class Body:
             self._panel = self._page.offer_body()
         if self._panel is not None and self._poses is not None:
             self._panel.offer_pose(self.send)
+
+    def _listen_to_contacts(self) -> None:
+        try:
+            kind = import_module('quad_msgs.msg').FootContacts
+        except ModuleNotFoundError:  # the robot may be on another machine
+            self._node.get_logger().warning(
+                f'{CONTACTS} is not shown: {CONTACTS_TYPE} is missing here; install quad_msgs'
+            )
+            return
+        self._listening.add(kind, CONTACTS, self._take_contacts, qos_profile_sensor_data)
 
     def send(self, pose: Pose) -> None:
         """Publish a pose of the body once, at once; the controller moves there slowly."""
@@ -128,21 +143,22 @@ class Body:
             self._contacts = None
         poses = link_poses(self._tree, self._positions)
         places = {foot: poses[foot].translation for foot in self._feet}
-        found = support(
+        found = self._support = support(
             places,
             () if self._contacts is None else self._contacts.feet,
             self._attitude or LEVEL,
             centre_of_mass(self._masses, poses),
             self._radius,
         )
-        self._margin = found.margin
         self._panel.show_feet(places, self._contacts)
         self._panel.show_support(found)
 
     def list(self) -> None:
         """Show attitude and battery."""
         if self._panel is not None:
-            feet = '' if self._contacts is None else self._contacts.html(self._margin)
+            feet = ''
+            if self._contacts is not None and self._support is not None:
+                feet = self._contacts.html(self._support)
             self._panel.show(horizon_html(self._attitude, self._battery) + feet)
 
     def _take_imu(self, message: Imu) -> None:

@@ -256,7 +256,15 @@ class WebViewer(Node):
     def _find_walking(self, services: Mapping[str, Sequence[str]]) -> None:
         name = self.resolve_service_name('set_mode')
         if self._set_mode is None and SET_MODE_TYPE in services.get(name, ()):
-            kind = import_module('quad_msgs.srv').SetMode
+            try:
+                kind = import_module('quad_msgs.srv').SetMode
+            except ModuleNotFoundError:  # the robot may be on another machine
+                self.get_logger().warning(
+                    f'the page offers no walking: {SET_MODE_TYPE} is missing here; install '
+                    'quad_msgs',
+                    once=True,
+                )
+                return
             self._set_mode = self.create_client(kind, 'set_mode')
             self._walks = self.create_publisher(TwistMessage, 'cmd_vel', QoSProfile(depth=1))
             self.page.offer_walk(WALKING_MODES)

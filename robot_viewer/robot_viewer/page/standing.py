@@ -34,16 +34,20 @@ class Contacts:
     feet: frozenset[str]
     source: str
 
-    def html(self, margin: float | None) -> str:
+    def html(self, found: Support) -> str:
         """Return it in words.
 
         Args:
-            margin: Of static stability in [m]; None where no three feet stand.
+            found: What these feet span.
         """
         names = ', '.join(sorted(foot.removesuffix(FOOT) for foot in self.feet)) or 'none'
         source = SOURCES.get(self.source, self.source or 'nobody says how that is known')
-        stable = 'no support polygon'  # on fewer than three feet; the line stays in its place
-        if margin is not None:
+        margin = found.margin
+        if margin is None:  # the line stays in its place
+            stable = 'centre of mass unknown: the description has no masses'
+            if len(found.corners) < LEAST_FEET:
+                stable = 'no support polygon'
+        else:
             inside = 'inside' if margin >= 0.0 else 'outside'
             stable = f'centre of mass {abs(margin) * 1e3:.0f} mm {inside} the support'
         return (
