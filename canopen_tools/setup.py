@@ -44,7 +44,6 @@ setup(
         ('share/canopen_tools', ['package.xml']),
     ],
     install_requires=[
-        'PyYAML>=6',
         sibling('arm_canopen'),
         sibling('libraries/first_motion'),
     ],
