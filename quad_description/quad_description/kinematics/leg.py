@@ -19,8 +19,9 @@ from ..urdf import Description, Joint, JointKind, JointLimits
 from .tree import BASE, link_poses
 
 LEGS: Final = ('fl', 'fr', 'bl', 'br')
-FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)  # their links
 """Front left, front right, back left, back right: the order of the legs everywhere."""
+FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
+"""Links of the feet, in the order of the legs."""
 
 AXIS_TOLERANCE = 1e-6
 _TURNING = (JointKind.REVOLUTE, JointKind.CONTINUOUS)

@@ -88,7 +88,7 @@ class OdometryState:
         velocity_x: Forward, in base_link turned level [m/s].
         velocity_y: To the left, in base_link turned level [m/s].
         distance: Way so far [m].
-        standing: Feet that are taken to stand, in URDF order.
+        standing: Feet that are taken to stand, in the order of :data:`quad_description.FEET`.
         contact_source: How that is known.
     """
 
