@@ -193,6 +193,7 @@ class PtyPeer:
             battery_voltage=7.4,
             position=tuple(self.angles[motor] for motor in MOTOR_ORDER),
             sequence=self._sequence % 65536,
+            device_time=round(time.monotonic() * 1e3) % 2**32,
         )
 
     def _send(self, frame: Frame) -> None:
