@@ -140,7 +140,7 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         RunningProcess([*command, '--enable'], isolation.env | {'NO_VIEW': ''}) as bringup,
         chromium.browser() as browser,
     ):
-        url = bringup.wait_for(r'seen at http://localhost:\d+$', STARTING).rpartition(' ')[2]
+        url = chromium.url_of(bringup, STARTING)
         bringup.wait_for('are enabled', STARTING)
         joint = Joint(runner)
 
@@ -184,3 +184,21 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
         page.mouse.up()
         joint.wait_for_rest()
+
+        # held beyond the end: neither that page nor this one moves the joint by what is pressed
+        # for the motion before
+        prepare(page, '-2')
+        joint.move(page)
+        page.get_by_text('What did the real joint do?').wait_for()
+        joint.wait_for_rest()
+        stood = joint.angle
+        other = chromium.open_page(browser, url)
+        prepare(other, '2')
+        joint.wait_for_rest()
+        page.mouse.up()
+        prepare(page, '2')
+        page.get_by_text('at rest').wait_for()
+        joint.wait_for_rest()
+        assert joint.angle == stood
+        joint.move(page)
+        page.mouse.up()

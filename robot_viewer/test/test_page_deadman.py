@@ -13,16 +13,16 @@ from robot_viewer.page.deadman import Deadman, HEARTBEAT, RELEASED_AFTER
 def test_a_held_button_counts_from_the_first_heartbeat_on() -> None:
     """Each one, as the browser's timer makes them."""
     deadman = Deadman()
-    assert all(deadman.beat(1, 10.0 + number * HEARTBEAT) for number in range(50))
+    assert all(deadman.beat(1, 'hold', 10.0 + number * HEARTBEAT) for number in range(50))
 
 
 @given(st.integers(2, 200), st.floats(0.0, 60.0))
 def test_what_was_held_up_counts_once(count: int, delay: float) -> None:
     """A slow connection delivers it at once, when the button may be up already."""
     deadman = Deadman()
-    assert deadman.beat(1, 10.0)
+    assert deadman.beat(1, 'hold', 10.0)
     arrivals = [10.0 + HEARTBEAT + delay + number * 1e-4 for number in range(count)]
-    assert sum(deadman.beat(1, arrival) for arrival in arrivals) == 1
+    assert sum(deadman.beat(1, 'hold', arrival) for arrival in arrivals) == 1
 
 
 @given(st.lists(st.tuples(st.sampled_from([1, 2, 3]), st.floats(0.0, 1.0)), max_size=60))
@@ -31,7 +31,7 @@ def test_one_page_at_a_time(beats: list[tuple[int, float]]) -> None:
     deadman, now, holder, last = Deadman(), 10.0, 0, -1.0
     for page, gap in beats:
         now += gap
-        if deadman.beat(page, now):
+        if deadman.beat(page, 'hold', now):
             assert page == holder or now - last >= RELEASED_AFTER
             holder, last = page, now
 
@@ -47,22 +47,31 @@ def test_after_a_stop_a_button_has_to_be_pressed_anew(
     deadman, now = Deadman(), 10.0
     for _ in range(before):
         now += HEARTBEAT
-        deadman.beat(1, now)
-        deadman.beat(2, now)
+        deadman.beat(1, 'hold', now)
+        deadman.beat(2, 'hold', now)
     deadman.stop()
     for page, gap in beats:
         now += gap
-        assert not deadman.beat(page, now)
-    assert deadman.release(1, now)
-    assert not deadman.release(2, now)
-    assert deadman.beat(1, now + RELEASED_AFTER)
+        assert not deadman.beat(page, 'hold', now)
+    assert deadman.release(1, 'hold', now)
+    assert not deadman.release(2, 'hold', now)
+    assert deadman.beat(1, 'hold', now + RELEASED_AFTER)
 
 
 def test_a_button_that_nobody_held_counts_after_a_stop_at_once() -> None:
     """It was let go before; what is late of it does not count."""
     deadman = Deadman()
-    assert deadman.beat(1, 10.0)
-    deadman.release(1, 10.1)
-    assert not deadman.beat(1, 10.1 + 0.1 * HEARTBEAT)
+    assert deadman.beat(1, 'hold', 10.0)
+    deadman.release(1, 'hold', 10.1)
+    assert not deadman.beat(1, 'hold', 10.1 + 0.1 * HEARTBEAT)
     deadman.stop()
-    assert deadman.beat(1, 11.0)
+    assert deadman.beat(1, 'hold', 11.0)
+
+
+def test_a_button_that_was_taken_off_the_page_bars_no_other() -> None:
+    """Its page cannot let it go any more; the one that came in its place was never held."""
+    deadman = Deadman()
+    assert deadman.beat(1, 'hold', 10.0)
+    deadman.stop()
+    assert not deadman.beat(1, 'hold', 11.0)
+    assert deadman.beat(1, 'its successor', 11.0)

@@ -43,7 +43,7 @@ BUS = 'nodes:\n  shoulder:\n    node_id: 2  # mine\n    scale_pos_to_dev: 1000.0
 def test_a_target_for_a_heartbeat_and_none_without(beats: list[bool], *, sign: int) -> None:
     """Whatever the button does: slow steps in one direction, and never beyond the target."""
     plan = MotionPlan(0.5, sign * 0.1, 0.05, 1e-4)
-    motion, now, position = GuardedTargets(plan, 10.0), 10.0, 0.5
+    motion, now, position = let_go(plan), 10.0, 0.5
     for beats_now in beats:
         now += HEARTBEAT
         if beats_now:
@@ -57,9 +57,35 @@ def test_a_target_for_a_heartbeat_and_none_without(beats: list[bool], *, sign: i
         position = target
 
 
+def let_go(plan: MotionPlan) -> GuardedTargets:
+    """Prepare a motion, and look while nobody holds the button; ends at 10.0."""
+    motion = GuardedTargets(plan, 9.0)
+    for number in range(1, 11):
+        assert motion.step(9.0 + 0.1 * number, Sample(plan.start)) is None
+    return motion
+
+
+@given(delays=st.lists(st.floats(0.0, RELEASED_AFTER - 0.01), min_size=1, max_size=99))
+def test_a_button_that_was_held_before_moves_nothing(delays: list[float]) -> None:
+    """It was pressed for another motion, perhaps on another page; let go it counts."""
+    motion, now = GuardedTargets(PLAN, 10.0), 10.0
+    for delay in delays:
+        now += delay
+        motion.beat(now)
+        assert motion.step(now, Sample(0.5)) is None
+        assert not motion.guard.moving
+        assert motion.press_anew or now == 10.0
+    now += RELEASED_AFTER
+    assert motion.step(now, Sample(0.5)) is None
+    motion.beat(now + 0.01)
+    assert motion.step(now + 0.02, Sample(0.5)) is None
+    assert motion.guard.moving
+    assert not motion.press_anew
+
+
 def test_a_touch_moves_nothing_and_a_late_heartbeat_no_farther() -> None:
     """And whoever lets go, or whose heartbeats stay away, commands nothing any more."""
-    motion = GuardedTargets(PLAN, 10.0)
+    motion = let_go(PLAN)
     motion.beat(10.02)
     assert motion.step(10.03, Sample(0.5)) is None
     motion.beat(10.06)

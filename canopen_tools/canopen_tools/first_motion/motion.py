@@ -282,7 +282,7 @@ class _GuardedMotion:
         guard = self._guard
         state = ('moving', Style.GREEN) if guard.moving else ('at rest', Style.YELLOW)
         if guard.needs_release:
-            state = ('release the key: the program was held up', Style.RED)
+            state = ('release the key, and press it anew', Style.RED)
         way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(guard.plan.distance))}'
         return status_text([state, (way, Style.PLAIN)], colour=self._colour)
 

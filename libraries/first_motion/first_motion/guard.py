@@ -3,8 +3,9 @@
 """When a joint may move, and what ends its motion: a state machine without clock and bus.
 
 Positions are in the unit of the joint in bus.yml ([rad] or [m]), times on one steady clock in [s].
-The joint moves only while the person holds a key. A loop that was held up for longer than
-:data:`LOOP_GAP` counts as a release: who was not asked has not agreed.
+The joint moves only while the person holds a key, which he has pressed after the motion was
+prepared. A loop that was held up for longer than :data:`LOOP_GAP` counts as a release: who was not
+asked has not agreed.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ class MotionGuard:
         self.detail = ''
         self.travelled = 0.0
         self._moving = self._has_begun = False
-        self.needs_release = False
+        self.needs_release = True  # a key that is held already was pressed for something else
         self._last = now
         self._idle_since = now
         self._progress = (now, 0.0)

@@ -91,9 +91,20 @@ def test_the_joint_moves_only_while_the_key_is_held(
 def test_a_held_up_loop_is_a_release() -> None:
     """The key has to be pressed anew: nobody was asked meanwhile."""
     joint = Joint(PLAN)
+    assert joint.step(held=False) is Order.NONE
     assert joint.step(held=True) is Order.GO
     assert joint.step(held=True, gap=LOOP_GAP * 1.1, factor=0.1) is Order.HALT
     assert joint.step(held=True) is Order.NONE
+    assert joint.step(held=False) is Order.NONE
+    assert joint.step(held=True) is Order.GO
+
+
+def test_a_key_that_was_held_before_does_not_count() -> None:
+    """It was pressed for something else; what is pressed after it was up counts."""
+    joint = Joint(PLAN)
+    for _ in range(20):
+        assert joint.step(held=True) is Order.NONE
+        assert joint.guard.needs_release
     assert joint.step(held=False) is Order.NONE
     assert joint.step(held=True) is Order.GO
 
@@ -102,6 +113,7 @@ def test_a_busy_drive_is_halted_but_not_ordered_to_go() -> None:
     """A halt may not wait for anything."""
     guard = MotionGuard(PLAN, 0.0)
     sample = Sample(PLAN.start)
+    assert guard.step(0.05, sample, held=False, busy=False) is Order.NONE
     assert guard.step(0.1, sample, held=True, busy=True) is Order.NONE
     assert guard.step(0.2, sample, held=True, busy=False) is Order.GO
     assert guard.step(0.3, sample, held=False, busy=True) is Order.HALT
@@ -119,6 +131,7 @@ def test_a_busy_drive_is_halted_but_not_ordered_to_go() -> None:
 def test_what_ends_a_motion(factor: float, outcome: Outcome) -> None:
     """By what the drive reports."""
     joint = Joint(PLAN)
+    joint.step(held=False)
     steps = 0
     while joint.step(held=True, factor=factor) is not Order.END:
         steps += 1
@@ -158,6 +171,7 @@ def test_nobody_there_and_enough() -> None:
     assert guard.finish() is Order.END
     assert guard.outcome is Outcome.IDLE
     guard = MotionGuard(PLAN, 0.0)
+    assert guard.step(0.05, Sample(PLAN.start), held=False, busy=False) is Order.NONE
     assert guard.step(0.1, Sample(PLAN.start), held=True, busy=False) is Order.GO
     assert guard.finish() is Order.END
     assert guard.outcome is Outcome.FINISHED

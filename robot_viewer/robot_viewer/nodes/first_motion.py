@@ -351,7 +351,8 @@ class FirstMotion:
     def list(self) -> None:
         """Show how far it is; called some times a second."""
         if self._targets is not None and self._rests_at is None and self._panel is not None:
-            self._panel.show_progress(self._targets.guard)
+            targets = self._targets
+            self._panel.show_progress(targets.guard, press_anew=targets.press_anew)
 
     def _publisher(self) -> Publisher:
         topic = f'{self._drives[self._request.joint]}/target'

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 import math
+from typing import TypeAlias
 
 HEARTBEAT = 1.0 / 30.0
 """Time between two heartbeats of a held button in [s]."""
@@ -14,6 +15,8 @@ LEAST_GAP = 0.4 * HEARTBEAT
 RELEASED_AFTER = 0.3
 """Silence in [s] after which another page may hold a button."""
 
+_Press: TypeAlias = tuple[Hashable, Hashable]  # a page and its button
+
 
 class Deadman:
     """Distinguishes a heartbeat that counts from one that does not.
@@ -21,44 +24,48 @@ class Deadman:
     Whoever moves something by it sends one command for each heartbeat that counts, and nothing
     else: a page that is gone sends none, and the robot's own time-out stops the motion. Of what a
     slow connection has held up and delivers at once, one counts. After a stop a button that was
-    held has to be let go, however its heartbeats pause.
+    held has to be let go, however its heartbeats pause; one that was taken off the page is over.
     """
 
     def __init__(self) -> None:
         """Begin with no button held."""
         self._holder: Hashable = None
         self._last = -math.inf
-        self._pressed: set[Hashable] = set()  # pages that have not let go
-        self._barred: set[Hashable] = set()  # those that have to, after a stop
-        self._released: dict[Hashable, float] = {}
+        self._pressed: set[_Press] = set()  # what was not let go
+        self._barred: set[_Press] = set()  # what has to be, after a stop
+        self._released: dict[_Press, float] = {}
 
     def stop(self) -> None:
         """Let no heartbeat of a button count that is held now, until it is let go."""
         self._barred |= self._pressed
 
-    def release(self, page: Hashable, now: float) -> bool:
+    def release(self, page: Hashable, button: Hashable, now: float) -> bool:
         """Take note that a page has let go; return whether it was the one that holds.
 
         Args:
             page: Which page.
+            button: Which of its buttons.
             now: Steady time in [s].
         """
-        self._pressed.discard(page)
-        self._barred.discard(page)
-        self._released[page] = now
+        press = page, button
+        self._pressed.discard(press)
+        self._barred.discard(press)
+        self._released[press] = now
         return page == self._holder
 
-    def beat(self, page: Hashable, now: float) -> bool:
+    def beat(self, page: Hashable, button: Hashable, now: float) -> bool:
         """Take a heartbeat; return whether it counts.
 
         Args:
             page: Which page it is of.
+            button: Which of its buttons.
             now: Steady time of its arrival in [s].
         """
-        if now - self._released.get(page, -math.inf) < LEAST_GAP:
+        press = page, button
+        if now - self._released.get(press, -math.inf) < LEAST_GAP:
             return False  # of the button that was let go; threads may have changed their order
-        self._pressed.add(page)
-        if page in self._barred:
+        self._pressed.add(press)
+        if press in self._barred:
             return False
         gap = now - self._last
         if page != self._holder and gap < RELEASED_AFTER:

@@ -163,12 +163,20 @@ class GuardedTargets:
         """
         self.guard = MotionGuard(plan, now)
         self._target = plan.start
-        self._beat = self._used = -math.inf
+        # a button counts as held until it has been silent for a while: heartbeats of one that was
+        # held before are no agreement to this motion
+        self._beat = self._since = now
+        self._used = -math.inf
 
     @property
     def commanded(self) -> float:
         """How far it was commanded until now: a motion may be ended before its target."""
         return self._target - self.guard.plan.start
+
+    @property
+    def press_anew(self) -> bool:
+        """Whether the button is held, and has to be let go before it counts."""
+        return self.guard.needs_release and self._beat > self._since
 
     def beat(self, now: float) -> None:
         """Take a heartbeat of the held button that counts."""

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from html import escape
 from typing import Protocol
 
@@ -19,7 +20,7 @@ DISTANCE = 1.0
 SPEEDS = {JointKind.TURNS: 0.5, JointKind.SLIDES: 1.0}
 """In the same unit per second: slow enough to let go in time, whatever the scale is by ten."""
 HOLD = 'Hold to move'
-PRESS_ANEW = 'let go of the button, and press it anew: this page was held up'
+PRESS_ANEW = 'let go of the button, and press it anew'
 CHOOSE = 'choose'
 GOOD, BAD, PLAIN = '#2f9e44', '#e03131', '#868e96'
 
@@ -74,6 +75,8 @@ class FirstMotionPanel:
             hold: Adds a button to hold.
         """
         self._joints, self._actions = joints, actions
+        self._add_hold = partial(hold, HOLD, actions.beat, actions.release)
+        self._hold: GuiButtonHandle | None = None  # while a motion is prepared
         self._kind = next(iter(joints.values()))
         self._causes: Mapping[str, Cause] = {}
         gui = server.gui
@@ -84,7 +87,7 @@ class FirstMotionPanel:
             self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
             self._prepare = gui.add_button('Enable and prepare')
             self._state: GuiHtmlHandle = gui.add_html('')
-            self._hold = hold(HOLD, actions.beat, actions.release)
+            self._place_of_hold = gui.add_html('')
             self._enough = gui.add_button('That is enough')
             self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
                 'What you saw', tuple(each.value for each in Saw)
@@ -134,12 +137,12 @@ class FirstMotionPanel:
         self._note.content = ''
         self._show(moves=True, asks=False, concluded=False)
 
-    def show_progress(self, guard: MotionGuard) -> None:
-        """Show how far it is."""
+    def show_progress(self, guard: MotionGuard, *, press_anew: bool) -> None:
+        """Show how far it is, and that the button does not count until it was let go."""
         kind, distance = self._kind, guard.plan.distance
         way = f'{guard.travelled / kind.size:.3f} of {kind.shown(abs(distance))}'
         state, color = ('moving', GOOD) if guard.moving else ('at rest', PLAIN)
-        if guard.needs_release:
+        if press_anew:
             state, color = PRESS_ANEW, BAD
         self._note.content = _line(f'{state}: {way}', color)
 
@@ -190,8 +193,16 @@ class FirstMotionPanel:
         self._note.content = _line(text, BAD if failed else GOOD)
 
     def _show(self, *, moves: bool, asks: bool, concluded: bool) -> None:
-        for handle in (self._hold, self._enough):
-            handle.visible = moves
+        # one that is only hidden gets no pointerup, so it sends heartbeats without end; those of
+        # one that is gone reach nothing, whatever a page was about to do
+        if self._hold is not None:
+            self._hold.remove()
+            self._hold = None
+        if moves:
+            with self._folder:
+                self._hold = self._add_hold()
+            self._hold.order = self._place_of_hold.order
+        self._enough.visible = moves
         for question in (self._saw, self._far, self._conclude):
             question.visible = asks
         self._verdict.visible = concluded

@@ -431,13 +431,14 @@ class RobotPage:
         self, label: str, act: Callable[[], None], rest: Callable[[], None]
     ) -> GuiButtonHandle:
         """Add a button that acts as long as it is held, and rests when it is let go."""
+        which = object()
 
         def beat(event: GuiEvent[GuiButtonHandle]) -> None:
-            if self._deadman.beat(event.client_id, time.monotonic()):
+            if self._deadman.beat(event.client_id, which, time.monotonic()):
                 act()
 
         def release(event: GuiEvent[GuiButtonHandle]) -> None:
-            if self._deadman.release(event.client_id, time.monotonic()):
+            if self._deadman.release(event.client_id, which, time.monotonic()):
                 rest()
 
         button = self._server.gui.add_button(label, hint='hold it')
