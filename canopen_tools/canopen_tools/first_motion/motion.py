@@ -16,7 +16,16 @@ from arm_canopen import CanopenDrive, CanopenError, CanopenMaster, DriveState, E
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import BootError
 from arm_canopen.standard.target_objects import CYCLIC_MODES
-from first_motion import JointKind, MotionGuard, MotionPlan, Order, Outcome, Quantity, Sample
+from first_motion import (
+    FOLLOWING,
+    JointKind,
+    MotionGuard,
+    MotionPlan,
+    Order,
+    Outcome,
+    Quantity,
+    Sample,
+)
 from operator_input import HeldKeys, Keyboard, ReleaseSource, status_text, Style, TerminalError
 
 from .checks import AxisFacts, doubts, motion_mode, obstacles, read_facts
@@ -30,7 +39,6 @@ HALT_TIMEOUT = 3.0  # [s] for a slow joint to come to rest
 SETTLE_TIME = 0.4  # [s] after the halt, until the position is read
 KEY = 'space'
 QUIT = frozenset({'q', 'escape', 'ctrl+c'})
-FOLLOWING = 0.5  # share of the distance that the joint may be behind set-points of each cycle
 RELEASES = {
     ReleaseSource.TERMINAL: 'releasing it stops at once',
     ReleaseSource.KEYBOARD: 'releasing it stops at once',
@@ -177,6 +185,8 @@ def _plan(
     request: Request, facts: AxisFacts, master: CanopenMaster, drive: CanopenDrive
 ) -> MotionPlan:
     distance, start = request.distance.value, drive.position
+    if not math.isfinite(start):
+        raise FirstMotionError(f'{drive.name} reports no position any more')
     cyclic = motion_mode(facts.axis) in CYCLIC_MODES
     return MotionPlan(
         start=start,

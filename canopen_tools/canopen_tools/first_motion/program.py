@@ -13,12 +13,12 @@ from arm_canopen.config.model.drive import DriveConfig
 from first_motion import (
     AxisScales,
     DriveFacts,
-    FASTEST,
-    FURTHEST,
     JointKind,
     judge,
     Judgement,
     propose,
+    too_far,
+    too_fast,
     Verdict,
 )
 
@@ -70,16 +70,15 @@ def _once(request: Request, interruptions: Interruptions) -> int | None:
 
 def _require_small(request: Request) -> None:
     kind = request.distance.kind
-    if abs(request.distance.value) > FURTHEST[kind] or not request.distance.value:
+    if far := too_far(kind, request.distance.value):
+        raise FirstMotionError(f'--distance {far}')
+    if request.speed.kind is not kind:
         raise FirstMotionError(
-            f'--distance {kind.shown(request.distance.value)}: a first motion is short, up to '
-            f'{kind.shown(FURTHEST[kind])} and not 0'
+            f'--speed is in {request.speed.kind.value}/s, --distance in {kind.value}: a first '
+            'motion is slow; give both in units of one kind'
         )
-    if request.speed.kind is not kind or not 0.0 < request.speed.value <= FASTEST[kind]:
-        raise FirstMotionError(
-            f'--speed: a first motion is slow; give a speed above 0 and up to '
-            f'{kind.shown(FASTEST[kind])} per second'
-        )
+    if fast := too_fast(kind, request.speed.value):
+        raise FirstMotionError(f'--speed {fast}')
     if not sys.stdin.isatty():
         raise FirstMotionError('a person has to hold a key: start this in a terminal')
 
@@ -155,5 +154,5 @@ def _correct(
         return False
     channel = axis.channel if len(node.axes) > 1 else None
     apply(correction, request.path, node.name, request.joint, channel)
-    say(f'{request.path} is changed')
+    say(f'{request.path.resolve()} is changed')
     return True

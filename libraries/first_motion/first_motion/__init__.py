@@ -9,14 +9,24 @@ clock, bus or terminal, so that a terminal and a page conclude the same.
 from .bus_edit import edited, replace_file, yaml_text
 from .correction import Correction, propose
 from .exceptions import BusEditError
-from .guard import MotionGuard, MotionPlan, Order, Outcome, Sample
-from .joint_units import FASTEST, FURTHEST, JointKind, Quantity, read_quantity, too_few_increments
+from .guard import FOLLOWING, MotionGuard, MotionPlan, Order, Outcome, Sample
+from .joint_units import (
+    FASTEST,
+    FURTHEST,
+    JointKind,
+    Quantity,
+    read_quantity,
+    too_far,
+    too_fast,
+    too_few_increments,
+)
 from .judgement import Cause, CAUSES, DriveFacts, judge, Judgement, Seen, Verdict
 from .scales import AxisScales, corrected
 
 __all__ = [
     'CAUSES',
     'FASTEST',
+    'FOLLOWING',
     'FURTHEST',
     'AxisScales',
     'BusEditError',
@@ -39,6 +49,8 @@ __all__ = [
     'propose',
     'read_quantity',
     'replace_file',
+    'too_far',
+    'too_fast',
     'too_few_increments',
     'yaml_text',
 ]

@@ -68,11 +68,15 @@ def replace_file(
 ) -> None:
     """Change a file; it is replaced as a whole, or not at all.
 
+    Where the path is a link its file is changed, and the link stays: a workspace that is built
+    with links has the file in its sources.
+
     Args:
         path: The file.
         edit: Returns the new text for the one that it has.
         check: Looks at the new file, and raises where it must not take the place of the old one.
     """
+    path = path.resolve()
     text = edit(path.read_text(encoding='utf-8'))
     new = path.with_name(f'{path.name}.new')
     try:

@@ -25,7 +25,12 @@ IDLE_TIME = 60.0  # [s] without a key, after which it is over
 REACHED = 0.03  # share of the distance that may be missing
 BEYOND = 0.25  # share of the distance by which the joint may go too far, or the other way
 OTHERS = 0.5  # share of the distance by which no other joint may move
+FOLLOWING = 0.5  # share of the distance by which the joint may be off its set-points
 INCREMENTS = 3  # by which a position may be off in each of these
+OTHER_WAY = (
+    'scale_pos_to_dev and scale_pos_from_dev have different signs, or the encoder counts the '
+    'other way than the motor turns'
+)
 
 
 class Order(Enum):
@@ -78,6 +83,20 @@ class MotionPlan:
     increment: float
     following_limit: float = math.inf
     others: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be guarded: nothing is beyond a limit that is not a number.
+
+        Raises:
+            ValueError: A value is not finite, or the joint would not move.
+        """
+        for name in ('start', 'distance', 'speed', 'increment'):
+            if not math.isfinite(value := getattr(self, name)):
+                raise ValueError(f'{name} of the motion is {value}; no motion can be guarded')
+        if not self.distance or self.speed <= 0.0:
+            raise ValueError(
+                f'a distance of {self.distance:g} at a speed of {self.speed:g} is no motion'
+            )
 
     @property
     def target(self) -> float:
@@ -197,6 +216,8 @@ class MotionGuard:
         if abs(self.travelled - before) > max(plan.increment, REACHED * abs(plan.distance)):
             self._progress = (now, self.travelled)
         elif now - since > STALL_TIME:
+            if self.travelled < -plan.noise:  # it went there until its targets did not go on
+                return Outcome.OTHER_WAY, OTHER_WAY
             return Outcome.STALLED, f'for {STALL_TIME:g} s'
         return None
 
@@ -207,10 +228,7 @@ class MotionGuard:
         if self.travelled > size * (1.0 + BEYOND) + plan.noise:
             return Outcome.TOO_FAR, f'by {self.travelled / size - 1.0:.0%} of the distance'
         if self.travelled < -size * BEYOND - plan.noise:
-            return Outcome.OTHER_WAY, (
-                'scale_pos_to_dev and scale_pos_from_dev have different signs, or the encoder '
-                'counts the other way than the motor turns'
-            )
+            return Outcome.OTHER_WAY, OTHER_WAY
         for name, start in plan.others.items():
             position = sample.others.get(name, start)
             if abs(position - start) > OTHERS * size + plan.noise:

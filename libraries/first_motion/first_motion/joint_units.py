@@ -68,6 +68,26 @@ def read_quantity(text: str, kind: JointKind = JointKind.TURNS) -> Quantity:
     return Quantity(found, float(match['number']) * size)
 
 
+def too_far(kind: JointKind, distance: float) -> str:
+    """Return why a distance, in [rad] or [m], is not that of a first motion; empty when it is."""
+    if 0.0 < abs(distance) <= FURTHEST[kind]:
+        return ''
+    return (
+        f'{kind.shown(distance)}: a first motion is short, up to {kind.shown(FURTHEST[kind])} and '
+        'not 0'
+    )
+
+
+def too_fast(kind: JointKind, speed: float) -> str:
+    """Return why a speed, in [rad/s] or [m/s], is not that of a first motion; empty when it is."""
+    if 0.0 < speed <= FASTEST[kind]:
+        return ''
+    return (
+        f'{kind.shown(speed)}/s: a first motion is slow; give a speed above 0 and up to '
+        f'{kind.shown(FASTEST[kind])} per second'
+    )
+
+
 def too_few_increments(kind: JointKind, distance: float, scale: float) -> str:
     """Return why a distance cannot be seen; empty when it can.
 

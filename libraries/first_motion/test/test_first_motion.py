@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 import math
+from pathlib import Path
 
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -26,8 +28,11 @@ from first_motion import (
     Order,
     Outcome,
     read_quantity,
+    replace_file,
     Sample,
     Seen,
+    too_far,
+    too_fast,
     Verdict,
 )
 from first_motion.guard import IDLE_TIME, LOOP_GAP, STALL_TIME
@@ -160,6 +165,50 @@ def test_errors_end_a_motion_with_their_reason(
     assert guard.outcome is outcome
     assert words in guard.detail
     assert guard.step(0.06, Sample(0.5), held=True, busy=False) is Order.END
+
+
+def test_a_joint_that_stands_behind_its_start_went_the_other_way() -> None:
+    """Its targets did not go on, as they stay near the joint."""
+    guard, now = MotionGuard(PLAN, 0.0), 0.0
+    held = False
+    while guard.outcome is Outcome.RUNNING:
+        now += PERIOD
+        position = PLAN.start - (0.002 if held else 0.0)
+        guard.step(now, Sample(position), held=held, busy=False)
+        held = True
+    assert guard.outcome is Outcome.OTHER_WAY
+    assert 'different signs' in guard.detail
+
+
+@pytest.mark.parametrize('name', ['start', 'distance', 'speed', 'increment'])
+def test_a_motion_that_cannot_be_guarded_is_refused(name: str) -> None:
+    """Nothing is beyond a limit that is no number."""
+    for value in (math.nan, math.inf):
+        with pytest.raises(ValueError, match=name):
+            replace(PLAN, **{name: value})  # type: ignore[arg-type]  # of numbers alone
+    with pytest.raises(ValueError, match='is no motion'):
+        MotionPlan(0.5, 0.0, 0.01, 1e-4)
+
+
+def test_a_first_motion_is_short_and_slow() -> None:
+    """Whoever asks for it; what is no number is neither."""
+    kind = JointKind.TURNS
+    assert not too_far(kind, -math.radians(20))
+    assert not too_fast(kind, math.radians(5))
+    for distance in (0.0, math.radians(21), -math.inf, math.nan):
+        assert 'a first motion is short, up to 20 deg' in too_far(kind, distance)
+    for speed in (0.0, -0.01, math.radians(6), math.inf, math.nan):
+        assert 'a first motion is slow' in too_fast(kind, speed)
+
+
+def test_the_file_behind_a_link_is_changed(tmp_path: Path) -> None:
+    """The link stays: the next build would make it anew, and the change were lost."""
+    source, link = tmp_path / 'source.yml', tmp_path / 'installed.yml'
+    source.write_text('old')
+    link.symlink_to(source)
+    replace_file(link, lambda text: f'{text}, new')
+    assert link.is_symlink()
+    assert source.read_text() == 'old, new'
 
 
 def test_nobody_there_and_enough() -> None:
