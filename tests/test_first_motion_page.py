@@ -126,6 +126,24 @@ def prepare(page: Page, distance: str) -> None:
     page.get_by_text('only while you hold the button').wait_for()
 
 
+def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
+    """What is pressed for a motion moves nothing in the next one, whoever prepares that."""
+    prepare(page, '-2')
+    joint.move(page)
+    page.get_by_text('What did the real joint do?').wait_for()
+    joint.wait_for_rest()
+    stood = joint.angle
+    prepare(other, '2')
+    joint.wait_for_rest()
+    page.mouse.up()
+    prepare(page, '2')
+    page.get_by_text('at rest').wait_for()
+    joint.wait_for_rest()
+    assert joint.angle == stood
+    joint.move(page)
+    page.mouse.up()
+
+
 def test_a_wrong_sign_and_scale_are_found_on_the_page(
     isolation: Isolation, tmp_path: Path
 ) -> None:
@@ -184,21 +202,4 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
         page.mouse.up()
         joint.wait_for_rest()
-
-        # held beyond the end: neither that page nor this one moves the joint by what is pressed
-        # for the motion before
-        prepare(page, '-2')
-        joint.move(page)
-        page.get_by_text('What did the real joint do?').wait_for()
-        joint.wait_for_rest()
-        stood = joint.angle
-        other = chromium.open_page(browser, url)
-        prepare(other, '2')
-        joint.wait_for_rest()
-        page.mouse.up()
-        prepare(page, '2')
-        page.get_by_text('at rest').wait_for()
-        joint.wait_for_rest()
-        assert joint.angle == stood
-        joint.move(page)
-        page.mouse.up()
+        hold_beyond_the_end(page, chromium.open_page(browser, url), joint)

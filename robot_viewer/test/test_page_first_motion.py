@@ -29,13 +29,23 @@ from robot_viewer.page.first_motion import (
     correction_lines,
     correction_of,
     GuardedTargets,
+    LEAD_TIME,
     MAX_STEP_TIME,
+    motion_plan,
+    MotionRequest,
     problem_of,
     RELEASED_AFTER,
     Saw,
 )
 
 PLAN = MotionPlan(start=0.5, distance=0.1, speed=0.05, increment=1e-4)
+SCALES = AxisScales(False, 1000.0, 0.001, 1000.0, 0.001, 1.0, 1.0, 0.0)
+AXIS = Axis(
+    JointKind.TURNS,
+    AxisScales(False, 1e4, 1e-4, 1e4, 1e-4, 1.0, 1.0, 0.0),
+    DriveFacts(1e4),
+    BusPlace(Path('none'), 0, 0, 'shoulder', None),
+)
 BUS = 'nodes:\n  shoulder:\n    node_id: 2  # mine\n    scale_pos_to_dev: 1000.0\n'
 
 
@@ -103,6 +113,43 @@ def test_a_touch_moves_nothing_and_a_late_heartbeat_no_farther() -> None:
     assert motion.guard.outcome is Outcome.RUNNING
 
 
+@pytest.mark.parametrize('sign', [1, -1])
+def test_the_target_of_a_stuck_joint_stays_near_it(sign: int) -> None:
+    """It would jump when it comes free; that it is stuck is a result, and no error."""
+    request = MotionRequest('shoulder', sign * 0.02, 0.05)
+    plan = motion_plan(request, AXIS, 0.5, {'elbow': 1.0, 'lost': math.nan})
+    assert plan.others == {'elbow': 1.0}
+    motion, now, farthest = let_go(plan), 10.0, 0.5
+    while motion.guard.outcome is Outcome.RUNNING:
+        now += HEARTBEAT
+        motion.beat(now)
+        target = motion.step(now, Sample(0.5))
+        farthest = farthest if target is None else target
+        assert abs(farthest - 0.5) <= 0.05 * LEAD_TIME + plan.noise + 1e-9
+    assert motion.guard.outcome is Outcome.STALLED
+    assert (farthest - 0.5) * sign > 0.9 * 0.05 * LEAD_TIME
+
+
+def test_a_joint_that_leaves_its_targets_ends_the_motion() -> None:
+    """Before it is a quarter beyond the distance."""
+    plan = motion_plan(MotionRequest('shoulder', 0.2, 0.05), AXIS, 0.5, {})
+    motion, now, position = let_go(plan), 10.0, 0.5
+    while motion.guard.outcome is Outcome.RUNNING:
+        now += HEARTBEAT
+        motion.beat(now)
+        motion.step(now, Sample(position))
+        position += 0.14 * HEARTBEAT  # below three times the speed
+    assert motion.guard.outcome is Outcome.FOLLOWING_ERROR
+    assert position < plan.target
+
+
+@pytest.mark.parametrize('start', [math.nan, math.inf])
+def test_a_start_that_is_no_number_is_refused(start: float) -> None:
+    """No position would be too far from it."""
+    with pytest.raises(ValueError, match='no motion can be guarded'):
+        motion_plan(MotionRequest('shoulder', 0.2, 0.05), AXIS, start, {})
+
+
 @pytest.mark.parametrize(
     ('saw', 'reported', 'verdict'),
     [
@@ -132,9 +179,8 @@ def test_a_correction_is_shown_and_written_once(tmp_path: Path) -> None:
         each.write_text(BUS)
     stat = path.stat()
     place = BusPlace(path, stat.st_ino, stat.st_mtime_ns, 'shoulder', None)
-    scales = AxisScales(False, 1000.0, 0.001, 1000.0, 0.001, 1.0, 1.0, 0.0)
     says = DriveFacts(1000.0, gear=50.0)
-    axis = Axis(JointKind.TURNS, scales, says, place)
+    axis = Axis(JointKind.TURNS, SCALES, says, place)
     judgement = judge(JointKind.TURNS, 0.1, 0.1, Saw.OTHER_WAY.seen(0.1, 0.002), says)
     assert len(judgement.causes) == 2, 'a gear of 50, or degrees'
     assert correction_of(axis, judgement, None) is None, 'a person chooses'
@@ -145,7 +191,7 @@ def test_a_correction_is_shown_and_written_once(tmp_path: Path) -> None:
     assert 'the gear of 50 (0x6091) is missing' in lines
     assert not BusPlace(copy, stat.st_ino, stat.st_mtime_ns, 'shoulder', None).is_here
     assert place.is_here
-    place.write(correction)
+    assert place.write(correction) == path
     written = yaml.safe_load(path.read_text())['nodes']['shoulder']
     assert written == {'node_id': 2, **correction.values}
     assert '# mine' in path.read_text()
@@ -160,7 +206,10 @@ def test_a_correction_is_shown_and_written_once(tmp_path: Path) -> None:
         ('Operation enabled', 'Cyclic position', 0.1, ''),
         ('Operation enabled', 'Cyclic position', 0.6, 'joint_states'),
         ('Switched on', 'Cyclic position', 0.1, 'not enabled'),
-        ('Operation enabled', 'Cyclic velocity', 0.1, 'select a position mode'),
+        ('Operation enabled', 'Interpolated position', 0.1, ''),
+        ('Operation enabled', 'Profile position', 0.1, 'goes on when the page is lost: choose'),
+        ('Operation enabled', 'Cyclic velocity', 0.1, 'position mode below Drives'),
+        ('Operation enabled', '', 0.1, 'no mode'),
         ('', '', 0.1, 'no diagnostics'),
     ],
 )

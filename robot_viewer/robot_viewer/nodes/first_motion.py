@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 import math
@@ -28,10 +29,11 @@ from first_motion import (
     JointKind,
     judge,
     Judgement,
-    MotionPlan,
     Order,
     Outcome,
     Sample,
+    too_far,
+    too_fast,
     too_few_increments,
     Verdict,
 )
@@ -43,6 +45,7 @@ from ..page.first_motion import (
     correction_lines,
     correction_of,
     GuardedTargets,
+    motion_plan,
     MotionRequest,
     problem_of,
     Saw,
@@ -54,6 +57,8 @@ READ_UNITS = 'read_units'
 READ_UNITS_TYPE = 'arm_msgs/srv/ReadUnits'
 STATUS_TIMEOUT, SILENCE_TIMEOUT = 3.0, 10.0
 """Times in [s] after the enabling, in which /diagnostics has to show it, and to say anything."""
+ANSWER_TIMEOUT, DISABLE_TIMEOUT = 20.0, 5.0
+"""Times in [s] for the answer of a service: before the motion, and of the one that disables."""
 SETTLE_TIME = 0.7
 """Time in [s] after the last target, until the position is read: the robot's own time-out and its
 ramp are in it."""
@@ -66,6 +71,21 @@ class Page(Protocol):
         self, joints: Mapping[str, JointKind], actions: FirstMotionActions
     ) -> FirstMotionPanel:
         """Offer it for these joints, in the place of those before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disabling:
+    """A drive that has to be without power, and is not confirmed to be.
+
+    Attributes:
+        joint: Its joint.
+        why: What its motion did.
+        deadline: Time until which it has to be confirmed in [s].
+    """
+
+    joint: str
+    why: str
+    deadline: float
 
 
 class FirstMotion:
@@ -101,7 +121,8 @@ class FirstMotion:
         self._attempt = 0  # what is answered for an earlier one counts no more
         self._request = MotionRequest('', 0.0, 0.0)
         self._axis: Axis | None = None
-        self._asking = False  # the drive, for its units and to be enabled
+        self._asking: tuple[str, float] | None = None  # which service, and until when
+        self._disabling: Disabling | None = None
         self._seen_at = -math.inf  # when a position of the joint came
         self._enabled: tuple[float, Status | None] | None = None  # when, and the status before
         self._targets: GuardedTargets | None = None
@@ -114,7 +135,8 @@ class FirstMotion:
     @property
     def busy(self) -> bool:
         """Whether positions matter, also for a page that was closed."""
-        return self._asking or self._enabled is not None or self._targets is not None
+        preparing = self._asking is not None or self._enabled is not None
+        return preparing or self._targets is not None
 
     # -- what the robot offers
 
@@ -146,9 +168,9 @@ class FirstMotion:
         kinds = {joint: self._kinds[joint] for joint in found}
         self._panel = self._page.offer_first_motion(kinds, self)
 
-    def take(self, names: Sequence[str]) -> None:
-        """Take note of the joints of which a position has come."""
-        if self._request.joint in names:
+    def take(self, positions: Mapping[str, float]) -> None:
+        """Take note of positions that have come."""
+        if math.isfinite(positions.get(self._request.joint, math.nan)):
             self._seen_at = time.monotonic()
 
     # -- what people do, in any thread
@@ -189,24 +211,23 @@ class FirstMotion:
 
     def stop(self) -> None:
         """Command nothing any more: the robot was stopped."""
-        if self._end():
+        if self.busy:  # else what was measured is kept
+            self._end()
             self._begin('stopped; prepare it anew')
 
-    def _end(self) -> bool:
-        """Forget what was prepared; return whether something was."""
-        was = self.busy
+    def _end(self) -> None:
+        """Forget what was prepared and measured."""
         self._attempt += 1
-        self._asking = False
-        self._enabled = self._targets = self._rests_at = self._reported = None
+        self._asking = self._enabled = self._targets = self._rests_at = self._reported = None
         self._judgement = self._correction = None
-        return was
 
     def _forget(self) -> None:
         self._end()
         self._begin('')
 
     def _begin(self, text: str, *, failed: bool = False) -> None:
-        if self._panel is not None:
+        # what becomes of a drive that has to be disabled is not hidden by anything else
+        if self._panel is not None and self._disabling is None:
             self._panel.begin(text, failed=failed)
 
     def _fail(self, why: str) -> None:
@@ -215,31 +236,62 @@ class FirstMotion:
         self._node.get_logger().warning(f'first motion of {self._request.joint}: {why}')
 
     def _prepare(self, request: MotionRequest) -> None:
-        self._end()
-        if self._panel is None or request.joint not in self._drives:
+        if self._panel is None or request.joint not in self._drives or self._disabling is not None:
             return
+        self._end()
         self._request, self._seen_at = request, -math.inf
-        self._asking = True
-        self._panel.show_preparing()
-        kind = import_module('arm_msgs.srv').ReadUnits
-        self._call(kind, READ_UNITS, self._take_units)
+        kind = self._kinds[request.joint]
+        if large := too_far(kind, request.distance) or too_fast(kind, request.speed):
+            self._fail(large)
+            return
+        try:
+            service = import_module('arm_msgs.srv').ReadUnits
+        except ModuleNotFoundError as error:
+            self._fail(f'{error.name} is not installed here; build the workspace with arm_msgs')
+            return
+        self._panel.show_waiting('asking the drive ...', failed=False)
+        self._ask_drive(service, READ_UNITS, self._take_units)
 
-    def _call(self, kind: Any, name: str, take: Callable[[Any], None]) -> None:  # noqa: ANN401
+    def _ask_drive(
+        self,
+        kind: Any,  # noqa: ANN401
+        name: str,
+        take: Callable[[Any], None],
+    ) -> None:
         """Call a service of the drive; an answer to an attempt that is over is dropped."""
-        client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
         attempt = self._attempt
+        self._asking = name, time.monotonic() + ANSWER_TIMEOUT
 
-        def answered(future: Future) -> None:
-            self._node.destroy_client(client)
+        def answered(response: Any, refusal: str) -> None:  # noqa: ANN401
             if attempt != self._attempt:
                 return
-            response = None if future.exception() is not None else future.result()
-            if response is None or not response.success:
-                self._fail(f'{name}: {"no answer" if response is None else response.message}')
-                return
-            take(response)
+            self._asking = None
+            if refusal:
+                self._fail(f'{name}: {refusal}')
+            else:
+                take(response)
 
-        client.call_async(kind.Request()).add_done_callback(answered)
+        self._call(kind, name, answered)
+
+    def _call(self, kind: Any, name: str, answered: Callable[[Any, str], None]) -> None:  # noqa: ANN401
+        """Call a service of the drive.
+
+        Args:
+            kind: Its type.
+            name: Its name below the drive.
+            answered: Takes the response and, unless it is a success, why not.
+        """
+        client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
+
+        def done(future: Future) -> None:
+            self._node.destroy_client(client)
+            if future.exception() is not None or future.result() is None:
+                answered(None, f'no answer ({future.exception()})')
+                return
+            response = future.result()
+            answered(response, '' if response.success else response.message or 'refused')
+
+        client.call_async(kind.Request()).add_done_callback(done)
 
     def _take_units(self, response: Any) -> None:  # noqa: ANN401
         kind = self._kinds[self._request.joint]
@@ -258,11 +310,10 @@ class FirstMotion:
         if few := too_few_increments(kind, self._request.distance, scales.scale_pos_to_dev):
             self._fail(few)
             return
-        self._call(Trigger, 'enable', self._enabled_now)
+        self._ask_drive(Trigger, 'enable', self._enabled_now)
 
     def _enabled_now(self, _response: Trigger.Response) -> None:
         """The drive is enabled; what is known of it is older."""
-        self._asking = False
         self._enabled = time.monotonic(), self._status()
 
     def _status(self) -> Status | None:
@@ -292,13 +343,11 @@ class FirstMotion:
             for name in self._drives
             if name != request.joint and name in positions
         }
-        plan = MotionPlan(
-            start=positions[request.joint],
-            distance=request.distance,
-            speed=request.speed,
-            increment=abs(axis.scales.scale_pos_from_dev),
-            others=others,
-        )
+        try:
+            plan = motion_plan(request, axis, positions[request.joint], others)
+        except ValueError as error:
+            self._fail(str(error))
+            return
         self._targets = GuardedTargets(plan, time.monotonic())
         self._panel.show_ready(list(announcement(request, axis, plan.start)))
 
@@ -319,7 +368,13 @@ class FirstMotion:
     def advance(self) -> None:
         """Go on; called 30 times a second."""
         now = time.monotonic()
-        if self._enabled is not None:
+        if self._disabling is not None and now > self._disabling.deadline:
+            self._report_disabling(f'no answer within {DISABLE_TIMEOUT:g} s')
+        if self._asking is not None:
+            name, until = self._asking
+            if now > until:
+                self._fail(f'{name}: no answer within {ANSWER_TIMEOUT:g} s; does its master run?')
+        elif self._enabled is not None:
             self._await_status(*self._enabled)
         elif self._rests_at is not None:
             if now >= self._rests_at:
@@ -343,10 +398,37 @@ class FirstMotion:
             self._end()
             self._begin('the button was not held: prepare it anew')
             return
-        detail = guard.detail
-        # what moves as nobody has commanded is left without power, as at the terminal
-        self._fail(f'{detail}; the drive is stopped and disabled')
-        self._call(Trigger, 'shutdown', lambda _: None)
+        self._disable(guard.detail)
+
+    def _disable(self, why: str) -> None:
+        """Leave a joint without power that moves as nobody has commanded, as at the terminal."""
+        joint = self._request.joint
+        self._fail(f'{why}; the drive is being disabled')
+        if self._panel is not None:
+            text = f'{joint}: {why}; the drive is being disabled ...'
+            self._panel.show_waiting(text, failed=True)
+        disabling = Disabling(joint, why, time.monotonic() + DISABLE_TIMEOUT)
+        self._disabling = disabling
+
+        def answered(_response: Any, refusal: str) -> None:  # noqa: ANN401
+            if self._disabling is disabling:
+                self._report_disabling(refusal)
+
+        self._call(Trigger, 'shutdown', answered)
+
+    def _report_disabling(self, refusal: str) -> None:
+        disabling, self._disabling = self._disabling, None
+        if disabling is None:
+            return
+        what = 'the drive is disabled'
+        if refusal:
+            what = f'NOT confirmed that it is disabled: use the emergency stop ({refusal})'
+        self._begin(f'{disabling.joint}: {disabling.why}; {what}', failed=True)
+        text = f'first motion of {disabling.joint}: {what}'
+        if refusal:
+            self._node.get_logger().error(text)
+        else:
+            self._node.get_logger().warning(text)
 
     def list(self) -> None:
         """Show how far it is; called some times a second."""
@@ -399,10 +481,10 @@ class FirstMotion:
         if self._axis is None or self._correction is None or self._panel is None:
             return
         try:
-            self._axis.place.write(self._correction)
+            path = self._axis.place.write(self._correction)
         except (OSError, ValueError) as error:
             self._panel.show_written(str(error), failed=True)
             return
-        text = f'{self._axis.place.path} is written; restart the robot, which has the old scales'
+        text = f'{path} is written; restart the robot, which has the old scales'
         self._node.get_logger().info(text)
         self._panel.show_written(text, failed=False)

@@ -155,8 +155,9 @@ class WebViewer(Node):
     def _take_joints(self, message: JointState) -> None:
         if not self._own:
             self._received_at = time.monotonic()
-        self._first_motion.take(message.name)
-        self._positions.update(zip(message.name, message.position, strict=False))
+        positions = dict(zip(message.name, message.position, strict=False))
+        self._first_motion.take(positions)
+        self._positions.update(positions)
 
     def _take_transforms(self, message: TFMessage) -> None:
         for transform in message.transforms:

@@ -10,7 +10,7 @@ robot itself stops when it pauses.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 import math
@@ -22,6 +22,7 @@ from first_motion import (
     Correction,
     DriveFacts,
     edited,
+    FOLLOWING,
     JointKind,
     Judgement,
     MotionGuard,
@@ -44,6 +45,10 @@ FRESHNESS = 0.5
 NO_POSITION = 'its position does not arrive on joint_states'
 ENABLED = 'Operation enabled'
 """State of a drive that takes targets, as /diagnostics has it."""
+MODES = frozenset({'Cyclic position', 'Interpolated position'})
+"""Modes in which targets are positions, and the master halts the axis when they pause."""
+LEAD_TIME = 0.3
+"""Time in [s] by which the target is ahead of the joint at most, at the speed of the motion."""
 
 
 class Saw(Enum):
@@ -110,8 +115,16 @@ class BusPlace:
             return False
         return (stat.st_ino, stat.st_mtime_ns) == (self.inode, self.changed)
 
-    def write(self, correction: Correction) -> None:
-        """Change the keys in the file.
+    @property
+    def file(self) -> Path:
+        """The file itself, where the path is a link that is seen from here."""
+        return self.path.resolve() if self.is_here else self.path
+
+    def write(self, correction: Correction) -> Path:
+        """Change the keys in the file, and return which one that is.
+
+        The new text is read back as YAML; the page knows no more of bus.yml, so unlike the
+        terminal it does not read it as the master does.
 
         Raises:
             OSError: It cannot be written.
@@ -127,7 +140,9 @@ class BusPlace:
             reason=correction.reason,
             channel=self.channel,
         )
-        replace_file(self.path, edit)
+        file = self.file
+        replace_file(file, edit)
+        return file
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +160,37 @@ class Axis:
     scales: AxisScales
     says: DriveFacts
     place: BusPlace
+
+
+def motion_plan(
+    request: MotionRequest, axis: Axis, start: float, others: Mapping[str, float]
+) -> MotionPlan:
+    """Return the motion that was requested.
+
+    Args:
+        request: The request.
+        axis: How the joint counts.
+        start: Where it stands.
+        others: Where the other joints stand, as far as it is known.
+
+    Raises:
+        ValueError: A number of it is not finite, or nothing would move.
+    """
+    plan = MotionPlan(
+        start=start,
+        distance=request.distance,
+        speed=request.speed,
+        increment=abs(axis.scales.scale_pos_from_dev),
+        others={name: each for name, each in others.items() if math.isfinite(each)},
+    )
+    # a joint that is stuck is as far behind as the target goes; that is a result, and no error
+    stuck = lead(plan) + plan.noise
+    return replace(plan, following_limit=max(FOLLOWING * abs(plan.distance), stuck))
+
+
+def lead(plan: MotionPlan) -> float:
+    """Return how far the target may be ahead of the joint."""
+    return plan.speed * LEAD_TIME + plan.noise
 
 
 class GuardedTargets:
@@ -194,6 +240,8 @@ class GuardedTargets:
             sample: What the drives report.
         """
         held = now - self._beat < RELEASED_AFTER
+        if self.guard.moving:
+            sample = replace(sample, following_error=self._target - sample.position)
         order = self.guard.step(now, sample, held=held, busy=False)
         if order is Order.GO:
             # from where it stands, whatever was commanded before; a single touch moves nothing
@@ -205,6 +253,10 @@ class GuardedTargets:
         self._used = self._beat
         left = plan.target - self._target
         self._target += math.copysign(min(plan.speed * gap, abs(left)), left)
+        # a joint that is stuck is not wound up: it would jump when it comes free
+        limit = sample.position + math.copysign(lead(plan), plan.distance)
+        nearest = min if plan.distance > 0.0 else max
+        self._target = nearest(self._target, limit)
         return self._target
 
 
@@ -220,8 +272,11 @@ def problem_of(drive: Mapping[str, str], age: float) -> str:
     state, mode = drive.get('state', ''), drive.get('mode', '')
     if state != ENABLED:
         return f'it is not enabled ({state or "no diagnostics"}): see Drives and Status'
-    if 'position' not in mode.lower():
-        return f'it is in {mode or "no mode"}: select a position mode below Drives'
+    if mode not in MODES:
+        return (
+            f'it is in {mode or "no mode"}, in which a position is not followed, or goes on when '
+            'the page is lost: choose cyclic or interpolated position mode below Drives'
+        )
     return ''
 
 
@@ -255,6 +310,6 @@ def correction_of(axis: Axis, judgement: Judgement, cause: Cause | None) -> Corr
 def correction_lines(place: BusPlace, correction: Correction) -> str:
     """Return the lines of the file, to be copied."""
     where = place.device if place.channel is None else f'{place.device}, channel {place.channel}'
-    lines = [f'# {place.path}, {where}', f'# {correction.reason}']
+    lines = [f'# {place.file}, {where}', f'# {correction.reason}']
     lines += [f'{key}: {yaml_text(value)}' for key, value in correction.values.items()]
     return '\n'.join(lines)

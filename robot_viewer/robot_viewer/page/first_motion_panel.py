@@ -124,10 +124,10 @@ class FirstMotionPanel:
         self._state.content = _line(text, BAD if failed else PLAIN) if text else ''
         self._show(moves=False, asks=False, concluded=False)
 
-    def show_preparing(self) -> None:
-        """Show that the drive is asked."""
+    def show_waiting(self, text: str, *, failed: bool) -> None:
+        """Show what is waited for; nothing can be prepared meanwhile."""
         self._prepare.disabled = True
-        self._state.content = _line('asking the drive ...', PLAIN)
+        self._state.content = _line(text, BAD if failed else PLAIN)
         self._show(moves=False, asks=False, concluded=False)
 
     def show_ready(self, announced: Sequence[str]) -> None:
