@@ -140,6 +140,7 @@ def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
     page.get_by_text('at rest').wait_for()
     joint.wait_for_rest()
     assert joint.angle == stood
+    chromium.picture(page, 'first-motion-ready')
     joint.move(page)
     page.mouse.up()
 
