@@ -143,6 +143,7 @@ def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
     chromium.picture(page, 'first-motion-ready')
     joint.move(page)
     page.mouse.up()
+    joint.wait_for_rest()
 
 
 def test_a_wrong_sign_and_scale_are_found_on_the_page(
@@ -195,6 +196,7 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert shoulder.scale_pos_to_dev == pytest.approx(PER_TURN / math.tau)
         assert elbow.scale_pos_to_dev == pytest.approx(-PER_TURN / 4 / math.tau)
 
+        hold_beyond_the_end(page, chromium.open_page(browser, url), joint)
         prepare(page, '-20')
         joint.move(page)
         page.keyboard.press('Space')
@@ -203,4 +205,3 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
         page.mouse.up()
         joint.wait_for_rest()
-        hold_beyond_the_end(page, chromium.open_page(browser, url), joint)
