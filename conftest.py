@@ -9,7 +9,6 @@ name of the Python package inside it, which would then be hidden; so the real on
 
 from collections.abc import Iterator
 import importlib
-import itertools
 import os
 from pathlib import Path
 import signal
@@ -49,27 +48,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let two workers have the scenarios with whole robots: more would share two cores too often.
 
     Large groups begin first, so that the others run beside them, and not all scenarios at the end.
-    Tests are dealt out one by one, those that share a set-up together: by files, one worker would
-    have the files with the many, and the other one nothing to do at the end.
     """
-    turns = itertools.cycle(range(2))
-    turn_of: dict[str, int] = {}
-    for item in items:
-        if item.path.parent == SCENARIOS and item.get_closest_marker('scenario') is not None:
-            unit = str(item.path) if _shares_set_up(item) else item.nodeid
-            if unit not in turn_of:
-                turn_of[unit] = next(turns)
-            item.add_marker(pytest.mark.xdist_group(f'robots-{turn_of[unit]}'))
-
-
-def _shares_set_up(item: pytest.Item) -> bool:
-    """Whether a test uses a fixture that lasts longer than the test; those of pytest count not."""
-    fixtures = item._fixtureinfo.name2fixturedefs if isinstance(item, pytest.Function) else {}  # noqa: SLF001
-    return any(
-        fixture.scope != 'function' and fixture.baseid
-        for fixtures_of_name in fixtures.values()
-        for fixture in fixtures_of_name
-    )
+    robots = [item for item in items if item.path.parent == SCENARIOS]
+    files = sorted({item.path for item in robots})
+    for item in robots:
+        item.add_marker(pytest.mark.xdist_group(f'robots-{files.index(item.path) % 2}'))
 
 
 @pytest.fixture
