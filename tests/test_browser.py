@@ -287,7 +287,7 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     page.keyboard.press('Space')
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.2
-    page.get_by_text('halted').wait_for()
+    page.get_by_text('stopped: panda_joint1').wait_for()
     chromium.picture(page, 'stopped')
     page.get_by_role('button', name=UNLOCK).wait_for()
     chromium.drag(page, JOINT1, 0.1)  # as if one were dragged on, or late
