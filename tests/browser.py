@@ -132,11 +132,8 @@ def colors_of_scene(png: bytes) -> int:
 
 def hold(page: Page, button: str) -> None:
     """Press a button of the panel with the mouse, and keep it pressed."""
-    found = page.get_by_role('button', name=button, exact=True)
-    found.scroll_into_view_if_needed()
-    box = found.bounding_box()
-    assert box is not None
-    page.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
+    # forced: it may just be made anew, and a busy machine draws too seldom to find it at rest
+    page.get_by_role('button', name=button, exact=True).hover(force=True)
     page.mouse.down()
 
 
