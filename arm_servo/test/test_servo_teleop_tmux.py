@@ -118,7 +118,7 @@ def test_without_a_servo(pane: Pane) -> None:
     pane.press('Up')
     pane.wait_for('no base frame yet')
     pane.press('p')
-    pane.wait_for('there is no service /servo_node/pause_servo; is the servo running')
+    pane.wait_for('there is no service /servo_node/pause_servo; is the robot running')
 
 
 def test_misspelt_parameter_of_the_keyboard(pane: Pane) -> None:
