@@ -25,7 +25,7 @@ from node_runner import (
     ParameterReader,
     refuse_misspelt,
     run_program,
-    spin,
+    spin_beside,
 )
 
 from ..can.frame import Frame
@@ -100,7 +100,6 @@ class ReplayProcess:
 
     Attributes:
         nodes: The nodes, for the executor.
-        failure: Why it has ended; None for the end of the log, or when it was stopped.
     """
 
     def __init__(
@@ -114,7 +113,7 @@ class ReplayProcess:
             parameters: Parameters of the program.
             stack: Destroys the nodes of the devices.
         """
-        self.failure: Exception | None = None
+        self._refusal: Exception | None = None
         self._node = node
         self._parameters = parameters
         self._name = parameters.log.name
@@ -150,33 +149,30 @@ class ReplayProcess:
 
         Args:
             stop: Ends it; set at the end of the log.
+
+        Raises:
+            CanopenError: Somebody else publishes the same meanwhile.
+            PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_master, stop))
-        thread = threading.Thread(target=self._run, args=(stop,), name='replay', daemon=True)
         self._output.start()
-        thread.start()
         try:
-            spin(self.nodes, stop)
+            spin_beside(partial(self._run, stop), self.nodes, stop, 'replay')
         finally:
-            stop.set()
-            thread.join()
             self._output.stop()
+        if self._refusal is not None:
+            raise self._refusal
 
     def _run(self, stop: threading.Event) -> None:
         notify_ready()
-        try:
-            self._player.play(stop, loop=self._parameters.loop)
-        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
-            self.failure = error
-        else:
-            self._node.get_logger().info(f'{self._name}: end of the log')
-        stop.set()
+        self._player.play(stop, loop=self._parameters.loop)
+        self._node.get_logger().info(f'{self._name}: end of the log')
 
     def _look_for_master(self, stop: threading.Event) -> None:
         own = [node.get_fully_qualified_name() for node in self.nodes]
         names = _published_by(self._node, self._bus.network.config)
         if found := other_nodes(self._node, names, own):
-            self.failure = _refusal(found)
+            self._refusal = _refusal(found)
             stop.set()
 
     def _report(self, event: Event) -> None:
@@ -258,8 +254,6 @@ def _serve(stop: threading.Event) -> None:
         process = ReplayProcess(node, config, parameters, stack)
         node.get_logger().info(f'replay of {parameters.log} with {config.file}')
         process.play(stop)
-        if process.failure is not None:
-            raise process.failure
 
 
 def _published_by(node: Node, config: BusConfig) -> set[str]:

@@ -16,7 +16,7 @@ from .qos import LATCHED
 from .readiness import notify_ready
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .signals import stop_on_signals
-from .spinning import LINGER, make_executor, spin, WAKE_PERIOD
+from .spinning import LINGER, make_executor, spin, spin_beside, WAKE_PERIOD
 
 __all__ = [
     'LATCHED',
@@ -46,5 +46,6 @@ __all__ = [
     'run_program',
     'settle_process_memory',
     'spin',
+    'spin_beside',
     'stop_on_signals',
 ]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 import threading
 import time
 
@@ -66,3 +66,34 @@ def spin(
         pass
     finally:
         executor.shutdown()
+
+
+def spin_beside(
+    work: Callable[[], None], nodes: Iterable[Node], stop: threading.Event, name: str
+) -> None:
+    """Serve nodes while a thread works; what it raises is raised here when both have ended.
+
+    Args:
+        work: Done in the thread; it has to end soon after the event is set.
+        nodes: The nodes to serve.
+        stop: Ends both; set when the work is done.
+        name: Of the thread.
+    """
+    failures: list[Exception] = []
+
+    def run() -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
+            failures.append(error)
+        stop.set()
+
+    thread = threading.Thread(target=run, name=name, daemon=True)
+    thread.start()
+    try:
+        spin(nodes, stop)
+    finally:
+        stop.set()
+        thread.join()
+    if failures:
+        raise failures[0]

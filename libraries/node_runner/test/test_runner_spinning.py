@@ -11,7 +11,7 @@ import rclpy
 from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.utilities import try_shutdown
 
-from node_runner import make_executor, spin
+from node_runner import make_executor, spin, spin_beside
 
 TIMEOUT = 20.0  # [s]
 
@@ -54,6 +54,31 @@ def test_spin_lingers(isolation: Isolation) -> None:
         assert not called.is_set()
         spin([node], stop, linger=TIMEOUT / 20)
         assert called.is_set()
+        node.destroy_node()
+    finally:
+        try_shutdown()
+
+
+@pytest.mark.parametrize('fails', [False, True])
+def test_nodes_are_served_while_a_thread_works(isolation: Isolation, fails: bool) -> None:
+    """Its end ends both, and what it raises is raised where the nodes were served."""
+    rclpy.init(args=[], domain_id=isolation.domain_id)
+    try:
+        node = rclpy.create_node('spinner')
+        called, stop = threading.Event(), threading.Event()
+        node.create_timer(0.005, called.set)
+
+        def work() -> None:
+            assert called.wait(TIMEOUT)
+            if fails:
+                raise OSError('no disk')
+
+        if fails:
+            with pytest.raises(OSError, match='no disk'):
+                spin_beside(work, [node], stop, 'work')
+        else:
+            spin_beside(work, [node], stop, 'work')
+        assert stop.is_set()
         node.destroy_node()
     finally:
         try_shutdown()

@@ -25,7 +25,7 @@ from node_runner import (
     ParameterReader,
     refuse_misspelt,
     run_program,
-    spin,
+    spin_beside,
 )
 from quad_description import RobotState
 
@@ -90,11 +90,7 @@ class Parameters:
 
 
 class Replay:
-    """The node of a log that is replayed.
-
-    Attributes:
-        failure: Why it has ended; None for the end of the log, or when it was stopped.
-    """
+    """The node of a log that is replayed."""
 
     def __init__(self, node: Node, parameters: Parameters) -> None:
         """Build it.
@@ -102,7 +98,7 @@ class Replay:
         Raises:
             CommandError: The legs of the URDF cannot be read.
         """
-        self.failure: Exception | None = None
+        self._refusal: Exception | None = None
         self._node, self._parameters = node, parameters
         self._robot = ReplayedRobot(
             parameters.robot,
@@ -127,29 +123,24 @@ class Replay:
 
         Args:
             stop: Ends it; set at the end of the log.
+
+        Raises:
+            HardwareError: Somebody else publishes the same meanwhile.
+            PlaybackError: The log cannot be played to its end.
         """
         self._node.create_timer(WATCH_PERIOD, partial(self._look_for_robot, stop))
-        thread = threading.Thread(target=self._run, args=(stop,), name='replay', daemon=True)
-        thread.start()
-        try:
-            spin([self._node], stop)
-        finally:
-            stop.set()
-            thread.join()
+        spin_beside(partial(self._run, stop), [self._node], stop, 'replay')
+        if self._refusal is not None:
+            raise self._refusal
 
     def _run(self, stop: threading.Event) -> None:
         notify_ready()
-        try:
-            self._player.play(stop, loop=self._parameters.loop)
-        except Exception as error:  # noqa: BLE001  # it is raised in the thread that waits
-            self.failure = error
-        else:
-            self._node.get_logger().info(f'{self._parameters.log.name}: end of the log')
-        stop.set()
+        self._player.play(stop, loop=self._parameters.loop)
+        self._node.get_logger().info(f'{self._parameters.log.name}: end of the log')
 
     def _look_for_robot(self, stop: threading.Event) -> None:
         if found := other_nodes(self._node, _published_by(self._node), _own(self._node)):
-            self.failure = _refusal(found)
+            self._refusal = _refusal(found)
             stop.set()
 
     def _publish(self, state: RobotState) -> None:
@@ -196,8 +187,6 @@ def _serve(stop: threading.Event) -> None:
         replay = Replay(node, parameters)
         node.get_logger().info(f'replay of {parameters.log}')
         replay.play(stop)
-        if replay.failure is not None:
-            raise replay.failure
     finally:
         node.destroy_node()
 
