@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import importlib.util
 import io
 from pathlib import Path
@@ -31,12 +31,14 @@ OPTIONS = [
 ]
 SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
 PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
+TEXT_TIMEOUT = 5_000  # [ms] of a page that may hang
 PAGE_URL = r'the robot is seen at (http://localhost:\d+)$'
 """What a bring-up or demo prints of its page."""
 PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 330  # [px] width of the controls at the right
 TOP = 170  # [px] height of STOP and of messages
+_opened: list[Page] = []
 
 
 def url_of(robot: RunningProcess, timeout: float) -> str:
@@ -108,10 +110,21 @@ def asleep() -> Iterator[None]:
 def open_page(browser: Browser, url: str, **options: object) -> Page:
     """Open a page and wait until it shows the robot's controls."""
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
+    _opened.append(page)
     page.set_default_timeout(PAGE_TIMEOUT)
     page.goto(url)
     page.get_by_role('tab', name='Joints').wait_for()
     return page
+
+
+def texts() -> Iterator[str]:
+    """Yield what the pages that are open say, for whoever looks for the cause of a failure."""
+    from playwright.sync_api import Error
+
+    for page in _opened:
+        with suppress(Error):  # of one that was killed
+            if not page.is_closed():
+                yield page.locator('body').inner_text(timeout=TEXT_TIMEOUT)
 
 
 def picture(page: Page, name: str) -> bytes:
@@ -132,9 +145,15 @@ def colors_of_scene(png: bytes) -> int:
 
 def hold(page: Page, button: str) -> None:
     """Press a button of the panel with the mouse, and keep it pressed."""
-    # forced: it may just be made anew, and a busy machine draws too seldom to find it at rest
-    page.get_by_role('button', name=button, exact=True).hover(force=True)
-    page.mouse.down()
+    found = page.get_by_role('button', name=button, exact=True)
+    while True:
+        pressed = found.element_handle()
+        # forced: a busy machine draws too seldom for playwright to find out that something stands
+        found.hover(force=True)
+        page.mouse.down()
+        if pressed.evaluate('element => element.isConnected'):
+            return
+        page.mouse.up()  # it was made anew in between
 
 
 def drag(page: Page, slider: int, share: float) -> None:

@@ -76,10 +76,7 @@ class SimulatedArm:
 
     def init_all(self) -> float:
         """Initialise all joints at the same time; return how long that took in [s]."""
-        node = self.client.node
-        clients = [node.create_client(Trigger, f'/{joint}/init') for joint in self.joints]
-        for client in clients:
-            assert client.wait_for_service(20.0), client.srv_name
+        clients = [self.client.client_of(Trigger, f'/{joint}/init', 20.0) for joint in self.joints]
         begin = time.monotonic()
         futures = [client.call_async(Trigger.Request()) for client in clients]
         self.client.spin_until(lambda: all(f.done() for f in futures), 20.0, 'init of all joints')

@@ -17,6 +17,7 @@ import pytest
 from arm_canopen import DriveState, load_bus
 from canopen_sim import DeviceRunner, simulated_devices
 from canopen_tools.cli.main import main as canopen
+from first_motion import JointKind
 from robot_viewer.page.first_motion import Saw
 from robot_viewer.page.first_motion_panel import HOLD, PRESS_ANEW
 
@@ -116,14 +117,15 @@ def write_bus(folder: Path, per_turn: float) -> Path:
 
 
 def prepare(page: Page, distance: str) -> None:
-    """Have a motion prepared; nothing moves yet."""
+    """Have a motion prepared, of another distance than the one before; nothing moves yet."""
     # forced: a busy machine draws too seldom for playwright to find out that something stands
     page.get_by_role('tab', name=TAB).click(force=True)
     page.get_by_label('Distance [deg]').fill(distance)
     page.get_by_label('Speed [deg/s]').fill('2')
     page.keyboard.press('Tab')  # the number counts when it is left
     page.get_by_role('button', name=PREPARE).click(force=True)
-    page.get_by_text('only while you hold the button').wait_for()
+    moves = JointKind.TURNS.shown(math.radians(float(distance)))
+    page.get_by_text(f'It will move {moves},').wait_for()
 
 
 def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
@@ -136,7 +138,7 @@ def hold_beyond_the_end(page: Page, other: Page, joint: Joint) -> None:
     prepare(other, '2')
     joint.wait_for_rest()
     page.mouse.up()
-    prepare(page, '2')
+    prepare(page, '3')
     page.get_by_text('at rest').wait_for()
     joint.wait_for_rest()
     assert joint.angle == stood

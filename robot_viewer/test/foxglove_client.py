@@ -89,8 +89,7 @@ class FoxgloveClient:
         self.until(lambda: topic in self.channels, f'channel {topic}')
         number = next(self._numbers)
         self._subscribed[number] = topic
-        wanted = {'id': number, 'channelId': self.channels[topic]['id']}
-        self._send('subscribe', subscriptions=[wanted])
+        self._subscribe(number)
 
     def next_message(self, topic: str) -> Any:
         """Return the next message of a topic, decoded by the definition that the server sent."""
@@ -203,7 +202,14 @@ class FoxgloveClient:
         elif operation == 'connectionGraphUpdate':
             self.graph.append(message)
         elif operation == 'status':
-            self.statuses.append(message['message'])
+            self._take_status(message['message'])
+
+    def _take_status(self, text: str) -> None:
+        self.statuses.append(text)
+        for number, topic in self._subscribed.items():
+            # foxglove-sdk offers a channel before it knows it itself
+            if text == f'Unknown channel ID: {self.channels[topic]["id"]}':
+                self._subscribe(number)
 
     def _take_binary(self, data: bytes) -> None:
         kind = data[0]
@@ -217,6 +223,10 @@ class FoxgloveClient:
             request, status, length = struct.unpack_from('<IBI', data, 1)
             rest = data[10:]
             self._answers[request] = rest[:length].decode() if status else rest[length:]
+
+    def _subscribe(self, number: int) -> None:
+        wanted = {'id': number, 'channelId': self.channels[self._subscribed[number]]['id']}
+        self._send('subscribe', subscriptions=[wanted])
 
     def _send(self, operation: str, **values: object) -> None:
         self._socket.send(json.dumps({'op': operation, **values}))

@@ -161,7 +161,7 @@ def test_topics_come_as_they_are_while_somebody_wants_them(
     """With the definition, in which another decoder finds every field."""
     robot = rig.robot
     client.subscribe('/joint_states')
-    robot.until(lambda: robot.states.get_subscription_count() == 1, 'subscription')
+    client.until(lambda: robot.states.get_subscription_count() == 1, 'subscription')
     sent = JointState(name=['a', 'b'], position=[0.5, -1.0])
     sent.header.frame_id = 'base'
     sent.header.stamp.sec = 12
