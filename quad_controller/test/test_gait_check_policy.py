@@ -106,6 +106,20 @@ def test_a_wrong_contract_is_found_before_a_motor_moves(
     assert run([str(path), *TURN]) == (1 if kind in WRONG else 0), capsys.readouterr().out
 
 
+def test_a_term_that_a_walk_cannot_check_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The shipped policies hardly use the angular velocity; one that damps by it does."""
+    words = 'note: {} hardly counts'
+    for policy, term in (('trot_ppo', 'angular_velocity'), (SHIPPED, 'ang_vel')):
+        assert run([policy, *TURN]) == 0
+        output = capsys.readouterr().out
+        assert words.format(term) in output
+        assert 'note: gravity' not in output
+    assert run([str(damped(tmp_path / 'policy.onnx')), *TURN]) == 0
+    assert words.format('ang_vel') not in capsys.readouterr().out
+
+
 HISTORY = 6
 """Steps that a policy of the tests sees."""
 

@@ -5,8 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+import math
+
+import numpy as np
 
 from ..gait.velocity import Velocity
+from ..policy.contract.model import PolicyContract, Source
+from ..policy.network import Floats, Network
+from ..policy.observation import observed_places
 from .course import CourseFigures
 
 MAX_LACK, MAX_EXCESS = 0.5, 0.2
@@ -15,6 +21,9 @@ MAX_DRIFT = Velocity(0.04, 0.04, 0.1)
 """What a policy may be off along an axis in any case in [m/s] and [rad/s]."""
 MAX_SATURATION = 0.2
 """Share of the time that servos may be at their limits, where the gait's are not."""
+MIN_SHARE = 0.1
+"""Of how the actions vary, that a term has to be worth to be seen on a walk."""
+TINY = 1e-6
 LATENCY_GOAL, JITTER_GOAL = 0.003, 0.002
 """Of commands on the wire with real-time priority: median and 99th percentile in [s]."""
 
@@ -33,6 +42,36 @@ def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
         else:
             hint = 'too far: look at its scales, and at the frame of the IMU'
         yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
+
+
+def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -> Iterator[str]:
+    """Yield which terms count so little that a walk cannot tell whether they are right.
+
+    Args:
+        network: Of the policy; one without memory.
+        contract: What it observes.
+        observed: What it saw on a walk, an observation in each row.
+    """
+    plain = _answers(network, observed)
+    usual = math.sqrt(float(plain.var(0).mean()))
+    places = observed_places(contract) % sum(term.width for term in contract.terms)
+    start = 0
+    for term in contract.terms:
+        mine = (places >= start) & (places < start + term.width)
+        start += term.width
+        if term.source is Source.CONSTANT:
+            continue
+        negated = _answers(network, np.where(mine, -observed, observed))
+        share = math.sqrt(float(((negated - plain) ** 2).mean())) / max(usual, TINY)
+        if share < MIN_SHARE:
+            yield (
+                f'{term.name} hardly counts (negated, it changes the actions by {share:.0%} of '
+                'how they vary): a walk cannot tell whether its frame, sign and scale are right'
+            )
+
+
+def _answers(network: Network, observed: Floats) -> Floats:
+    return np.concatenate([network.run(row[np.newaxis]) for row in observed])
 
 
 def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:

@@ -21,6 +21,7 @@ from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
 from ..policy.load import load_policy, LoadedPolicy
+from ..policy.network import OnnxNetwork
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
 from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
@@ -36,7 +37,14 @@ from .findings import (
     tracking_table,
 )
 from .html_report import html_report
-from .judgement import against_gait, astray, is_too_late, timing_notes, velocity_text
+from .judgement import (
+    against_gait,
+    astray,
+    is_too_late,
+    timing_notes,
+    unseen_terms,
+    velocity_text,
+)
 from .walk import walk
 
 SERVOS = ('firm', 'vendor_rl')
@@ -217,6 +225,9 @@ def _walk(
     if trouble := walked.trouble or '; '.join(astray(walked.velocity, velocity)):
         found.reasons.append(trouble)
         _print(f'it did not go well: {trouble}')
+    elif not loaded.contract.recurrence:
+        network = OnnxNetwork(find_policy(options.policy))
+        found.notes += unseen_terms(network, loaded.contract, walked.observed)
 
 
 def _weaker(swept: Swept) -> list[str]:

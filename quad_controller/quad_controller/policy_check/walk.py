@@ -15,6 +15,7 @@ from ..exceptions import QuadControllerError
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy
+from ..policy.network import Floats
 from ..states.controller import Controller
 from ..states.modes import State
 from ..states.parameters import StateParameters
@@ -33,11 +34,13 @@ class Walked:
         velocity: Mean velocity in the robot's own frame.
         tilt: Largest angle between the body's z axis and up in [rad].
         trouble: Why it ended early; empty when it did not.
+        observed: What the policy saw, an observation in each row.
     """
 
     velocity: Velocity
     tilt: float
     trouble: str
+    observed: Floats
 
 
 class WalkingRobot:
@@ -47,6 +50,7 @@ class WalkingRobot:
         controller: The controller.
         tilt: Largest tilt so far in [rad].
         travelled: Way and turning so far, in the robot's own frame, in [m] and [rad].
+        observed: What the policy saw so far.
     """
 
     def __init__(
@@ -84,6 +88,7 @@ class WalkingRobot:
         """Count way, tilt and targets from now on."""
         self.tilt = 0.0
         self.travelled = REST
+        self.observed: list[Floats] = []
         self._targets: list[np.ndarray] = []
         self._bends, self._bend_count = 0.0, 0
 
@@ -143,6 +148,8 @@ class WalkingRobot:
         passed = self._state.time - before.time  # a report may have been lost
         self._dt = passed if passed > 0.0 else self._backend.period
         self._add_way(before, self._state)
+        if output.asked is not None and output.asked.answer.observation is not None:
+            self.observed.append(output.asked.answer.observation[0])
         if output.targets is not None:
             self._add_targets(np.array(output.targets))
 
@@ -182,8 +189,10 @@ def walk(
     try:
         walker.stand_up()
     except QuadControllerError as error:
-        return Walked(REST, walker.tilt, str(error))
+        return Walked(REST, walker.tilt, str(error), np.array(walker.observed))
     walker.run(SETTLE_TIME, velocity)
     walker.travelled = REST
+    walker.observed.clear()
     walker.run(duration, velocity)
-    return Walked(walker.travelled.scaled(1.0 / duration), walker.tilt, walker.trouble)
+    went, observed = walker.travelled.scaled(1.0 / duration), np.array(walker.observed)
+    return Walked(went, walker.tilt, walker.trouble, observed)
