@@ -73,6 +73,26 @@ def link_poses(tree: KinematicTree, positions: Mapping[str, float]) -> dict[str,
     return poses
 
 
+def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
+    """Return a path of each link, below that of the link it hangs on; parents come first.
+
+    Args:
+        tree: The robot.
+        base: Path above the root link.
+    """
+    paths = {tree.root: f'{base}/{tree.root}'}
+    waiting = list(tree.joints)
+    while waiting:  # a joint may stand before the one that its parent hangs on
+        later: list[Joint] = []
+        for joint in waiting:
+            if joint.parent in paths:
+                paths[joint.child] = f'{paths[joint.parent]}/{joint.child}'
+            else:
+                later.append(joint)
+        waiting = later
+    return paths
+
+
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
     """Return the links that joints move.
 

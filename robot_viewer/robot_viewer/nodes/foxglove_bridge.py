@@ -9,7 +9,7 @@ import threading
 
 from node_runner import log_as, notify_ready, run_program, spin
 
-from ..foxglove import BridgeError
+from ..exceptions import BridgeError
 
 NAME = 'foxglove_bridge'
 NICENESS = 10

@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-import trimesh
 from urdf_reader import (
     DescriptionError,
-    find_mesh,
     Joint,
     KinematicTree,
     MeshFileError,
@@ -23,10 +21,10 @@ from urdf_reader import (
 )
 from viser import FrameHandle, SceneApi, SceneNodeHandle
 
+from ..link_poses import link_paths
+from ..shapes import Meshes, PLAIN, shapes_of
 from ..state_publisher import joint_transform
 
-PLAIN = (0.7, 0.72, 0.75, 1.0)
-"""Color of what the description gives none."""
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
 """Red, green, blue and opacity from 0 to 1."""
@@ -87,7 +85,7 @@ class RobotScene:
         tree: KinematicTree,
         folder: Path | None = None,
         look: Look | None = None,
-        meshes: dict[Path, trimesh.Trimesh] | None = None,
+        meshes: Meshes | None = None,
     ) -> None:
         """Show the robot, each joint at zero or the limit next to it.
 
@@ -100,13 +98,13 @@ class RobotScene:
         """
         look = look or Look()
         self.notes: list[str] = []
-        self._scene, self._tree, self._folder = scene, tree, folder
+        self._scene, self._tree = scene, tree
         self._links, self._tint = look.links or frozenset(tree.links), look.tint
-        self._meshes = {} if meshes is None else meshes
+        self._meshes = meshes or Meshes(folder)
         self._movable = {joint.name: joint for joint in tree.movable()}
         self._base = scene.add_frame(look.path, show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
-        self._paths = {tree.root: f'{look.path}/{tree.root}'}
+        self._paths = link_paths(tree, look.path)
         scene.add_frame(self._paths[tree.root], show_axes=False)
         self._add_joints()
         self._add_shapes()
@@ -146,7 +144,7 @@ class RobotScene:
             tint: Their color.
         """
         look = Look(f'{ROOT}/ghost', links, tint)
-        return RobotScene(self._scene, self._tree, self._folder, look, self._meshes)
+        return RobotScene(self._scene, self._tree, look=look, meshes=self._meshes)
 
     def show(self, *, seen: bool) -> None:
         """Let it be seen, or not."""
@@ -166,17 +164,12 @@ class RobotScene:
         self._base.remove()
 
     def _add_joints(self) -> None:
-        waiting = list(self._tree.joints)
-        while waiting:  # a joint may stand before the one that its parent hangs on
-            later: list[Joint] = []
-            for joint in waiting:
-                if joint.parent not in self._paths:
-                    later.append(joint)
-                    continue
-                path = self._paths[joint.child] = f'{self._paths[joint.parent]}/{joint.child}'
-                frame = self._frames[joint.name] = self._scene.add_frame(path, show_axes=False)
-                put(frame, joint.origin)
-            waiting = later
+        joints = {joint.child: joint for joint in self._tree.joints}
+        for link, path in self._paths.items():
+            if link in joints:
+                frame = self._scene.add_frame(path, show_axes=False)
+                put(frame, joints[link].origin)
+                self._frames[joints[link].name] = frame
 
     def _reach(self, link: str) -> float:
         below = (joint for joint in self._tree.joints if joint.parent == link)
@@ -186,10 +179,7 @@ class RobotScene:
 
     def _add_shapes(self) -> None:
         missing: dict[str, list[str]] = {}
-        shown = {each.link for each in self._tree.visuals()}
-        shapes = [*self._tree.visuals()]
-        shapes += [each for each in self._tree.collisions() if each.link not in shown]
-        shapes = [each for each in shapes if each.link in self._links]
+        shapes = [each for each in shapes_of(self._tree) if each.link in self._links]
         for number, shape in enumerate(shapes):
             try:
                 self._add_shape(f'{self._paths[shape.link]}/shape{number}', shape)
@@ -221,14 +211,7 @@ class RobotScene:
     def _add_mesh(
         self, name: str, shape: UrdfShape, rgb: tuple[int, int, int], opacity: float | None
     ) -> SceneNodeHandle:
-        path = find_mesh(shape.attributes.get('filename', ''), self._folder)
-        mesh = self._meshes.get(path) or trimesh.load(path, force='mesh')
-        scale = shape.lengths('scale') if 'scale' in shape.attributes else (1.0, 1.0, 1.0)
-        if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-            raise MeshFileError(f'{path}: no triangles')
-        self._meshes[path] = mesh
-        (x, y, z) = scale
-        whole = (x, y, z)
+        mesh, whole = self._meshes.read(shape)
         plain = shape.color is not None or self._tint is not None
         if not plain and mesh.visual is not None and mesh.visual.defined:
             return self._scene.add_mesh_trimesh(name, mesh, scale=whole)

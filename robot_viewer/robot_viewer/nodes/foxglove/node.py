@@ -18,7 +18,7 @@ from rosgraph_msgs.msg import Clock
 
 from node_runner import destroyed_when_refused
 
-from ...foxglove import BridgeError
+from ...exceptions import BridgeError
 from ...foxglove.admission import Admission
 from ...foxglove.assets import Assets
 from ...foxglove.relay import hidden_address, Relay
