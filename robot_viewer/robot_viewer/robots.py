@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 DESCRIPTION = '/robot_description'
 """What each robot has in its namespace."""
+SET_NMT_TYPE, SET_MODE_TYPE = 'canopen_interfaces/srv/CONmtID', 'quad_msgs/srv/SetMode'
+"""Of services that only a master of drives has, and only the controller of a walking robot."""
 
 
 def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> list[str]:
@@ -27,3 +29,16 @@ def of_robot(description: str, topics: Iterable[str], nodes: Iterable[str]) -> l
         return max(above, key=len, default=None)
 
     return sorted(node for node in set(nodes) if nearest(node) == own)
+
+
+def stops_robot(node: str, services: Mapping[str, Collection[str]]) -> bool:
+    """Return whether the `stop` of a node is that of a robot: it leads drives, or legs.
+
+    Args:
+        node: Its full name.
+        services: Names and types of what it offers.
+    """
+    beside = node.rpartition('/')[0]
+    return SET_NMT_TYPE in services.get(f'{node}/set_nmt', ()) or SET_MODE_TYPE in services.get(
+        f'{beside}/set_mode', ()
+    )

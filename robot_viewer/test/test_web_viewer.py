@@ -5,19 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
+import threading
 from typing import Any
 
+from canopen_interfaces.srv import CONmtID
 from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
 import pytest
 import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.service import Service
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
+from std_srvs.srv import Empty, Trigger
 from urdf_robots import ARM
 
 from node_runner import make_executor
@@ -58,7 +63,8 @@ class Robot:
         self._executor.add_node(self.viewer)
 
     def offer_stop(self) -> Service:
-        """Offer to stop all of it."""
+        """Offer to stop all of it, as a master does."""
+        self.node.create_service(CONmtID, '~/set_nmt', lambda _, response: response)
         return self.node.create_service(Trigger, 'stop', self._answer('stop'))
 
     def called_until_enable(self) -> list[str]:
@@ -139,6 +145,75 @@ def test_stop_calls_one_service_that_stops_all(robot: Robot) -> None:
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
     robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
+
+
+@contextmanager
+def conveyor(isolation: Isolation, kind: Any) -> Iterator[list[Any]]:
+    """Run a process's worth of somebody else with a service `stop`; yield what it was asked."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=isolation.domain_id)
+    node, asked = Node('conveyor', context=context), []
+
+    def answer(request: Any, response: Any) -> Any:
+        asked.append(request)
+        return response
+
+    node.create_service(kind, 'stop', answer)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    try:
+        yield asked
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize('kind', [Trigger, Empty])
+def test_a_stop_of_somebody_else_leaves_no_drive_moving(
+    robot: Robot, isolation: Isolation, monkeypatch: pytest.MonkeyPatch, kind: Any
+) -> None:
+    """Each drive is halted, whatever type it has; also beside a master, unless it has another."""
+    reports: list[str] = []
+    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: reports.append(text))
+    robot.node.create_client(Trigger, 'stop')  # as keyboards have one
+    halts = ['joint1/halt', 'joint2/halt']
+    is_asked = kind is Trigger
+
+    def stopped() -> list[str]:
+        robot.viewer.stop()
+        return robot.called_until_enable()
+
+    def reached() -> bool:  # the connection with the first server hides that with the second
+        robot.viewer.stop()
+        return 'stop' in robot.calls
+
+    def named() -> int:
+        return sum(
+            each.startswith('/stop: offered by /conveyor, which leads neither') for each in reports
+        )
+
+    with conveyor(isolation, kind) as asked:
+        robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
+        robot.spin_until(lambda: robot.node.count_services('/stop') == 1, 'its server')
+        robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+        client = robot.viewer._trigger_clients['/stop']
+        robot.spin_until(lambda: client.service_is_ready() or not is_asked, 'a connection')
+        assert stopped() == halts
+        assert named() == is_asked
+        robot.spin_until(lambda: bool(asked) or not is_asked, 'the request')
+        robot.offer_stop()
+        robot.spin_until(lambda: robot.node.count_services('/stop') == 2, 'the master')
+        robot.spin_until(client.service_is_ready, 'a connection')
+        robot.spin_until(reached, 'the stop')
+        assert set(robot.called_until_enable()) == {*(halts if is_asked else ()), 'stop'}
+        assert (named() > 1) is is_asked
+        assert is_asked or not asked
+    robot.spin_until(lambda: robot.node.count_services('/stop') == 1, 'the end of the other one')
+    assert stopped() == ['stop']
 
 
 def test_who_does_not_look_takes_no_messages(

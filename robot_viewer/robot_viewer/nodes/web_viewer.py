@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 import threading
@@ -16,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
 from rclpy.client import Client
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 from rclpy.task import Future
@@ -39,7 +40,7 @@ from node_runner import (
 
 from ..page.robot_page import RobotPage, Status, Twist, Velocity
 from ..page.robot_scene import greatest_velocities
-from ..robots import of_robot
+from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
 from .controllers import Controllers
 from .first_motion import FirstMotion
@@ -69,7 +70,6 @@ DRIVE_SERVICES = (
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
 WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax')
-SET_MODE_TYPE = 'quad_msgs/srv/SetMode'
 TRIGGER = 'std_srvs/srv/Trigger'
 STOP = 'stop'
 """Service of a robot that stops all of it."""
@@ -317,12 +317,37 @@ class WebViewer(Node):
         self._controllers.stop()
         self._first_motion.stop()
         called = {service for service in self._stops if self._call(service)}
+        doubtful = self._doubtful_stops(called)
         for drive in self._drives:
-            if _stop_beside(drive) not in called:  # of another master than ours, or it is gone
+            if _stop_beside(drive) not in called - doubtful.keys():
                 self._call(f'{drive}/halt')
+        for service, others in doubtful.items():
+            who = ', '.join(others) or 'a node that the graph does not show'
+            text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
+            self._report(service, f'{text}, too. Give that service another name', failed=True)
         self._planning.stop()
         if not self._drives and not self._stops:
             self.page.say('STOP: nothing here offers to be stopped', failed=True)
+
+    def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
+        """Return those that are not a robot's own alone, with the other nodes that offer them.
+
+        Args:
+            services: Names of services that were called to stop a robot.
+        """
+        own, others = set[str](), {service: list[str]() for service in services}
+        for name, namespace in self.get_node_names_and_namespaces():
+            node = f'{namespace.rstrip("/")}/{name}'
+            with suppress(NodeNameNonExistentError):  # it has just gone
+                offered = dict(self.get_service_names_and_types_by_node(name, namespace))
+                for service in offered.keys() & others.keys():
+                    if TRIGGER not in offered[service]:
+                        continue  # it is not asked
+                    if stops_robot(node, offered):
+                        own.add(service)
+                    else:
+                        others[service].append(node)
+        return {name: nodes for name, nodes in others.items() if nodes or name not in own}
 
     def _client(self, service: str) -> Client:
         if service not in self._trigger_clients:
