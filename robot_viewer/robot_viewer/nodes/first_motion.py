@@ -123,6 +123,7 @@ class FirstMotion:
         self._axis: Axis | None = None
         self._asking: tuple[str, float] | None = None  # which service, and until when
         self._disabling: Disabling | None = None
+        self._unconfirmed: Disabling | None = None  # what the page shows of one that was late
         self._seen_at = -math.inf  # when a position of the joint came
         self._enabled: tuple[float, Status | None] | None = None  # when, and the status before
         self._targets: GuardedTargets | None = None
@@ -219,7 +220,7 @@ class FirstMotion:
         """Forget what was prepared and measured."""
         self._attempt += 1
         self._asking = self._enabled = self._targets = self._rests_at = self._reported = None
-        self._judgement = self._correction = None
+        self._judgement = self._correction = self._unconfirmed = None
 
     def _forget(self) -> None:
         self._end()
@@ -369,7 +370,8 @@ class FirstMotion:
         """Go on; called 30 times a second."""
         now = time.monotonic()
         if self._disabling is not None and now > self._disabling.deadline:
-            self._report_disabling(f'no answer within {DISABLE_TIMEOUT:g} s')
+            refusal = f'no answer within {DISABLE_TIMEOUT:g} s'
+            self._report_disabling(self._disabling, refusal)
         if self._asking is not None:
             name, until = self._asking
             if now > until:
@@ -411,19 +413,20 @@ class FirstMotion:
         self._disabling = disabling
 
         def answered(_response: Any, refusal: str) -> None:  # noqa: ANN401
-            if self._disabling is disabling:
-                self._report_disabling(refusal)
+            self._report_disabling(disabling, refusal)
 
         self._call(Trigger, 'shutdown', answered)
 
-    def _report_disabling(self, refusal: str) -> None:
-        disabling, self._disabling = self._disabling, None
-        if disabling is None:
-            return
-        what = 'the drive is disabled'
+    def _report_disabling(self, disabling: Disabling, refusal: str) -> None:
+        """Report what became of it; an answer that comes late corrects what is shown."""
+        late = self._disabling is not disabling
+        what = 'the drive is disabled' + (', it answered late' if late else '')
         if refusal:
             what = f'NOT confirmed that it is disabled: use the emergency stop ({refusal})'
-        self._begin(f'{disabling.joint}: {disabling.why}; {what}', failed=True)
+        if not late:
+            self._disabling, self._unconfirmed = None, disabling
+        if self._unconfirmed is disabling:  # else the page shows what came after it
+            self._begin(f'{disabling.joint}: {disabling.why}; {what}', failed=True)
         text = f'first motion of {disabling.joint}: {what}'
         if refusal:
             self._node.get_logger().error(text)
