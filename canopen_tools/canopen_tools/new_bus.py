@@ -7,27 +7,31 @@ What an EDS leaves open is not guessed: the caller gives it, or learns what is m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 import json
-import math
 
-from arm_canopen.config.model.checks.drive_units import is_coarse
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from arm_canopen.config.model.factor_group import FACTOR_OBJECTS
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.read.eds import Eds
 from arm_canopen.config.resolve.pdo_mapping import is_fixed, mapping_slots
-from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.datatypes import bit_length
-from arm_canopen.standard.device_profile import is_drive, profile_number
+from arm_canopen.standard.device_profile import profile_number
 from arm_canopen.standard.dictionary import ObjectEntry
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.objects import AXIS_OFFSET, Index, PDO_BITS_MAX
 from arm_canopen.standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
 
-from .si_unit import position_unit, SI_UNIT_POSITION, SI_UNIT_VELOCITY, velocity_unit
+from .new_device import (
+    contradiction,
+    NewBusError,
+    NewDevice,
+    said_units,
+    says_units,
+    TURN,
+    velocity_scale,
+)
 
 POSITION_MODES = (
     OperationMode.CYCLIC_POSITION,
@@ -37,78 +41,6 @@ POSITION_MODES = (
 """Modes for arms, the best one first: set-points of each cycle, else moves of the drive's own."""
 HEARTBEAT_MS = 1000
 """Time between two heartbeats of a device in [ms]."""
-TURN = 2.0 * math.pi
-"""A turn in [rad]."""
-
-
-class NewBusError(CanopenError):
-    """No bus.yml can be made of this; the message names the device and what is missing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Units:
-    """How far an increment is, as somebody has said.
-
-    Attributes:
-        scale: Increments of the drive per rad or m of the joint; negative for the other direction.
-        said: The same in words.
-        slides: The joint slides, so that the scale is per m.
-        velocity: Velocity units of the drive per rad/s or m/s; None where nobody has said it.
-        velocity_said: The same in words.
-    """
-
-    scale: float
-    said: str
-    slides: bool = False
-    velocity: float | None = None
-    velocity_said: str = ''
-
-
-@dataclass(frozen=True, slots=True)
-class NewDevice:
-    """A device of the new bus.
-
-    Attributes:
-        name: Its name; that of the joint, for a drive.
-        node_id: Its node id.
-        eds: Its EDS.
-        mode: Mode of operation; None takes the best one that the EDS names.
-        units: Units of the joint; None where the factor group says them.
-        rpm: Turns of what the drive counts in rpm for one turn or 1 m of the joint; None where it
-            has another unit of velocity.
-        values: What the device itself holds, by index and sub-index; it counts before the
-            defaults of its EDS.
-        found: Who it is and why it has this EDS, where it was found on a bus; else empty.
-    """
-
-    name: str
-    node_id: int
-    eds: Eds
-    mode: OperationMode | None = None
-    units: Units | None = None
-    rpm: float | None = None
-    values: Mapping[tuple[int, int], int] = field(default_factory=dict)
-    found: str = ''
-
-    @property
-    def is_drive(self) -> bool:
-        """Whether it is a CiA 402 drive."""
-        return is_drive(self.eds.dictionary)
-
-    @property
-    def has_open_units(self) -> bool:
-        """Whether neither its EDS nor anybody says how far an increment of its joint is."""
-        return self.is_drive and _said_units(self) is None and not _says_units(_factors(self))
-
-    def number(self, index: int, subindex: int = 0) -> int:
-        """Return what an object holds, by the device or else the EDS; 0 where nobody says it."""
-        entry = self.eds.dictionary.get(index, subindex)
-        default = entry.default if entry is not None else 0
-        return self.values.get((index, subindex), default if isinstance(default, int) else 0)
-
-    def source(self, *indices: int) -> str:
-        """Return who says what these objects hold, in words."""
-        return 'the drive' if any(index in indices for index, _ in self.values) else 'the EDS'
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,9 +192,9 @@ def _interpolation(device: NewDevice, period_ms: int) -> Iterator[str]:
 def _units(device: NewDevice) -> Iterator[str]:
     if not device.is_drive:
         return
-    factors, units = _factors(device), _said_units(device)
+    factors, units = device.factors, said_units(device)
     if units is not None:
-        velocity, why = _velocity(device, units, factors)
+        velocity, why = velocity_scale(device, units)
         yield f'scale_pos_to_dev: {units.scale!r}  # {units.said}'
         yield f'scale_pos_from_dev: {1.0 / units.scale!r}'
         yield f'scale_vel_to_dev: {velocity!r}  # {why}'
@@ -270,109 +202,20 @@ def _units(device: NewDevice) -> Iterator[str]:
         if units.scale < 0.0:
             yield 'scale_eff_to_dev: -1.0  # torque turns with the position'
             yield 'scale_eff_from_dev: -1.0'
-        if device.units is None and (doubt := _contradiction(device, units, factors)):
+        if doubt := contradiction(device, units):
             yield f'# {doubt}'
-    elif _says_units(factors):
+    elif says_units(factors):
         turn, source = factors.position_scale * TURN, device.source(*FACTOR_OBJECTS.values())
         yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by {source}'
     else:
+        eds = device.eds.path.name
+        speaker = f'neither the drive nor {eds} does' if device.found else f'{eds} does'
         raise NewBusError(
-            f'{device.name}: {_speaker(device)} not say how far an increment of the joint'
+            f'{device.name}: {speaker} not say how far an increment of the joint'
             ' is (0x608F or 0x6092, with the gear in 0x6091); give'
             f' --turn {device.name}=INCREMENTS for a turn of the joint with its gear, or'
             f' --metre {device.name}=INCREMENTS'
         )
-
-
-def _says_units(factors: FactorGroup) -> bool:
-    """Whether a factor group says what a turn of the joint is: with its gear, and not 1 to 1."""
-    scale = factors.position_scale
-    return factors.gear is not None and bool(scale) and not is_coarse(scale)
-
-
-def _speaker(device: NewDevice) -> str:
-    name = device.eds.path.name
-    return f'neither the drive nor {name} does' if device.found else f'{name} does'
-
-
-def _factors(device: NewDevice) -> FactorGroup:
-    """Return the factor group by what the drive holds, else by the defaults of its EDS."""
-
-    def value(index: Index) -> float | None:
-        return ratio(device.number(index, 1), device.number(index, 2))
-
-    return FactorGroup(**{name: value(index) for name, index in FACTOR_OBJECTS.items()})
-
-
-def _said_units(device: NewDevice) -> Units | None:
-    """Return the units that somebody has said, else those that the drive names; None for none.
-
-    What it names in 0x60A8 and 0x60A9 counts where it was read from the drive: in an EDS these are
-    defaults that the maker changes by parameters.
-    """
-    units = device.units or _named_units(device)
-    if units is not None and device.rpm is not None:
-        return _in_rpm(units, device.rpm)
-    velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0)))
-    if units is None or velocity is None or velocity.slides is not units.slides:
-        return units
-    said = f'0x60A9 of the drive: its unit is {velocity.text}'
-    return replace(units, velocity=1.0 / velocity.size, velocity_said=said)
-
-
-def _in_rpm(units: Units, turns: float) -> Units:
-    """Return units with velocities in rpm; a joint has `turns` of the motor a turn or m."""
-    per, one = (1.0, '1 m') if units.slides else (TURN, 'one turn')
-    formula = f'60 * {turns:g}' + ('' if units.slides else ' / (2 pi)')
-    said = f'rpm, {turns:g} turns for {one} of the joint, as said: {formula}'
-    return replace(units, velocity=60.0 * turns / per, velocity_said=said)
-
-
-def _named_units(device: NewDevice) -> Units | None:
-    """Return the units that are written out, as the master does not read them from the drive."""
-    position = position_unit(device.values.get((SI_UNIT_POSITION, 0)))
-    if position is not None:
-        per = 'm' if position.slides else 'rad'
-        said = f'0x60A8 of the drive: its unit is {position.text}; per {per}'
-        return Units(1.0 / position.size, said, position.slides)
-    names_velocity = velocity_unit(device.values.get((SI_UNIT_VELOCITY, 0))) is not None
-    factors = _factors(device)
-    is_written = names_velocity or device.rpm is not None or _has_unlisted(device)
-    if not is_written or not _says_units(factors):
-        return None
-    source = device.source(*FACTOR_OBJECTS.values())
-    return Units(factors.position_scale, f'0x608F, 0x6091, 0x6092 of {source}; per rad')
-
-
-def _has_unlisted(device: NewDevice) -> bool:
-    """Whether the drive has ratios that its EDS lacks, so that the master would not read them."""
-    known = device.eds.dictionary
-    return any(
-        (index, 1) in device.values and known.get(index, 1) is None
-        for index in FACTOR_OBJECTS.values()
-    )
-
-
-def _velocity(device: NewDevice, units: Units, factors: FactorGroup) -> tuple[float, str]:
-    if units.velocity is not None:
-        return math.copysign(units.velocity, units.scale), units.velocity_said
-    if factors.velocity_factor:
-        source = device.source(Index.VELOCITY_FACTOR)
-        return units.scale * factors.velocity_factor, f'by 0x6096 of {source}'
-    turns = '60 * turns per m' if units.slides else '60 * turns of the motor per turn / (2 pi)'
-    said = 'increments per second, where the manual says nothing else'
-    return units.scale, f'{said}; rpm: {turns}, by --rpm {device.name}=TURNS'
-
-
-def _contradiction(device: NewDevice, units: Units, factors: FactorGroup) -> str:
-    """Return what to look at where 0x60A8 and the factor group differ; else nothing."""
-    by_factors = factors.position_scale
-    if not _says_units(factors) or math.isclose(units.scale, by_factors, rel_tol=0.01):
-        return ''
-    return (
-        f'its factor group has {by_factors:g} per rad: try which it is, canopen first-motion'
-        f' bus.yml {device.name}'
-    )
 
 
 def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:

@@ -7,6 +7,7 @@ Bits 24 to 31 are a power of ten, 16 to 23 the unit of the position, 8 to 15 tha
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
@@ -28,11 +29,13 @@ class LengthUnit:
         size: In [rad] or [m].
         name: Its name.
         slides: It is one of a joint that slides.
+        counts: It is an increment: the size is one of these, and nobody knows how far that is.
     """
 
     size: float
     name: str
     slides: bool = False
+    counts: bool = False
 
 
 POSITIONS: dict[int, LengthUnit] = {
@@ -44,6 +47,8 @@ POSITIONS: dict[int, LengthUnit] = {
     0xB4: LengthUnit(2.0 * math.pi, 'turns'),
 }
 """Units that say how far they are; increments (0xB5) and steps (0xAC) do not."""
+VELOCITIES = {**POSITIONS, 0xB5: LengthUnit(1.0, 'increments', counts=True)}
+"""Those of velocities, for which it matters that they are increments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,36 +56,45 @@ class NamedUnit:
     """What one unit of a drive is.
 
     Attributes:
-        size: In [rad] or [m], or per second.
+        size: In [rad], [m] or [inc], or per second.
         text: In words.
         slides: It is one of a joint that slides.
+        counts: It is made of increments.
     """
 
     size: float
     text: str
-    slides: bool
+    slides: bool = False
+    counts: bool = False
+
+
+RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')
+"""What many drives count velocities in."""
 
 
 def position_unit(value: int | None) -> NamedUnit | None:
     """Return what 0x60A8 says; None where it is not there, or says nothing about a joint."""
     if value is None or (value >> 8) & 0xFF:
         return None
-    return _named(value, 1.0, '')
+    return _named(value, POSITIONS, 1.0, '')
 
 
 def velocity_unit(value: int | None) -> NamedUnit | None:
-    """Return what 0x60A9 says; None where it is not there, or says nothing about a joint."""
+    """Return what 0x60A9 says, also increments; None where it is not there, or says nothing."""
     time = None if value is None else TIMES.get((value >> 8) & 0xFF)
     if value is None or time is None:
         return None
-    return _named(value, time[0], f'/{time[1]}')
+    return _named(value, VELOCITIES, time[0], f'/{time[1]}')
 
 
-def _named(value: int, seconds: float, suffix: str) -> NamedUnit | None:
-    unit = POSITIONS.get((value >> 16) & 0xFF)
+def _named(
+    value: int, units: Mapping[int, LengthUnit], seconds: float, suffix: str
+) -> NamedUnit | None:
+    unit = units.get((value >> 16) & 0xFF)
     if unit is None:
         return None
     prefix = (value >> 24) & 0xFF
     exponent = prefix - 0x100 if prefix >= 0x80 else prefix
     factor = 10.0**exponent
-    return NamedUnit(factor * unit.size / seconds, f'{factor:g} {unit.name}{suffix}', unit.slides)
+    size, text = factor * unit.size / seconds, f'{factor:g} {unit.name}{suffix}'
+    return NamedUnit(size, text, unit.slides, unit.counts)

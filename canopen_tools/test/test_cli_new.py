@@ -167,6 +167,71 @@ def test_a_drive_that_counts_in_rpm_follows(
         assert drive.position == pytest.approx(0.5, abs=0.01)
 
 
+RPM, TENTHS, DEGREES, METRES, COUNTS = (
+    Row(0x60A9, 0, 'SI unit velocity', 7, 'rw', value)
+    for value in ('0x00B44700', '0xFFB44700', '0x00410300', '0x00010300', '0x00B50300')
+)
+FACTOR = (
+    Row(0x6096, 0, 'Highest sub-index', 5, 'const', '2'),
+    Row(0x6096, 1, 'Numerator', 7, 'rw', '60'),
+    Row(0x6096, 2, 'Divisor', 7, 'rw', '4096'),
+)
+A_TURN = 628_318.5  # [inc] by the factor group of the sample
+
+
+@pytest.mark.parametrize(
+    ('rows', 'options', 'velocity', 'words'),
+    [
+        # the factor group says what the joint is in increments, and a turn is one of the joint
+        ([RPM], [], 60 / TURN, '0x60A9 of the EDS: its unit is 1 turns/min'),
+        ([DEGREES], [], 360 / TURN, '1 deg/s'),
+        ([RPM], ['--turn', f'arm=-{A_TURN}'], -60 / TURN, '1 turns/min'),
+        # somebody else says it, and what turns so fast
+        ([RPM], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 60 / TURN, '# rpm, 26 turns'),
+        ([TENTHS], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 600 / TURN, '0.1 turns/min by'),
+        ([RPM], ['--metre', 'arm=5000', '--rpm', 'arm=20'], 20 * 60, '# rpm, 20 turns for 1 m'),
+        ([METRES], ['--metre', 'arm=5000'], 1.0, '1 m/s'),
+        ([COUNTS], ['--turn', 'arm=-1000'], -1000 / TURN, '0x60A9 of the EDS: its unit is 1 incr'),
+        # 0x6096 that agrees, and 0x60A9 that is overruled
+        ([RPM, *FACTOR], ['--turn', 'arm=4096', '--rpm', 'arm=1'], 60 / TURN, '# rpm, 1 turns'),
+        ([COUNTS], ['--turn', 'arm=1000', '--rpm', 'arm=2'], 120 / TURN, 'has 1 increments/s'),
+    ],
+)
+def test_velocity_is_in_the_unit_that_the_eds_names(
+    *, rows: Sequence[Row], options: Sequence[str], velocity: float, words: str, tmp_path: Path
+) -> None:
+    """In 0x60A9, with the reason behind the scale."""
+    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, *rows]), tmp_path / 'bus.yml'
+    assert main(['new', f'arm={eds}@5', *options, '--output', str(bus_yml)]) == 0
+    (node,) = load_bus(bus_yml).nodes
+    assert node.drive.scale_vel_to_dev == pytest.approx(velocity)
+    assert node.drive.scale_vel_from_dev == pytest.approx(1 / velocity)
+    (line,) = re.findall('scale_vel_to_dev.*', bus_yml.read_text())
+    assert words in line
+
+
+def test_an_epos4_is_asked_for_its_gear(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its EDS says rpm; with the gear the scales are those of the bus.yml that is shipped."""
+    monkeypatch.chdir(tmp_path)
+    folder = REPOSITORY / 'tests' / 'drives' / 'epos4'
+    new = ['new', f'shoulder={folder / "epos4_objects.eds"}@1', '--turn', 'shoulder=83200']
+    assert main(new) != 0
+    assert 'give --rpm shoulder=TURNS' in capsys.readouterr().err
+    assert main([*new, '--rpm', 'shoulder=26']) == 0
+    (made,), shipped = load_bus(Path('bus.yml')).nodes, load_bus(folder / 'bus.yml').nodes[0]
+    assert made.drive.scale_vel_to_dev == shipped.drive.scale_vel_to_dev
+    assert made.drive.scale_pos_to_dev == shipped.drive.scale_pos_to_dev
+
+
+def test_what_the_master_reads_from_the_drive_is_not_written_out(tmp_path: Path) -> None:
+    """Increments per second are what the factor group means without 0x6096."""
+    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, COUNTS]), tmp_path / 'bus.yml'
+    assert main(['new', f'arm={eds}@5', '--output', str(bus_yml)]) == 0
+    assert 'scale_from_factor_group: true' in bus_yml.read_text()
+
+
 def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:
     """Interpolated position has another one, with a sub-index."""
     seventh = replace(CYCLIC_AND_PROFILE, default='0x41')
@@ -215,6 +280,18 @@ def test_several_axes_are_not_made_one(
         (SAMPLE, ['--turn', 'arm=0'], '--turn arm=0: give a number of increments'),
         (SAMPLE, ['--rpm', 'arm=-3'], '--rpm arm=-3: give turns of the motor'),
         (without(0x6091), ['--rpm', 'arm=100'], 'how far an increment of the joint is'),
+        (
+            (*SAMPLE, RPM),
+            ['--turn', 'arm=1000'],
+            '0x60A9 of the EDS has 1 turns/min .*of which shaft; give --rpm arm=TURNS',
+        ),
+        ((*SAMPLE, RPM), ['--metre', 'arm=1000'], 'turns of the motor for 1 m of the joint'),
+        ((*SAMPLE, METRES), ['--turn', 'arm=1000'], '1 m/s .*the joint turns; give --metre'),
+        (
+            (*SAMPLE, COUNTS, *FACTOR),
+            [],
+            '1 increments/s, which is 100000 .*0x6096 of the EDS it is 1464.84; correct the EDS',
+        ),
         (SAMPLE, ['--turn', 'arm=far'], '--turn arm=far: give a number'),
         (without(0x60C1), ['--mode', 'arm=7'], r'0x6502 .*0x81. has no mode 7 .*, it has 1, 8;'),
         (SAMPLE, ['--mode', 'arm=3'], '--mode arm=3: choose one of 8 .cyclic position'),
@@ -295,6 +372,21 @@ def test_a_person_is_asked_for_units(
     assert capsys.readouterr().out.count('a number of increments is needed') == 3
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
     assert node.axes[0].scale_pos_to_dev == pytest.approx(10_000.0)
+
+
+def test_a_person_is_asked_what_turns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where 0x60A9 names turns, and the increments are known by --turn alone."""
+    monkeypatch.chdir(tmp_path)
+    written(tmp_path, 'drive.eds', [*SAMPLE, RPM])
+    monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
+    answers = ['-1', 'fast', '26']
+    monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
+    assert main(['new', 'arm=drive.eds@2', '--turn', 'arm=83200']) == 0
+    assert capsys.readouterr().out.count('a number of turns is needed') == 2
+    (node,) = load_bus(tmp_path / 'bus.yml').nodes
+    assert node.axes[0].scale_vel_to_dev == pytest.approx(26 * 60 / TURN)
 
 
 def changed(row: Row, fits: set[int], constant: set[int]) -> Row:

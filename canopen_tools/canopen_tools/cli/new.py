@@ -5,23 +5,26 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 import math
 from pathlib import Path
 import shutil
 import sys
 import tempfile
+from typing import TypeVar
 
 from arm_canopen.standard.drive import OperationMode
 
-from ..new_bus import bus_text, NewDevice, POSITION_MODES, TURN, Units
+from ..new_bus import bus_text, POSITION_MODES
+from ..new_device import NewDevice, TURN, Units
 from .arguments import add_bus_argument, node_id, seconds, SubParsers, UsageError
 from .check import show_check
 from .new_scan import given_devices, scanned_devices
 from .output import print_line
 from .scan import LISTEN
 
+T = TypeVar('T')
 PERIOD_MS = 10
 """Time between two SYNC in [ms]."""
 
@@ -89,7 +92,7 @@ def add_parser(parsers: SubParsers) -> None:
         action='append',
         default=[],
         help='the drive counts velocities in rpm: turns of its motor for one turn (or 1 m) of the '
-        'joint, its gear; 1 for rpm of the joint (default: increments per second, or 0x6096)',
+        'joint, its gear; 1 for rpm of the joint (default: 0x60A9, 0x6096, increments per second)',
     )
     add(
         '--mode',
@@ -120,7 +123,7 @@ def run(options: argparse.Namespace) -> int:
             options,
             scanned_devices(options, Path(stored)) if options.scan else given_devices(options),
         )
-        devices = [_asked(each) if each.has_open_units else each for each in devices]
+        devices = [_asked_turns(_asked(each)) for each in devices]
         _write(devices, bus_text(devices, options.period), output)
     print_line(f'{output} is written; what it says and why is in it')
     return show_check(output)
@@ -219,23 +222,39 @@ def _mode(name: str, text: str) -> OperationMode:
 
 def _asked(device: NewDevice) -> NewDevice:
     """Ask the person at the terminal for the units of a drive; a script learns what to give."""
-    if not sys.stdin.isatty():
+    if not device.has_open_units or not sys.stdin.isatty():
         return device
     question = (
         f'{device.name}: increments of the encoder for one turn of the joint, gear included'
         ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
     )
-    while (units := _answered(device.name, question)) is None:
+    options = f'--turn or --metre {device.name}=INCREMENTS'
+    while (units := _answered(_turn, device.name, question, options)) is None:
         print_line('a number of increments is needed, such as 360000 or -36000.5, and not 0')
     return replace(device, units=units)
 
 
-def _answered(name: str, question: str) -> Units | None:
-    """Ask once; None where the answer is no number of increments."""
+def _asked_turns(device: NewDevice) -> NewDevice:
+    """Ask for what the velocities of a drive are of, where its EDS leaves that open."""
+    named = device.velocity_unit
+    if not device.open_velocity or named is None or named.slides or not sys.stdin.isatty():
+        return device
+    question = (
+        f'{device.name}: its velocities are in {named.text} by 0x60A9: turns of the motor for one'
+        ' turn (or 1 m) of the joint, 1 where the drive knows the gear: '
+    )
+    option = f'--rpm {device.name}=TURNS'
+    while (turns := _answered(_turns, device.name, question, option)) is None:
+        print_line('a number of turns is needed, such as 100, and above 0')
+    return replace(device, rpm=turns)
+
+
+def _answered(read: Callable[[str, str], T], name: str, question: str, option: str) -> T | None:
+    """Ask once; None where the answer is none."""
     try:
-        return _turn(name, input(question).strip())
+        return read(name, input(question).strip())
     except EOFError as error:
-        raise UsageError(f'give --turn or --metre {name}=INCREMENTS') from error
+        raise UsageError(f'give {option}') from error
     except UsageError:
         return None
 

@@ -25,7 +25,7 @@ from ..eds_match import (
     NoMatchError,
     SeveralMatchError,
 )
-from ..new_bus import NewBusError, NewDevice
+from ..new_device import NewBusError, NewDevice
 from ..si_unit import SI_UNIT_POSITION, SI_UNIT_VELOCITY
 from .arguments import node_id, UsageError
 from .output import print_line
