@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 import importlib.util
 import io
 from pathlib import Path
+import shlex
 import shutil
 import signal
+import tempfile
 import time
 from typing import TYPE_CHECKING
 
@@ -70,22 +72,32 @@ def lacking() -> str:
 
 
 @contextmanager
-def browser() -> Iterator[Browser]:
-    """Start one, without a window."""
+def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
+    """Start one, without a window.
+
+    Args:
+        prefix: Command that runs it, as on another host; none to run it here.
+    """
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as playwright:
-        started = launch(playwright.chromium)
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
+        script = Path(folder, NAMES[0])
+        script.write_text(f'#!/bin/sh\nexec {shlex.join([*prefix, _program()])} "$@"\n')
+        script.chmod(0o700)
+        started = launch(playwright.chromium, str(script))
         try:
             yield started
         finally:
             started.close()
 
 
-def launch(kind: BrowserType) -> Browser:
-    """Start one more."""
-    program = next(filter(None, map(shutil.which, NAMES)))
-    return kind.launch(executable_path=program, args=OPTIONS)
+def launch(kind: BrowserType, program: str = '') -> Browser:
+    """Start one more, by a program of its own or the one that is installed."""
+    return kind.launch(executable_path=program or _program(), args=OPTIONS)
+
+
+def _program() -> str:
+    return next(filter(None, map(shutil.which, NAMES)))
 
 
 def processes() -> list[psutil.Process]:

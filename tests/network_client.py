@@ -3,13 +3,13 @@
 """A ROS program of another host, which knows nothing of this workspace but its messages.
 
 ``call SERVICE SECONDS`` prints the nodes, and the answer of a Trigger service; ``jog`` jogs the
-first joint, 50 times a second; ``watch`` prints "moving" and "still" as /joint_states change.
+first joint, 50 times a second; ``watch`` prints "moving" and "still" as any joint of /joint_states
+changes.
 """
 
 from __future__ import annotations
 
 import json
-import math
 import sys
 
 from control_msgs.msg import JointJog
@@ -55,16 +55,17 @@ def watch(node: Node) -> None:
 
     A single command that comes late makes no motion: an arm that is jogged goes on.
     """
-    place, since = math.nan, 0.0  # [rad], [s] where the first joint was when it last moved
-    last = ''
+    places: dict[str, float] = {}  # [rad] where the joints were when one of them last moved
+    since, last = 0.0, ''  # [s]
 
     def take(message: JointState) -> None:
-        nonlocal place, since, last
+        nonlocal since, last
         now = Time.from_msg(message.header.stamp).nanoseconds * 1e-9
-        position = message.position[message.name.index(JOINT)]
-        moved = abs(position - place) > WAY
-        if moved or math.isnan(place):
-            place, since = position, now
+        positions = dict(zip(message.name, message.position, strict=True))
+        moved = any(abs(positions[name] - place) > WAY for name, place in places.items())
+        if moved or not places:
+            places.update(positions)
+            since = now
         state = 'moving' if moved else 'still' if now - since > REST else last
         if state != last:
             last = state

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 import os
 import re
@@ -76,17 +76,38 @@ class RunningProcess:
             count: How many lines must match.
         """
         expression = re.compile(pattern)
+
+        def found() -> str | None:
+            matches = [line for line in self.lines if expression.search(line)]
+            return matches[count - 1] if len(matches) >= count else None
+
+        return self._wait(found, pattern, timeout)
+
+    def wait_until_last(self, pattern: str, timeout: float = 60.0) -> str:
+        """Wait until the last line matches a regular expression, and return it.
+
+        Args:
+            pattern: Searched in it.
+            timeout: Longest time in [s].
+        """
+        expression = re.compile(pattern)
+
+        def found() -> str | None:
+            last = self.lines[-1] if self.lines else ''
+            return last if expression.search(last) else None
+
+        return self._wait(found, pattern, timeout)
+
+    def _wait(self, found: Callable[[], str | None], pattern: str, timeout: float) -> str:
         deadline = time.monotonic() + timeout
         with self._changed:
-            while True:
-                matches = [line for line in self.lines if expression.search(line)]
-                if len(matches) >= count:
-                    return matches[count - 1]
+            while (line := found()) is None:
                 left = deadline - time.monotonic()
                 if left <= 0 or (not self.is_running() and not self._reader.is_alive()):
                     state = 'running' if self.is_running() else f'ended: {self._process.poll()}'
                     raise AssertionError(f'no {pattern!r} ({state}) in:\n{self.output}')
                 self._changed.wait(min(left, 0.5))
+            return line
 
     def wait_until_ready(self, timeout: float = 60.0) -> None:
         """Wait until it reports that it is ready.

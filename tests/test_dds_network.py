@@ -12,6 +12,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
+import browser as chromium
 from held_key import held_key
 from isolation import Isolation
 from network_hosts import Host, two_hosts, two_linked_hosts
@@ -59,7 +60,7 @@ def brought_up(
     """Bring a simulated arm up on a host, with its drives enabled."""
     command = [executable('arm_bringup', 'bringup'), 'panda', '--simulate', '--enable', *arguments]
     with host.run([*command, '--can', isolation.bus], isolation.env | variables) as bringup:
-        bringup.wait_for('drives are enabled', 40.0)
+        bringup.wait_for('drives are enabled', 90.0)
         yield bringup
 
 
@@ -145,3 +146,38 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
             before = sum(line.startswith('still') for line in watch.lines)
             with desk.run([sys.executable, '-c', STOP, line.rpartition(' ')[2]], env):
                 watch.wait_for('^still', 30.0, before + 1)
+                assert 'leads neither' not in viewer.wait_for('/stop: ')
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.skipif(bool(chromium.lacking()), reason=chromium.lacking())
+def test_a_page_of_the_other_side_jogs_stops_with_the_link_and_heals(isolation: Isolation) -> None:
+    """A button held in a browser there, beside the viewer; it says when the robot is silent."""
+    with two_linked_hosts() as (robot, desk, link):
+        env = isolation.env | {NETWORK_VARIABLE: desk.interface}
+        with (
+            brought_up(robot, isolation, '--network', robot.interface),
+            robot.run([sys.executable, CLIENT, 'watch'], beside(isolation)) as watch,
+            desk.run([executable('robot_viewer', 'web_viewer')], env) as viewer,
+            chromium.browser(desk.command([])) as browser,
+        ):
+            url = viewer.wait_for(r'http://localhost:\d+$').rpartition(' ')[2]
+            page = chromium.open_page(browser, url)
+            page.get_by_role('tab', name='Jog').click(force=True)
+            silence = page.get_by_text('nothing from the robot for')
+            # there and back again, far from the limits of the joint
+            for turn, fault in (
+                ('+ about z', Condition(cut=True)),
+                ('− about z', Condition(delay=0.15)),
+            ):
+                chromium.hold(page, turn)
+                watch.wait_until_last('^moving')
+                link.condition = fault
+                watch.wait_until_last('^still')
+                if fault.cut:
+                    silence.wait_for()
+                link.condition = Condition()
+                watch.wait_until_last('^moving')
+                silence.wait_for(state='hidden')
+                page.mouse.up()
+                watch.wait_until_last('^still')

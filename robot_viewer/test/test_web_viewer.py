@@ -271,7 +271,9 @@ def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
     robot.node.destroy_publisher(other)
 
 
-def test_a_robot_that_is_out_of_reach_is_said_to_be(robot: Robot) -> None:
+def test_a_robot_that_is_out_of_reach_is_said_to_be(
+    robot: Robot, opened: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A link that is cut looks like an arm that stands still; the words go when it comes back."""
     states = robot.node.create_publisher(JointState, 'joint_states', 10)
     robot.description.publish(String(data=ARM))
@@ -284,6 +286,15 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(robot: Robot) -> None:
     robot.spin_until(received, 'joint states')
     robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words')
     robot.spin_until(received, 'their end')
+    robot.node.destroy_publisher(states)  # as a link that was cut for long looks
+    robot.spin_until(lambda: not robot.node.count_publishers('joint_states'), 'its end')
+    opened.append(False)
+    monkeypatch.setattr(listening, 'LINGER', 0.1)
+    robot.spin_until(lambda: robot.node.count_subscribers('joint_states') == 1, 'a closed page')
+    robot.viewer.page.show_silence(None)
+    opened.append(True)
+    robot.spin_until(lambda: 'nothing from the robot for' in silence.content, 'the words again')
+    assert not robot.node.count_publishers('joint_states'), 'no sliders for a robot that was there'
 
 
 def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:

@@ -45,7 +45,7 @@ def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
 
 
 def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -> Iterator[str]:
-    """Yield which terms count so little that a walk cannot tell whether they are right.
+    """Yield which terms count so little that a walk does not show whether they are right.
 
     Args:
         network: Of the policy; one without memory.
@@ -66,7 +66,7 @@ def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -
         if share < MIN_SHARE:
             yield (
                 f'{term.name} hardly counts (negated, it changes the actions by {share:.0%} of '
-                'how they vary): a walk cannot tell whether its frame, sign and scale are right'
+                'how they vary): a walk does not show whether its frame, sign and scale are right'
             )
 
 

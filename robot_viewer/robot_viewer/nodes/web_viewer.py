@@ -104,7 +104,9 @@ class WebViewer(Node):
         self._positions: dict[str, float] = {}
         self._drawn: dict[str, float] = {}
         self._received_at: float | None = None
-        self._own = False
+        self._listens_since = 0.0
+        self._own = False  # the page publishes joint states, as nobody else ever did
+        self._robot_publishes = False
         self._statuses: dict[str, Status] = {}
         self._set_mode: Client | None = None
         self._root = ''
@@ -181,7 +183,7 @@ class WebViewer(Node):
         watched = self.page.watched
         looked_at = watched or self._controllers.busy or self._first_motion.busy
         if self._listening.update(time.monotonic(), looked_at=looked_at):
-            self._received_at = None  # what is known is old
+            self._received_at, self._listens_since = None, time.monotonic()  # what is known is old
         if watched:
             self._draw()
 
@@ -199,9 +201,11 @@ class WebViewer(Node):
     def _list(self) -> None:
         if not self.page.watched:
             return
-        age = None if self._received_at is None else time.monotonic() - self._received_at
+        now, received_at = time.monotonic(), self._received_at
+        age = None if received_at is None else now - received_at
         self.page.list_joints(self._positions, 0.0 if self._own else age)
-        self.page.show_silence(None if self._own else age)
+        silent = now - self._listens_since if age is None else age
+        self.page.show_silence(silent if self._robot_publishes else None)
         if self._statuses:
             self.page.show_statuses(list(self._statuses.values()))
         for name, controller in self._controllers.found.items():
@@ -225,7 +229,8 @@ class WebViewer(Node):
         self._planning.look(services)
         self._body.look()
         others = self.count_publishers('joint_states') - (self._joint_states is not None)
-        self._own = not others and bool(self._root)
+        self._robot_publishes |= bool(others)  # also while a link is cut, or when it has ended
+        self._own = not self._robot_publishes and bool(self._root)
         if others and self._joint_states is not None:
             self.destroy_publisher(self._joint_states)
             self._joint_states = None
