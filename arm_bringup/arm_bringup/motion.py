@@ -97,7 +97,8 @@ def planning_files(
         names[tool]: {'joints': list(joints[tool]), 'type': gripper_action(joints[tool])}
         for tool in groups.tools
     }
-    values = {'ros__parameters': {'moveit_simple_controller_manager': manager}}
+    own = {'moveit_simple_controller_manager': manager, 'frame_prefix': ros.frame_prefix}
+    values = {'ros__parameters': own}
     path = folder / 'planning.yaml'
     path.write_text(json.dumps({f'{EVERY_NODE}/move_group': values}), encoding='utf-8')
     return [*motion_files(robot, folder, ros, groups), path]

@@ -239,12 +239,14 @@ def test_move_group_knows_the_controller_by_its_name(tmp_path: Path) -> None:
     )
     manager = {'controller_name': 'mine'}
     robot.controllers.write_text(json.dumps({'controller_manager': {'ros__parameters': manager}}))
-    *_, file = planning_files(robot, tmp_path, RosOptions(), MovedGroups(('arm',), ('hand',)))
+    ros = RosOptions('left')
+    *_, file = planning_files(robot, tmp_path, ros, MovedGroups(('arm',), ('hand',)))
     (values,) = yaml.safe_load(file.read_text()).values()
     assert values['ros__parameters'] == {
         'moveit_simple_controller_manager': {
             'controller_names': ['mine', 'hand_controller'],
             'mine': {'joints': ['j']},
             'hand_controller': {'joints': ['f'], 'type': 'GripperCommand'},
-        }
+        },
+        'frame_prefix': 'left/',
     }

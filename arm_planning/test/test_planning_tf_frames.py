@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import Pose as PoseMessage
@@ -37,8 +38,8 @@ class Camera:
         rig: move_group and its client.
     """
 
-    def __init__(self, rig: MoveGroupRig) -> None:
-        """Publish where the table is, for ever."""
+    def __init__(self, rig: MoveGroupRig, prefix: str = '') -> None:
+        """Publish where the table is, latched; the links of the robot have a prefix in TF."""
         self.rig = rig
         node = rig.client.node
         self._moving = node.create_publisher(TFMessage, '/tf', 100)
@@ -51,9 +52,9 @@ class Camera:
         static.publish(
             TFMessage(
                 transforms=[
-                    transform('map', 'panda_link0', -1.0),
+                    transform('map', f'{prefix}panda_link0', -1.0),
                     transform('map', 'table', 1.0, 0.5),
-                    transform('panda_link8', 'camera_on_hand', 0.0, 0.1),
+                    transform(f'{prefix}panda_link8', 'camera_on_hand', 0.0, 0.1),
                 ]
             )
         )
@@ -165,6 +166,28 @@ def test_old_and_unknown_frames_are_refused(camera: Camera) -> None:
         motion_request(pose_goal(down(1.5, 0.0), 'panda_link8', 'camera_link'))
     )
     assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
+
+
+def test_links_have_a_prefix_in_tf(tmp_path: Path) -> None:
+    """Of a robot in a namespace; a frame that names a link may have it, too."""
+    path = str(panda_parameters(tmp_path))
+    arguments = ['--ros-args', '--params-file', path, '-p', 'frame_prefix:=left/']
+    with reserve() as isolation, MoveGroupRig(isolation, *arguments) as rig:
+        camera = Camera(rig, 'left/')
+
+        def place(frame: str, x: float, z: float) -> tuple[float, ...]:
+            camera.see()
+            answer = camera.ik(frame, x, z)
+            if answer.error_code.val != MoveItErrorCodes.SUCCESS:
+                return ()
+            found = fk(camera, answer.solution)
+            return found.x, found.y, found.z
+
+        seen = pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
+        rig.client.spin_until(lambda: place('camera_link', 1.5, 0.0) == seen, 60.0, 'the camera')
+        for frame in ('left/panda_link0', 'panda_link0'):
+            assert place(frame, 0.5, 0.5) == seen
+        assert place('right/panda_link0', 0.5, 0.5) == ()
 
 
 def test_a_frame_of_tf_is_no_link_of_a_goal(camera: Camera) -> None:

@@ -19,6 +19,7 @@ from node_runner import (
     destroyed_when_refused,
     LATCHED,
     notify_ready,
+    ParameterReader,
     run_program,
     spin,
 )
@@ -60,6 +61,7 @@ parameters, each before what the package says:
   robot_description, robot_description_semantic, joint_limits   what describes the robot
   robot_description_kinematics, robot_description_planning,
   ompl, pilz_industrial_motion_planner                          MoveIt's, as its launch files do
+  frame_prefix                                                  of robot_state_publisher
   allow_trajectory_execution                                    (default true)
   trajectory_execution.allowed_start_tolerance                  [rad] (default 0.01)
   trajectory_execution.allowed_execution_duration_scaling       (default 1.1)
@@ -97,6 +99,9 @@ class MoveGroup(Node):
         description, settings = given.description, given.settings
         robot = _robot(description)
         self.groups = robot.names
+        prefix = ParameterReader(self).text(
+            'frame_prefix', '', 'what robot_state_publisher puts before frames in TF'
+        )
         limits = declare_execution_limits(self)
         controllers = declare_controllers(self, robot, given.places)
         declare_others(self, given.names)
@@ -109,7 +114,7 @@ class MoveGroup(Node):
             self.get_logger().warning(line)
         semantic = self.create_publisher(String, 'robot_description_semantic', LATCHED)
         semantic.publish(String(data=description.srdf))
-        monitor = SceneMonitor(self, robot)
+        monitor = SceneMonitor(self, robot, prefix)
         self._queries = Background(self, 'queries')
         queried = _robot(description)
         StateServices(self, monitor, self._queries, queried)

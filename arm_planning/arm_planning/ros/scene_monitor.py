@@ -51,15 +51,16 @@ class SceneMonitor:
         snapshot: The scene; a value that any thread may keep.
     """
 
-    def __init__(self, node: Node, robot: RobotGroups) -> None:
+    def __init__(self, node: Node, robot: RobotGroups, frame_prefix: str = '') -> None:
         """Offer topics and services.
 
         Args:
             node: The node.
             robot: The robot.
+            frame_prefix: Before the names of its links in TF.
         """
         self.robot = robot
-        frames = TfFrames(node, robot.kinematics)
+        frames = TfFrames(node, robot.kinematics, frame_prefix)
         self.snapshot = SceneSnapshot.of(
             robot.scene, f'{robot.name} scene', robot.world_frames, frames.pose
         )

@@ -33,14 +33,15 @@ class TfFrames:
     own links 100 times a second, and few requests name others.
     """
 
-    def __init__(self, node: Node, kinematics: Kinematics) -> None:
+    def __init__(self, node: Node, kinematics: Kinematics, prefix: str = '') -> None:
         """Listen.
 
         Args:
             node: The node.
             kinematics: All joints of the robot.
+            prefix: Before the names of its links in TF.
         """
-        self._node, self._kinematics = node, kinematics
+        self._node, self._kinematics, self._prefix = node, kinematics, prefix
         self._unread: deque[tuple[float, float, bytes]] = deque(maxlen=KEPT_MESSAGES)
         self._tree, self._lock = FrameTree(), threading.Lock()
         node.create_subscription(TFMessage, '/tf', self._take, 100, raw=True)
@@ -58,18 +59,20 @@ class TfFrames:
         Raises:
             PlanningError: It is unknown, not connected with the robot, or too old.
         """
-        root = self._kinematics.root
+        root, links = self._kinematics.root, self._kinematics.frames
+        if (name := frame.removeprefix(self._prefix)) in links:
+            return self._kinematics.link_pose(name, positions)
         with self._lock:
             self._read()
             now = time.monotonic()
-            for link in (root, *self._kinematics.frames):
-                in_link = self._tree.pose(frame, link, now)
+            for link in (root, *links):
+                in_link = self._tree.pose(frame, self._prefix + link, now)
                 if in_link is not None:
                     return combined(self._kinematics.link_pose(link, positions), in_link)
             raise PlanningError(PlanningCode.FRAME_TRANSFORM_FAILURE, self._reason(frame, now))
 
     def _reason(self, frame: str, now: float) -> str:
-        age, root = self._tree.age(frame, now), self._kinematics.root
+        age, root = self._tree.age(frame, now), self._prefix + self._kinematics.root
         if not math.isfinite(age):
             return (
                 f'Unknown frame: {frame!r}; it is no link, no object and no subframe'
