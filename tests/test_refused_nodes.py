@@ -19,6 +19,7 @@ from arm_canopen.nodes.joint_state_publisher import JointStatePublisher
 from node_runner import ParameterError
 from quad_controller import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
+from quad_description import DescriptionError as QuadDescriptionError
 from quad_description.display import Display
 from quad_hardware.exceptions import HardwareError
 from quad_hardware.nodes.hardware_node import HardwareNode
@@ -31,6 +32,7 @@ ERRORS = (
     HardwareError,
     QuadControllerError,
     DescriptionError,
+    QuadDescriptionError,
 )
 
 
@@ -48,12 +50,13 @@ def controller() -> Node:
         (controller, 'swing_hight:=0.03', "did you mean 'swing_height'"),
         (controller, 'arm_pose:=[0.5, 1.0]', 'arm_pose has 2 positions'),
         (HardwareNode, 'protokoll:=old', "did you mean 'protocol'"),
-        (HardwareNode, 'robot_description:=none', 'not XML'),
+        (controller, 'robot_description:=none', 'robot_description: .*not XML'),
+        (HardwareNode, 'robot_description:=none', 'robot_description: .*not XML'),
         (RobotStatePublisher, 'publish_frequncy:=9.0', "did you mean 'publish_frequency'"),
         (RobotStatePublisher, 'frame_prefix:=robot', 'no robot_description'),
-        (RobotStatePublisher, 'robot_description:=<robot/>', 'no <link>'),
+        (RobotStatePublisher, 'robot_description:=<robot/>', '^robot_description: .*no <link>'),
         (Display, 'rate:=1000', 'rate is 1000: it must be 1.0 to 200.0'),
-        (JointStatePublisher, 'robot_description:=none', 'no XML'),
+        (JointStatePublisher, 'robot_description:=none', '^robot_description: .*no XML'),
         (JointStatePublisher, 'robot_descripton:=none', "did you mean 'robot_description'"),
     ],
 )

@@ -238,3 +238,12 @@ def test_another_folder_for_the_variable(tmp_path: Path) -> None:
     (other / 'drive.eds').write_text(eds_text(), encoding='utf-8')
     path = write_bus(tmp_path, f'options: {{dcf_path: "@BUS_CONFIG_PATH@"}}\n{BUS}')
     assert load_bus(path, bus_config_path=other).nodes[0].eds == other / 'drive.eds'
+
+
+def test_what_a_missing_section_lacks_has_its_name(tmp_path: Path) -> None:
+    """There is no line to show."""
+    path = write_bus(tmp_path, OLD.replace('master:', 'mastr:'))
+    keys = {
+        each.key for each in errors_of(path) if each.message in {"no 'driver'", "no 'node_id'"}
+    }
+    assert keys == {'master'}

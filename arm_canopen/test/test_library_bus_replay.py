@@ -257,6 +257,7 @@ def test_a_log_that_is_repeated_goes_on_in_time(watched: Watched) -> None:
     playing = LogPlayer(
         watched.bus,
         lambda: ((frame.timestamp, frame) for frame in frames),
+        name='bus.log',
         rate=100.0,
         start=0.0,
     )

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from urdf_reader import DescriptionError
 
@@ -81,9 +82,26 @@ class CommandError(ArmError, ValueError):
 
 
 @contextmanager
-def description_refused() -> Iterator[None]:
-    """Raise a ModelError where URDF or SRDF cannot be used."""
+def description_refused(place: str = '') -> Iterator[None]:
+    """Raise a ModelError where URDF or SRDF cannot be used.
+
+    Args:
+        place: File or parameter that the message names.
+    """
     try:
         yield
     except DescriptionError as error:
-        raise ModelError(str(error)) from error
+        raise ModelError(f'{place}: {error}' if place else str(error)) from error
+
+
+@contextmanager
+def limits_refused(path: Path | str) -> Iterator[None]:
+    """Name the limits file in what is wrong with it.
+
+    Args:
+        path: The file.
+    """
+    try:
+        yield
+    except LimitsError as error:
+        raise LimitsError(*(f'{path}: {problem}' for problem in error.problems)) from error

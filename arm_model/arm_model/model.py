@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 import copy
 from itertools import combinations
 import math
@@ -16,7 +16,13 @@ import pinocchio as pin
 from urdf_reader import EndEffector, find_group, KinematicTree, Pair, parse_srdf, read_urdf
 
 from .arrays import Array, frozen, Native
-from .exceptions import CommandError, description_refused, ModelError, SceneError
+from .exceptions import (
+    CommandError,
+    description_refused,
+    limits_refused,
+    ModelError,
+    SceneError,
+)
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
 from .pose import Pose, turned_twists
@@ -147,7 +153,9 @@ class RobotModel:
             ModelError: A file cannot be read, or the three do not fit together.
         """
         table, folder = load_limits(limits), Path(urdf).parent
-        return cls(_text(Path(urdf)), _text(Path(srdf)), table, group, tip, folder=folder)
+        texts = _text(Path(urdf), read_urdf), _text(Path(srdf), parse_srdf)
+        with limits_refused(limits):
+            return cls(*texts, table, group, tip, folder=folder)
 
     def __len__(self) -> int:
         """Return the number of joints."""
@@ -436,8 +444,12 @@ def _poses(
     return found
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, read: Callable[[str], object]) -> str:
+    """Return the text of a file that can be read, too."""
     try:
-        return path.read_text(encoding='utf-8')
+        text = path.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError(f'{path}: {error}') from error
+    with description_refused(str(path)):
+        read(text)
+    return text

@@ -389,6 +389,16 @@ def test_limits_that_are_wider_than_the_description_are_refused(
     assert re.search(r'joint_limits\.yaml:\d+: .*panda_joint1.*21\.75 is wider', output), output
 
 
+def test_a_limits_file_that_lacks_a_joint_is_refused(isolation: Isolation, tmp_path: Path) -> None:
+    """With its path, where the parameter joint_limits names it."""
+    limits = tmp_path / 'limits.yaml'
+    limits.write_text('joint_limits: {elbow: {}}')
+    path = panda_parameters(tmp_path, joint_limits=str(limits))
+    output = refused(isolation, '--ros-args', '--params-file', str(path))
+    words = rf'joint panda_joint1 is missing .*\(joint_limits: {re.escape(str(limits))}\)'
+    assert re.search(words, output), output
+
+
 def test_a_controller_of_a_joint_that_there_is_not_is_refused(
     isolation: Isolation, tmp_path: Path
 ) -> None:

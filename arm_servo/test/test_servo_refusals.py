@@ -64,6 +64,9 @@ def parameters(folder: Path, **values: object) -> list[str]:
     ('make', 'values', 'reason'),
     [
         (motion, {'robot_description': ''}, 'no robot_description'),
+        (motion, {'robot_description': '<robot/>'}, 'robot_description: .*no <link>'),
+        (motion, {'robot_description_semantic': 'none'}, 'robot_description_semantic: .*no XML'),
+        (motion, {'limits': {'elbow': {}}}, r'/limits\.yaml: joint joint_1_s is missing'),
         (motion, {'publish_joint_states': 3}, 'publish_joint_states is 3'),
         (motion, {}, 'bus.yml has no drive'),
         (

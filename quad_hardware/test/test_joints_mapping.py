@@ -62,7 +62,9 @@ def test_servos_that_are_not_reported_are_left_out() -> None:
 def test_a_missing_leg_joint_is_named() -> None:
     """A URDF without a knee is refused before a port is opened."""
     servos = [servo_of(joint) for joint in LEGS if joint.name != 'bl_calf_joint']
-    with pytest.raises(CommandError, match=r'no joint for motors 41; .* bl_calf_joint'):
+    with pytest.raises(
+        CommandError, match=r'no joint for motors 41; .* bl_calf_joint; correct robot_description'
+    ):
         JointMap(servos)
 
 
@@ -84,7 +86,9 @@ def test_the_legs_come_first() -> None:
         JointMap([servos[12], *servos[:12], *servos[13:]])
     assert JointMap([*reversed(servos[:12]), *servos[12:]]).leg_count == 12
     tail = replace(LEGS[2], name='tail_joint')
-    with pytest.raises(CommandError, match='tail_joint: unknown motor 61'):
+    with pytest.raises(
+        CommandError, match=r'tail_joint: unknown motor 61; give joints\.tail_joint\.motor'
+    ):
         JointMap([*servos, servo_of(tail, 61)])
 
 

@@ -126,17 +126,20 @@ def test_silence_on_joint_states_is_reported(start: StartNode, urdf: Path) -> No
     [
         ([], 'no robot_description'),
         (['/nowhere.urdf'], 'nowhere.urdf.*No such file'),
-        (['--ros-args', '-p', 'robot_description:=<robot/>'], 'no <link>'),
+        (['--ros-args', '-p', 'robot_description:=<robot/>'], 'robot_description: .*no <link>'),
+        (['{broken}'], r'broken\.urdf: .*no <link>'),
         (['{urdf}', '--ros-args', '-p', 'publish_frequency:=2000.0'], 'publish_frequency'),
         (['{urdf}', '--ros-args', '-p', 'publish_frequncy:=9.0'], "mean 'publish_frequency'"),
     ],
-    ids=['nothing', 'no file', 'no robot', 'range', 'misspelt'],
+    ids=['nothing', 'no file', 'no robot', 'broken file', 'range', 'misspelt'],
 )
 def test_what_cannot_work_ends_at_once_with_the_reason(
     start: StartNode, urdf: Path, arguments: list[str], words: str
 ) -> None:
     """Exit code 1, one line, no traceback."""
-    node = start(*(word.format(urdf=urdf) for word in arguments))
+    broken = urdf.with_name('broken.urdf')
+    broken.write_text('<robot/>')
+    node = start(*(word.format(urdf=urdf, broken=broken) for word in arguments))
     node.wait_for(words)
     assert node.wait() == 1
     assert 'Traceback' not in node.output

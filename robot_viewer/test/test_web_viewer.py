@@ -25,7 +25,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
 from urdf_robots import ARM
 
-from node_runner import make_executor
+from node_runner import make_executor, ParameterError
 from robot_viewer.nodes import listening
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.robot_page import RobotPage
@@ -344,3 +344,14 @@ def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
         assert not sent[-2].points
         assert sent[-1].points
         robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
+
+
+@pytest.mark.parametrize('host', ['192.0.2.1', 'no.such.host.invalid'])
+def test_a_host_that_is_none_of_this_computer_is_refused(isolation: Isolation, host: str) -> None:
+    """At once, with its name: the server of the page would look for a free port without end."""
+    rclpy.init(args=['--ros-args', '-p', f'host:={host}'], domain_id=isolation.domain_id)
+    try:
+        with pytest.raises(ParameterError, match=f"host is '{host}': .*; give an address"):
+            WebViewer()
+    finally:
+        rclpy.shutdown()

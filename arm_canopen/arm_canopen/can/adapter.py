@@ -207,4 +207,4 @@ def _not_opened(name: str, interface: str, error: Exception) -> str:
         return (
             f'no bus is called {name!r}: python-can has no interface {interface}; it has {known}'
         )
-    return f'cannot open {name}: {error}'
+    return f'cannot open {name}: {error}; is it plugged in, and is its driver installed?'

@@ -94,8 +94,12 @@ class MulticastBus(SocketBus):
         self._sender.close()
 
 
-def check_group(group: str) -> None:
+def check_group(name: str, group: str) -> None:
     """Check the address of a multicast group.
+
+    Args:
+        name: Of the bus, as it was given.
+        group: Its address.
 
     Raises:
         BusError: It is no IPv4 multicast address.
@@ -103,14 +107,18 @@ def check_group(group: str) -> None:
     try:
         address = ipaddress.ip_address(group)
     except ValueError as error:
-        raise BusError(f'{group!r} is no IP address; take one such as {DEFAULT_GROUP}') from error
+        raise BusError(
+            f'{name}: {group!r} is no IP address; take one such as {DEFAULT_GROUP}'
+        ) from error
     if address.version != 4:
         raise BusError(
-            f'{group} is an IPv6 group; only IPv4 groups are kept on the loopback interface, '
-            f'take one such as {DEFAULT_GROUP}'
+            f'{name}: {group} is an IPv6 group; only IPv4 groups are kept on the loopback'
+            f' interface, take one such as {DEFAULT_GROUP}'
         )
     if not address.is_multicast:
-        raise BusError(f'{group} is no multicast address; those are 224.0.0.0 to 239.255.255.255')
+        raise BusError(
+            f'{name}: {group} is no multicast address; those are 224.0.0.0 to 239.255.255.255'
+        )
 
 
 def _open_sender(name: str, group: str, port: int) -> socket.socket:

@@ -80,7 +80,7 @@ def _open_multicast(name: str, channel: str) -> Bus:
     group, colon, digits = (channel or DEFAULT_GROUP).partition(':')
     if ':' in digits:
         group, colon = channel, ''  # an IPv6 address, to be refused as one
-    check_group(group)
+    check_group(name, group)
     if not colon:
         return MulticastBus(name, group, DEFAULT_PORT)
     if not digits.isdecimal() or not 0 < int(digits) < 0x10000:

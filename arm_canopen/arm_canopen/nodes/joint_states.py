@@ -219,7 +219,11 @@ def on_description(node: Node, text: str, begin: Callable[[list[RobotJoint]], No
         CanopenError: The text is no URDF.
     """
     if text:
-        begin(movable_joints(text))
+        try:
+            joints = movable_joints(text)
+        except CanopenError as error:
+            raise CanopenError(f'robot_description: {error}') from error
+        begin(joints)
         return
     begun = False
 

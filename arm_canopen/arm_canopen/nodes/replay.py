@@ -122,6 +122,7 @@ class ReplayProcess:
         self._player = LogPlayer(
             bus,
             partial(_timed_frames, parameters.log),
+            name=str(parameters.log),
             rate=parameters.rate,
             start=parameters.start,
         )

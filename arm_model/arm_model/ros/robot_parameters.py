@@ -15,7 +15,7 @@ from urdf_reader import find_group, parse_srdf, read_urdf
 
 from node_runner import ParameterReader
 
-from ..exceptions import description_refused, ModelError
+from ..exceptions import description_refused, limits_refused, ModelError
 from ..limits import load_limits
 from ..model import RobotModel
 
@@ -48,11 +48,13 @@ class Description:
         urdf: Robot description as XML text.
         srdf: Semantic description as XML text.
         limits: The table ``joint_limits`` of the limits file.
+        limits_file: That file; empty where there is none.
     """
 
     urdf: str
     srdf: str
     limits: Mapping[str, Any]
+    limits_file: str = ''
 
 
 def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> Description:
@@ -66,7 +68,7 @@ def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> 
         ModelError: A parameter is missing, or the limits file cannot be read.
     """
     urdf, srdf, path, _group, _tip = _given(node, needs_limits=limits is None)
-    return Description(urdf, srdf, load_limits(Path(path)) if path else limits or {})
+    return Description(urdf, srdf, load_limits(Path(path)) if path else limits or {}, path)
 
 
 def declare_robot(node: Node) -> RobotModel:
@@ -79,7 +81,9 @@ def declare_robot(node: Node) -> RobotModel:
         ModelError: A parameter is missing, or they do not make an arm.
     """
     urdf, srdf, limits, group, tip = _given(node)
-    return RobotModel(urdf, srdf, load_limits(Path(limits)), group or None, tip or None)
+    table = load_limits(Path(limits))
+    with limits_refused(limits):
+        return RobotModel(urdf, srdf, table, group or None, tip or None)
 
 
 def declare_groups(node: Node) -> GroupModels:
@@ -111,8 +115,9 @@ def declare_groups(node: Node) -> GroupModels:
         tip_link = tip if name == group else ''
         return RobotModel(urdf, srdf, table, name, tip_link or None, moved_by_others=others)
 
-    tools = [RobotModel(urdf, srdf, table, name) for name in joints if name not in arms]
-    return GroupModels([arm(name) for name in arms], tools)
+    with limits_refused(limits):
+        tools = [RobotModel(urdf, srdf, table, name) for name in joints if name not in arms]
+        return GroupModels([arm(name) for name in arms], tools)
 
 
 def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str, str]:
@@ -125,6 +130,10 @@ def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str
     ):
         if not value and (needs_limits or name != 'joint_limits'):
             raise ModelError(f'no {name}: give it with --ros-args -p {name}:=... or a params file')
+    with description_refused('robot_description'):
+        read_urdf(urdf)
+    with description_refused('robot_description_semantic'):
+        parse_srdf(srdf)
     return urdf, srdf, limits, group, tip
 
 

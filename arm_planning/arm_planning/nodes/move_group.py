@@ -24,6 +24,7 @@ from node_runner import (
     spin,
 )
 
+from ..exceptions import PlanningError
 from ..moveit_config.known import misspelt
 from ..moveit_config.package import MoveItPackage, read_package
 from ..moveit_config.settings import of_nothing
@@ -145,7 +146,13 @@ class MoveGroup(Node):
 
 
 def _robot(description: Description) -> RobotGroups:
-    return RobotGroups(description.urdf, description.srdf, description.limits)
+    try:
+        return RobotGroups(description.urdf, description.srdf, description.limits)
+    except PlanningError as error:
+        file = description.limits_file
+        raise PlanningError(
+            error.code, f'{error} (joint_limits: {file})' if file else str(error)
+        ) from error
 
 
 def _arguments() -> argparse.Namespace:

@@ -47,6 +47,7 @@ class LogPlayer(Generic[Entry]):
         replay: Replay[Entry],
         read: Callable[[], Iterable[tuple[float, Entry]]],
         *,
+        name: str,
         rate: float,
         start: float,
     ) -> None:
@@ -55,6 +56,7 @@ class LogPlayer(Generic[Entry]):
         Args:
             replay: Gets the entries.
             read: Yields the entries of the log with their times in [s], from the first one.
+            name: What errors call the log: its file.
             rate: How many seconds of the log go by in one.
             start: How far from its beginning it is played in time, in [s]; what comes before is
                 taken at once, so that states are known.
@@ -63,6 +65,7 @@ class LogPlayer(Generic[Entry]):
         self.on_tick: Callable[[], None] = lambda: None
         self._replay = replay
         self._read = read
+        self._name = name
         self._rate = rate
         self._start = start
         self._zero = 0.0  # steady time in [s] at which log time `_log_zero` is played
@@ -112,9 +115,10 @@ class LogPlayer(Generic[Entry]):
         if not began and not stop.is_set():
             length = 0.0 if first is None else now - shift
             raise PlaybackError(
-                f'nothing to play: the log has {length:.1f} s, and start is {self._start:g} s'
+                f'{self._name}: nothing to play: the log has {length:.1f} s, and start is'
+                f' {self._start:g} s; begin earlier'
                 if first is not None
-                else 'nothing to play: the log is empty'
+                else f'{self._name}: nothing to play: the log is empty, or no log; give another'
             )
         return now
 

@@ -54,6 +54,7 @@ def player(
     return LogPlayer(
         replay,
         lambda: ((1.7e9 + number * PERIOD, number) for number in range(count)),
+        name='walk.log',
         rate=rate,
         start=start,
     )
@@ -87,7 +88,10 @@ def test_a_log_that_is_repeated_goes_on_in_time() -> None:
     assert steps[8:11] == pytest.approx([PERIOD, 0.1, PERIOD], abs=1e-6)
 
 
-@pytest.mark.parametrize(('count', 'start', 'reason'), [(0, 0.0, 'is empty'), (11, 9.0, '0.1 s')])
+@pytest.mark.parametrize(
+    ('count', 'start', 'reason'),
+    [(0, 0.0, '^walk.log: .* is empty'), (11, 9.0, '^walk.log: .* 0.1 s')],
+)
 def test_a_log_with_nothing_to_play_is_refused(count: int, start: float, reason: str) -> None:
     """An empty file, or a start behind its end."""
     with pytest.raises(PlaybackError, match=reason):

@@ -12,7 +12,7 @@ from typing import Any
 from rclpy.node import Node
 
 from node_runner import declare_thread_priority, ParameterReader, refuse_misspelt
-from quad_description import PRESETS, Quadruped, quadruped, robot_urdf
+from quad_description import DescriptionError, PRESETS, Quadruped, quadruped, robot_urdf
 
 from ..gait.body import BodyLimits
 from ..gait.parameters import GaitParameters, RANGES
@@ -155,7 +155,10 @@ def _robot(read: ParameterReader) -> Quadruped:
     presets = {name: name for name in PRESETS}
     preset = read.choice('preset', 'lite', presets, 'robot of quad_description')
     arm = read.flag('arm', default=False, meaning='the robot of quad_description has its arm')
-    return quadruped(text or robot_urdf(preset, arm=arm))
+    try:
+        return quadruped(text or robot_urdf(preset, arm=arm))
+    except DescriptionError as error:
+        raise DescriptionError(f'robot_description: {error}') from error
 
 
 def _gait(node: Node, read: ParameterReader) -> GaitParameters:

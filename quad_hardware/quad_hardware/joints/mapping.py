@@ -121,16 +121,20 @@ class JointMap:
             joints = [name for name, motor in MOTOR_OF_JOINT.items() if motor in missing]
             raise CommandError(
                 f'the URDF has no joint for motors {", ".join(map(str, missing))}; '
-                f'by the vendor’s names {", ".join(joints)}'
+                f'by the vendor’s names {", ".join(joints)}; correct robot_description, or the'
+                ' parameters joints.JOINT.motor'
             )
         twice = sorted({motor for motor in motors if motors.count(motor) > 1})
         if twice:
-            raise CommandError(f'motor {", ".join(map(str, twice))} moves two joints of the URDF')
+            raise CommandError(
+                f'motor {", ".join(map(str, twice))} moves two joints of the URDF; correct the'
+                ' parameters joints.JOINT.motor'
+            )
         unknown = [s for s in self.servos if s.motor not in MOTOR_ORDER]
         if unknown:
             raise CommandError(
                 f'{unknown[0].joint}: unknown motor {unknown[0].motor}; '
-                f'choose one of {", ".join(map(str, MOTOR_ORDER))}'
+                f'give joints.{unknown[0].joint}.motor, one of {", ".join(map(str, MOTOR_ORDER))}'
             )
         early = [s.joint for s in self.servos[: self.leg_count] if s.motor not in LEG_MOTORS]
         if early:  # twelve positions are those of the legs

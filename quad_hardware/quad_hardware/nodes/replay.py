@@ -109,6 +109,7 @@ class Replay:
         self._player: LogPlayer[Entry] = LogPlayer(
             self._robot,
             partial(_timed_entries, parameters.log),
+            name=str(parameters.log),
             rate=parameters.rate,
             start=parameters.start,
         )

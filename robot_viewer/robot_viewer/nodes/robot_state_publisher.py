@@ -72,7 +72,10 @@ class RobotStatePublisher(Node):
 
     def _apply(self) -> None:
         text = str(self.get_parameter(DESCRIPTION).value)
-        model = read_urdf(text)
+        try:
+            model = read_urdf(text)
+        except DescriptionError as error:
+            raise DescriptionError(f'{DESCRIPTION}: {error}') from error
         self._core = StatePublisher(model, read_settings(self))
         self._watch = JointWatch(model, time.monotonic())
         self._description.publish(String(data=text))
@@ -145,9 +148,11 @@ def _read_argument(argv: Sequence[str]) -> str:
     if len(files) > 1:
         raise ParameterError(f'one URDF file at most, not {" ".join(files)}')
     try:
-        return Path(files[0]).read_text(encoding='utf-8')
-    except (OSError, UnicodeDecodeError) as error:
+        text = Path(files[0]).read_text(encoding='utf-8')
+        read_urdf(text)  # here, where it has a name
+    except (OSError, UnicodeDecodeError, DescriptionError) as error:
         raise DescriptionError(f'{files[0]}: {error}') from error
+    return text
 
 
 def _start() -> RobotStatePublisher:

@@ -32,12 +32,14 @@ from node_runner import (
     LATCHED,
     log_as,
     notify_ready,
+    ParameterError,
     ParameterReader,
     refuse_misspelt,
     run_program,
     spin,
 )
 
+from ..loopback import binding_problem
 from ..page.robot_page import RobotPage, Status, Twist, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
@@ -97,6 +99,11 @@ class WebViewer(Node):
         port = read.whole('port', PORT, (1, 65535), 'of the page; else the next free one')
         self._prefix = read.text('frame_prefix', '', 'before each frame, as of the robot on /tf')
         refuse_misspelt(self)
+        if problem := binding_problem(host):  # the server would look for a free port without end
+            raise ParameterError(
+                f'host is {host!r}: {problem}; give an address of this computer, such as'
+                ' 127.0.0.1, or 0.0.0.0 for all of them'
+            )
         self._orders: deque[Callable[[], object]] = deque()
         self._trigger_clients: dict[str, Client] = {}
         self._drives: dict[str, list[str]] = {}

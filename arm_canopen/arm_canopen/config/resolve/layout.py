@@ -9,7 +9,7 @@ the new one. Top-level keys that begin with a dot are templates for anchors, ign
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import difflib
 
 from ..findings import Findings
@@ -43,12 +43,11 @@ def lay_out(root: YamlMap, findings: Findings) -> Layout:
     devices = _new_devices(root, findings) if new else _old_devices(root, findings)
     if 'master' not in root.entries:
         findings.error(root.place, "no section 'master'", "write 'master:' and its node_id below")
-    empty = YamlMap(root.place)
-    return Layout(
-        block(root, 'options', findings) or empty,
-        block(root, 'master', findings) or empty,
-        devices,
+    options, master = (
+        block(root, name, findings) or YamlMap(replace(root.place, key=name))
+        for name in ('options', 'master')
     )
+    return Layout(options, master, devices)
 
 
 def _lifted(root: YamlMap, findings: Findings) -> YamlMap:
