@@ -5,13 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+import math
 import time
 from typing import Any
 
+from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from process_supervisor import CallError
 from process_supervisor.graph_client import GraphClient
+
+ANSWER_TIME = 10.0
+"""After which an answer counts as lost in [s]; enabling takes less."""
 
 
 class ServiceClient(GraphClient):
@@ -40,6 +45,10 @@ class ServiceClient(GraphClient):
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
         """Call services side by side.
 
+        One that does not answer is called again: DDS loses the answer where the server does not
+        know this client yet, which takes a while on a busy machine. So they may be none that do
+        more when they are called twice.
+
         Args:
             services: Names that were prepared.
             timeout: Longest time in [s] for all together.
@@ -58,13 +67,24 @@ class ServiceClient(GraphClient):
             timeout,
             f'the services {", ".join(services)}',
         )
-        futures = {name: client.call_async(Trigger.Request()) for name, client in clients.items()}
-        self.wait_until(
-            lambda: all(future.done() for future in futures.values()),
-            max(0.0, end - time.monotonic()),
-            f'the answers of {", ".join(services)}',
-        )
-        answers = {name: future.result() for name, future in futures.items()}
+        answers: dict[str, Trigger.Response] = {}
+        asked: dict[str, list[Future]] = {name: [] for name in services}
+        called = -math.inf
+
+        def answered() -> bool:
+            nonlocal called
+            for name, futures in asked.items():
+                done = [future for future in futures if future.done()]
+                if done and name not in answers:
+                    answers[name] = done[0].result()
+            if time.monotonic() - called > ANSWER_TIME:
+                called = time.monotonic()
+                for name in asked.keys() - answers.keys():
+                    asked[name].append(clients[name].call_async(Trigger.Request()))
+            return answers.keys() == asked.keys()
+
+        left = max(0.0, end - time.monotonic())
+        self.wait_until(answered, left, f'the answers of {", ".join(services)}')
         refused = [f'{name}: {each.message}' for name, each in answers.items() if not each.success]
         if refused:
             raise CallError('; '.join(refused))
