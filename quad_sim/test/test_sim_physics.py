@@ -73,6 +73,24 @@ def test_a_falling_robot_weighs_nothing() -> None:
     assert np.linalg.norm(robot.imu.specific_force) < 2.0
 
 
+def test_a_robot_may_begin_on_any_side_and_in_the_air() -> None:
+    """Its lowest point is as high as it is to be; on its back it stays there."""
+    robot = Robot(URDF)
+    robot.reset(orientation=(1.0, 0.0, 0.0, 0.0), drop=0.1)
+    assert robot.base_pose.tilt == pytest.approx(math.pi)
+    in_the_air = robot.base_pose.position[2]
+    robot.reset(orientation=(2.0 * 0.9, 0.0, 0.0, 0.0))
+    assert robot.base_pose.position[2] == pytest.approx(in_the_air - 0.1)
+    settled(robot)
+    assert robot.base_pose.tilt > 3.0
+    robot.reset()
+    assert robot.base_pose.tilt == 0.0
+    with pytest.raises(SetupError, match='unit quaternion'):
+        robot.reset(orientation=(0.0, 0.0, 0.0, 0.0))
+    with pytest.raises(SetupError, match='0 to 10'):
+        robot.reset(drop=-0.1)
+
+
 @given(st.floats(-0.7, 0.7), st.floats(-math.pi, math.pi))
 def test_ground_turns_the_vertical_onto_its_normal(angle: float, direction: float) -> None:
     """Orientation and normal of a slope say the same, and the yaw stays small."""

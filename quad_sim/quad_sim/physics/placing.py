@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from quad_description import Pose, pose_positions
+from quad_description.rotations import multiply, Quaternion
 
 from ..exceptions import SetupError
 from ..plant.state import Array
@@ -36,16 +37,29 @@ def start_positions(joints: Sequence[str], pose: Mapping[str, float]) -> Array:
     return np.array([pose.get(name, stand.get(name, 0.0)) for name in joints])
 
 
-def place(model: mujoco.MjModel, data: mujoco.MjData, terrain: Terrain) -> None:
+def place(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    terrain: Terrain,
+    orientation: Quaternion,
+    drop: float,
+) -> None:
     """Put the robot on the ground with the joint positions that it has.
 
     Joints that mimic others go where those are; the base turns as the ground does and comes down
     until the robot's lowest point touches it.
+
+    Args:
+        model: The robot.
+        data: Its state; changed in place.
+        terrain: The ground.
+        orientation: Of the base on level ground.
+        drop: How far the lowest point is above the ground [m].
     """
     _follow_mimics(model, data)
     normal = np.array(terrain.normal)
     data.qpos[:3] = normal
-    data.qpos[3:7] = np.roll(terrain.orientation, 1)  # MuJoCo has w first
+    data.qpos[3:7] = np.roll(multiply(terrain.orientation, orientation), 1)  # w first in MuJoCo
     mujoco.mj_kinematics(model, data)
     floor, points = model.geom(FLOOR).id, np.empty(6)
     gap = min(
@@ -53,7 +67,7 @@ def place(model: mujoco.MjModel, data: mujoco.MjData, terrain: Terrain) -> None:
         for geom in range(model.ngeom)
         if model.geom(geom).name not in {FLOOR, BUMPS}  # there are no bumps at the start
     )
-    data.qpos[:3] -= gap * normal
+    data.qpos[:3] -= (gap - drop) * normal
 
 
 def _follow_mimics(model: mujoco.MjModel, data: mujoco.MjData) -> None:

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from quad_description import FEET, movable_joints
-from quad_description.rotations import Vector
+from quad_description.rotations import IDENTITY, normalized, Quaternion, Vector
 
 from ..exceptions import SetupError, SimulationError
 from ..plant.noise import disturb, Noise, NONE
@@ -28,6 +28,7 @@ from .variation import AS_MADE, Variation, VariedModel
 TIMESTEP: Final = 0.002  # [s]
 STRONGEST: Final = 200.0  # [N] of a push; the robot weighs 7 N
 MAX_KICK: Final = 10.0  # [m/s] of a kick
+MAX_DROP: Final = 10.0  # [m] above the ground at the start
 UNSTABLE: Final = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
     int(mujoco.mjtWarning.mjWARN_BADQVEL),
@@ -95,6 +96,8 @@ class Robot:
         pose: Mapping[str, float] | None = None,
         seed: int = 0,
         variation: Variation = AS_MADE,
+        orientation: Quaternion = IDENTITY,
+        drop: float = 0.0,
     ) -> None:
         """Stand on the ground again, as a new robot with these arguments would.
 
@@ -102,10 +105,17 @@ class Robot:
             pose: Joint positions at the start [rad]; the standing pose for those left out.
             seed: Of the sensors' noise.
             variation: How robot and ground differ from what they were made as.
+            orientation: Of base_link on level ground, (x, y, z, w); another one lets it fall.
+            drop: Height of the lowest point above the ground [m], from which it falls.
 
         Raises:
-            SetupError: The pose names joints that the robot lacks.
+            SetupError: The pose names joints that the robot lacks, the orientation is no rotation,
+                or the height is not a number from 0 to 10.
         """
+        if not 0.5 < math.hypot(*orientation) < 2.0:
+            raise SetupError(f'orientation {orientation}: give a unit quaternion (x, y, z, w)')
+        if not 0.0 <= drop <= MAX_DROP:
+            raise SetupError(f'drop {drop} m: give 0 to {MAX_DROP:g}')
         self._varied.vary(self._data, variation)
         self._gains = self._model.actuator_gainprm.copy(), self._model.actuator_biasprm.copy()
         mujoco.mj_resetData(self._model, self._data)
@@ -115,7 +125,7 @@ class Robot:
         start = start_positions(self.joint_names, pose or {})
         self._data.qpos[self._qpos] = start
         self._ramp.jump(start)
-        place(self._model, self._data, self._terrain)
+        place(self._model, self._data, self._terrain, normalized(orientation), drop)
         mujoco.mj_forward(self._model, self._data)
         self._inertial.rest()
 
