@@ -15,7 +15,7 @@ LIE_TIMEOUT = 10.0
 """Longest time in [s] for it to lie, or to stand still."""
 FAULT, LYING, STANDING = 'fault', 'lie', 'stand'
 """States of the controller after a fault, and at the end."""
-ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy', FAULT})
+ON_ITS_FEET = frozenset({'stand', 'walk', 'turn', 'policy', 'get_up', FAULT})
 """States of the controller in which the legs may carry the body."""
 STEPPING = frozenset({'walk', 'turn', 'policy'})
 """States of the controller in which a leg may be in the air."""

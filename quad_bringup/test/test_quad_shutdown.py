@@ -59,7 +59,18 @@ def leave(controller: Controller, *, given_up: bool = False, hold: bool = False)
 
 @pytest.mark.parametrize(
     'state',
-    ['stand', 'walk', 'turn', 'policy', 'to stand', 'to walk', 'fault', 'to fault', 'to lie'],
+    [
+        'stand',
+        'walk',
+        'turn',
+        'policy',
+        'get_up',
+        'to stand',
+        'to walk',
+        'fault',
+        'to fault',
+        'to lie',
+    ],
 )
 def test_a_robot_on_its_feet_lies_down(state: str) -> None:
     """Also one that is on its way there or down, or has a fault; the log says how not to wait."""

@@ -29,6 +29,7 @@ from quad_controller import replay_policy
 from quad_controller.exceptions import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
+from quad_description.rotations import about, IDENTITY, Quaternion
 from quad_gait_policies import joined, metadata, write_policy
 from quad_msgs.msg import JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
@@ -51,6 +52,7 @@ class Robot:
         client: A ROS node of the test.
         process: The controller's.
         positions: Where the joints are.
+        orientation: Of the body, x, y, z, w.
         names: Under which they are published.
         largest_speed: The largest speed of a target so far in [rad/s].
         commands: All joint commands so far.
@@ -62,6 +64,7 @@ class Robot:
         self.client, self.process = client, process
         node = client.node
         self.positions = list(FOLDED)
+        self.orientation: Quaternion = IDENTITY
         self.names = list(ROBOT.names)
         self.largest_speed, self._stamp = 0.0, 0.0
         self._joints = node.create_publisher(JointState, 'joint_states', 10)
@@ -79,7 +82,8 @@ class Robot:
 
     def _publish(self) -> None:
         imu = Imu()
-        imu.orientation.w = 1.0
+        attitude = imu.orientation
+        attitude.x, attitude.y, attitude.z, attitude.w = self.orientation
         imu.linear_acceleration.z = 9.81
         self._imu.publish(imu)
         still = [0.0] * len(self.names)
@@ -102,6 +106,11 @@ class Robot:
             20.0,
             'readiness',
         )
+
+    def until_logged(self, text: str) -> None:
+        """Wait for a line of the log."""
+        lines = self.process.lines
+        self.client.spin_until(lambda: any(text in line for line in lines), 20.0, text)
 
     def mode(self, mode: str) -> Any:
         """Ask for a mode."""
@@ -136,6 +145,48 @@ def robot(isolation: Isolation) -> Iterator[Robot]:
         client = stack.enter_context(RosClient(isolation.domain_id))
         process.wait_for('waiting for joint_states')
         yield Robot(client, process)
+
+
+def test_a_robot_that_fell_gets_up(robot: Robot) -> None:
+    """The fault names the mode, asking for it clears it, and it ends standing."""
+    robot.begin()
+    robot.until_ready()
+    assert robot.mode('stand').success
+    robot.until_state('stand')
+    robot.orientation = about((1.0, 0.0, 0.0), -math.pi / 2)
+    robot.until_state('fault')
+    answer = robot.mode('stand')
+    assert not answer.success
+    assert 'request the mode get_up' in answer.message
+    assert robot.mode('get_up').message == 'get_up, coming from fault'
+    robot.until_state('get_up')
+    robot.until_logged('lies on its left side; turns over, try 1')
+    robot.orientation = IDENTITY
+    robot.until_state('stand')
+    robot.orientation = (1.0, 0.0, 0.0, 0.0)
+    robot.until_state('fault')
+    assert 'it lies on its back' in robot.mode('get_up').message
+
+
+def test_a_policy_gets_it_up_where_a_parameter_names_one(
+    isolation: Isolation, tmp_path: Path
+) -> None:
+    """From its back; it is loaded and checked at the start as every policy is."""
+    path = write_policy(tmp_path / 'rise.onnx', metadata())
+    words = [*NODE, '-p', f'get_up_policy:={path}']
+    with ExitStack() as stack:
+        process = stack.enter_context(RunningProcess(words, isolation.env))
+        client = stack.enter_context(RosClient(isolation.domain_id))
+        process.wait_for('policy rise.onnx')
+        process.wait_for('waiting for joint_states')
+        robot = Robot(client, process)
+        robot.orientation = (1.0, 0.0, 0.0, 0.0)
+        robot.begin()
+        robot.until_ready()
+        assert robot.mode('get_up').success
+        robot.until_logged('follows the policy rise.onnx')
+        robot.orientation = IDENTITY
+        robot.until_state('stand')
 
 
 def test_from_lying_to_walking_and_back(robot: Robot) -> None:

@@ -18,6 +18,7 @@ MODE_BUTTONS = {
     Button.EAST: Mode.LIE,
     Button.WEST: Mode.WALK,
     Button.NORTH: Mode.TURN,
+    Button.RIGHT_STICK: Mode.GET_UP,
 }
 """Buttons that ask the controller for a mode."""
 

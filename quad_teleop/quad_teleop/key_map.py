@@ -47,6 +47,7 @@ MODES = {
     '1': Mode.STAND,
     '2': Mode.WALK,
     '3': Mode.TURN,
+    '9': Mode.GET_UP,
 }
 """Keys that ask the controller for a mode."""
 
@@ -94,6 +95,7 @@ HELP = """\
     m  ,  .            M  <  >         a d       pitch        e c  turning
                                        r y       yaw
   1 stand  2 walk  3 turn  0 lie       g         neutral      ?    this help
+  9 gets up after a fall
   Space STOP: the gait ends, too     letting go, any other key stop
   Backspace clears a fault           Ctrl-C quits\
 """

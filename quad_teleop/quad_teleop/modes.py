@@ -14,6 +14,7 @@ class Mode(Enum):
     STAND = 'stand'
     WALK = 'walk'
     TURN = 'turn'
+    GET_UP = 'get_up'
 
     @property
     def moves(self) -> bool:

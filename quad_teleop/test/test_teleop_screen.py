@@ -58,7 +58,7 @@ def test_state_of_the_controller_is_shown() -> None:
         (replace(MOVING, mode=Mode.STAND, has_subscriber=False), ''),
         (
             replace(VIEW, report=report('fault', 'fault', Level.ERROR, 'it fell over')),
-            'fault: it fell over; Backspace clears it, 0 lies down',
+            'fault: it fell over; Backspace clears it, 0 lies down, 9 gets up',
         ),
     ],
 )

@@ -60,7 +60,9 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
         wait_on_screen(client, pane, 'lie refused: stays in stand: it is too high')
         assert robot.modes == ['walk', 'lie']
         robot.fall_over()
-        wait_on_screen(client, pane, 'fault: it fell over; Backspace clears it, 0 lies down')
+        wait_on_screen(
+            client, pane, 'fault: it fell over; Backspace clears it, 0 lies down, 9 gets up'
+        )
         pane.press('BSpace')
         wait_on_screen(client, pane, 'clear fault: all is well')
         pane.press('t', 'Down')

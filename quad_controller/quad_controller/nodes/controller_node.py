@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 import sys
@@ -48,6 +49,7 @@ from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
+from ..policy.options import PolicyOptions
 from ..policy.shipped import find_policy
 from ..recording.recorder import Recorder
 from ..recording.run import PolicyRun
@@ -98,6 +100,7 @@ class ControllerNode(Node):
         self._loader = ThreadPoolExecutor(1, thread_name_prefix='load_policy')
         self._texts: WeakKeyDictionary[Policy, str] = WeakKeyDictionary()
         policy, refusal = self._load_first_policy()
+        get_up_policy = self._load_get_up_policy()
         self._reported = policy
         self._controller = Controller(
             settings.robot,
@@ -105,6 +108,7 @@ class ControllerNode(Node):
             settings.states,
             policy=policy,
             policy_refusal=refusal,
+            get_up_policy=get_up_policy,
             dry_run=settings.policy_dry_run,
             first_gait=settings.first_gait,
             arm_pose=settings.arm_pose,
@@ -120,8 +124,9 @@ class ControllerNode(Node):
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
+        policies = [each for each in (policy, get_up_policy) if each is not None]
         self._filter = CommandFilter(
-            settings.robot, others_move=bool(settings.arm_pose) or policy is not None
+            settings.robot, others_move=bool(settings.arm_pose or policies)
         )
         self._targets = self._controller.fallback_positions
         self._unreported: tuple[str, ...] = ()
@@ -137,8 +142,8 @@ class ControllerNode(Node):
         self._subscribe()
         self._seen: set[str] = set()  # topics of estimates
         self._arrived = {topic: threading.Event() for topic in ESTIMATES}
-        if policy is not None:
-            self._see_estimates(_estimates_for(policy))
+        for each in policies:
+            self._see_estimates(_estimates_for(each))
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, 'stop', self._take_stop)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
@@ -205,8 +210,23 @@ class ControllerNode(Node):
         self._report.publish(String(data=str(loaded)))
         return loaded.runner, ''
 
-    def _load_policy(self, text: str) -> LoadedPolicy:
+    def _load_get_up_policy(self) -> Policy | None:
+        """Return what the mode get_up follows; None for its poses, and when it does not fit."""
+        if not self._settings.get_up_policy:
+            return None
+        options = replace(self._settings.policy_options, contract=None)  # that of the other one
+        try:
+            return self._load_policy(self._settings.get_up_policy, options).runner
+        except PolicyError:
+            self.get_logger().error('get_up_policy was refused; get_up uses its own poses')
+            return None
+
+    def _load_policy(self, text: str, options: PolicyOptions | None = None) -> LoadedPolicy:
         """Load and check a policy; the log has the table in either case.
+
+        Args:
+            text: Its path, or its name if it is shipped.
+            options: How it shall be run; None for the parameters.
 
         Raises:
             PolicyError: It does not fit.
@@ -218,7 +238,7 @@ class ControllerNode(Node):
                 find_policy(text),
                 settings.robot,
                 gait.stand_targets,
-                settings.policy_options,
+                options or settings.policy_options,
                 settings.states.period,
             )
         except PolicyError as error:

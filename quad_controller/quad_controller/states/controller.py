@@ -21,13 +21,25 @@ from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import REST, Velocity
-from ..policy.interface import Policy, PolicyInputs
+from ..policy.interface import Policy
 from .commands import Commands
-from .faults import Fault, FaultLatch
+from .faults import Fault, FaultLatch, LYING_FAULTS
+from .get_up import get_up_refusal, stands
 from .health import Health
 from .limiter import StepLimiter
 from .machine import Poses, StateMachine
-from .modes import Answer, GAIT_STATES, ModeRequest, MODES, MOVING_STATES, parse_mode, State
+from .modes import (
+    Answer,
+    GAIT_STATES,
+    ModeRequest,
+    MODES,
+    MOVING_STATES,
+    ON_FEET,
+    parse_mode,
+    State,
+    UPRIGHT_STATES,
+    WAYS_DOWN,
+)
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
@@ -38,15 +50,6 @@ from .unseen import UnseenJoints
 from .watchdogs import Watchdogs
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
-
-UPRIGHT_STATES = GAIT_STATES | {State.POLICY, State.FAULT}
-"""States in which the robot is on its legs, and what is wrong with it is a fault."""
-
-WAYS_DOWN = frozenset({State.LIE, State.RELAX})
-"""Modes that no fault keeps a robot from: they need nothing but the last targets."""
-
-LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
-"""What stops a robot on its way down, if it was in order when the way down was requested."""
 
 
 class Controller:
@@ -65,6 +68,7 @@ class Controller:
         *,
         policy: Policy | None = None,
         policy_refusal: str = NO_POLICY,
+        get_up_policy: Policy | None = None,
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
         first_gait: Gait = Gait.TROT,
@@ -77,6 +81,7 @@ class Controller:
             states: Limits of states, watchdogs and protections.
             policy: What the mode ``policy`` follows.
             policy_refusal: Why there is none.
+            get_up_policy: What the mode ``get_up`` follows; None for its own poses.
             dry_run: Whether the policy is only asked, and never followed.
             arm_pose: Positions of the joints that belong to no leg when the robot stands, in
                 [rad]; empty leaves them where they are.
@@ -98,7 +103,8 @@ class Controller:
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
-        self._machine = StateMachine(poses, self._generator, states, policy)
+        self._machine = StateMachine(poses, self._generator, states, policy, get_up_policy)
+        self._get_up_policy = get_up_policy
         self._policies = PolicySwitch(self._machine, policy, policy_refusal, dry_run=dry_run)
         self._parameters = states
         self._commands = Commands(states.command_timeout)
@@ -121,33 +127,39 @@ class Controller:
         if request is None:
             return Answer(False, f'unknown mode {text!r}; choose one of {", ".join(MODES)}')
         state = self._machine.state
+        if request.state is State.GET_UP and self._is_on_its_feet:
+            return Answer(True, f'{self._machine.goal.value}: it is on its feet')
         if reason := self._refusal(request):
             return Answer(False, f'stays in {state.value}: {reason}')
         if request.gait is not None:
             self._generator.choose(request.gait)
         present = dict(self._health.faults()) if request.state in WAYS_DOWN else {}
         self._tolerated = frozenset(present)
+        if request.state is State.GET_UP:
+            self._latch.clear()  # nothing but a fall, see the refusals
         self._machine.request(request.state)
         gait = f' with gait {request.gait.value}' if request.gait is not None else ''
         way = '' if state is request.state else f', coming from {state.value}'
         without = ''.join(f'; in spite of {f.value}: {why}' for f, why in present.items())
         return Answer(True, f'{request.state.value}{gait}{way}{without}')
 
-    def stop(self) -> Answer:
-        """End the gait or the policy, whatever follows it; a robot that does not walk stays so.
+    @property
+    def _is_on_its_feet(self) -> bool:
+        machine = self._machine
+        return {machine.state, machine.goal} <= ON_FEET and stands(self._health.attitude)
 
-        A change of posture goes on to its end: half-way a leg may be in the air.
+    def stop(self) -> Answer:
+        """End gait, policy or getting up, whatever follows; a robot that does not walk stays so.
+
+        Another change of posture goes on to its end: half-way a leg may be in the air.
         """
         machine = self._machine
         self._commands.set_velocity(REST)  # or the next mode would begin with the one of before
         if machine.state is State.FAULT and machine.goal is State.FAULT:
             return Answer(True, f'nothing walks: fault: {"; ".join(self._latch.texts)}')
-        if not {machine.state, machine.goal} & MOVING_STATES:
-            return Answer(True, f'nothing walks: {machine.title}')
         was = machine.title
-        if machine.goal in MOVING_STATES:
-            down = machine.state in {State.LIE, State.RELAX}
-            machine.request(machine.state if down else State.STAND)
+        if not machine.stop(self._limiter.last):
+            return Answer(True, f'nothing walks: {was}')
         return Answer(True, f'stopped: {was}; the mode is {machine.goal.value}')
 
     def set_velocity(self, velocity: Velocity) -> Answer:
@@ -200,7 +212,7 @@ class Controller:
         policies, last = self._policies, self._limiter.last
         refusal = self.handover_refusal()
         if not refusal and policies.moves and last is not None and policy is not None:
-            refusal = self._health_refusal() or self._unmeasured(policy)
+            refusal = self._health_refusal() or self._health.unmeasured(policy)
         if refusal:
             return Answer(False, f'stays with {policies.followed}: {refusal}')
         return policies.follow(policy, last, self._watchdogs() if policy is not None else None)
@@ -377,10 +389,14 @@ class Controller:
     def _latch_faults(self, last: Targets, events: list[Event]) -> None:
         """Latch faults of a robot that is on its legs, or on its way down."""
         machine = self._machine
+        if machine.way_up is not None and machine.way_up.failure:
+            events += self._latch_fault(Fault.FALLEN, machine.way_up.failure, last)
         upright, goes_down = machine.state in UPRIGHT_STATES, machine.goal in WAYS_DOWN
         if not upright and machine.motion.finished:
             return
         watched = LYING_FAULTS - self._tolerated if goes_down or not upright else frozenset(Fault)
+        if State.GET_UP in {machine.state, machine.goal}:
+            watched -= {Fault.FALLEN}
         for fault, reason in self._health.faults():
             if fault in watched:
                 events += self._latch_fault(fault, reason, last)
@@ -397,6 +413,8 @@ class Controller:
             conditions['following'] = self._tracking.text
         if self._health.uncertainty and state in UPRIGHT_STATES:
             conditions['uncertain'] = self._health.uncertainty
+        if (way_up := self._machine.way_up) is not None:
+            conditions[way_up.text] = f'get_up: {way_up.text}'
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal
@@ -454,6 +472,8 @@ class Controller:
         """Return why a mode cannot be entered, nothing when it can."""
         if request.state in WAYS_DOWN and self._limiter.last is not None:
             return ''
+        if request.state is State.GET_UP:
+            return get_up_refusal(self._health, self._latch, self._get_up_policy)
         if self._latch.texts:
             return (
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '
@@ -464,22 +484,9 @@ class Controller:
             return reason
         if reason := self._health_refusal():
             return reason
-        return self._unmeasured(policy) if policy is not None else ''
+        return self._health.unmeasured(policy)
 
     def _health_refusal(self) -> str:
         """Return what keeps the robot from moving its legs."""
         present = next(self._health.faults(), None)
         return f'{present[0].value}: {present[1]}' if present else ''
-
-    def _unmeasured(self, policy: Policy) -> str:
-        """Return what a policy would need and nobody measures."""
-        health = self._health
-        if health.joints is None or health.imu is None:
-            return 'a policy needs joint states and an attitude; there are none yet'
-        if health.uncertainty:
-            return health.uncertainty
-        return policy.missing(
-            PolicyInputs(
-                health.joints, health.imu, REST, health.linear_velocity, health.foot_contacts
-            )
-        )

@@ -37,6 +37,10 @@ REACTIONS: Mapping[Fault, Reaction] = {
 }
 
 
+LYING_FAULTS = frozenset({Fault.JOINTS, Fault.FALLEN})
+"""What stops a robot on its way down, if it was in order when the way down was requested."""
+
+
 class FaultLatch:
     """Keeps faults until they are cleared."""
 
@@ -59,6 +63,12 @@ class FaultLatch:
         if new:
             self._faults[fault] = reason
         return new
+
+    def texts_without(self, fault: Fault) -> tuple[str, ...]:
+        """Return each of the others with its reason."""
+        return tuple(
+            f'{f.value}: {reason}' for f, reason in self._faults.items() if f is not fault
+        )
 
     def clear(self) -> None:
         """Forget all."""

@@ -10,7 +10,10 @@ import math
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import Vector
 
+from ..gait.velocity import REST
+from ..policy.interface import Policy, PolicyInputs
 from .faults import Fault
+from .lying import Lying, lying_on
 from .parameters import StateParameters
 
 REFUSAL_LIFE = 0.2
@@ -170,6 +173,18 @@ class Health:
         if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
 
+    def unmeasured(self, policy: Policy | None) -> str:
+        """Return what a policy would need and nobody measures; nothing for none."""
+        if policy is None:
+            return ''
+        if self.joints is None or self.imu is None:
+            return 'a policy needs joint states and an attitude; there are none yet'
+        if self.uncertainty:
+            return self.uncertainty
+        return policy.missing(
+            PolicyInputs(self.joints, self.imu, REST, self.linear_velocity, self.foot_contacts)
+        )
+
     def _silence(self, what: Fault, age: float, topic: str) -> str:
         """Return why nothing was received for a time [s]."""
         if what in self._refusals:
@@ -202,7 +217,8 @@ class Health:
         most, fastest = self._parameters.max_tilt, self._parameters.max_turn_rate
         if imu.tilt > most:
             angles = f'{math.degrees(imu.tilt):.0f} deg, more than {math.degrees(most):.0f}'
-            return f'the body is tilted by {angles}; put it on its feet'
+            mode = '' if lying_on(imu.down) is Lying.BACK else ', or request the mode get_up'
+            return f'the body is tilted by {angles}; put it on its feet{mode}'
         rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 

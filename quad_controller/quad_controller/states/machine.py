@@ -7,7 +7,8 @@
     RELAX <-> LIE <-> STAND <-> WALK, TURN      (the gait comes to rest before it is left)
                         ^-----> POLICY          (eased in; winds down, or fails, back to STAND)
     STAND, WALK, TURN, POLICY <-> POLICY        (handed over while they go on, see handover.py)
-    any of STAND, WALK, TURN, POLICY -> FAULT   (then RELAX, LIE or STAND when it is cleared)
+    RELAX, LIE, FAULT (a fall) -> GET_UP -> STAND   (or FAULT again; see get_up.py)
+    any but RELAX and LIE at rest -> FAULT      (then RELAX, LIE or STAND when it is cleared)
     FAULT -> LIE -> RELAX                       (a way down is possible with any fault)
 
 From RELAX the robot stands up directly, from wherever its joints are.
@@ -23,8 +24,9 @@ from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from .faults import Reaction
+from .get_up import FinalPoses, GetUp
 from .handover import Handover
-from .modes import GAIT_STATES, State
+from .modes import GAIT_STATES, MOVING_STATES, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
 from .policy_motion import PolicyMotion
@@ -34,7 +36,13 @@ EASE_TIME = 0.7  # [s] over which a policy takes over
 
 
 class Poses:
-    """The poses that the robot goes to; joints that are no legs' may have one or stay."""
+    """The poses that the robot goes to; joints that are no legs' may have one or stay.
+
+    Attributes:
+        robot: The robot.
+        fallback_positions: Positions of all joints that are assumed of those that nobody has
+            measured [rad].
+    """
 
     def __init__(self, robot: Quadruped, lie_height: float, arm_pose: Sequence[float]) -> None:
         """Prepare them.
@@ -53,7 +61,7 @@ class Poses:
             raise ParameterError(
                 f'arm_pose has {len(arm_pose)} positions; the joints of the arm are {names}'
             )
-        self._robot = robot
+        self.robot = robot
         self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
         self.fallback_positions = self.with_arm([0.0] * len(robot.names))
         self._lying = robot.solve(robot.footprint(lie_height, self.fallback_positions))
@@ -61,11 +69,11 @@ class Poses:
     def with_arm(self, targets: Sequence[float]) -> Targets:
         """Return targets of all joints with those that are no legs' as the parameter says."""
         moved = [self._arm.get(index, target) for index, target in enumerate(targets)]
-        return self._robot.clamp(moved)
+        return self.robot.clamp(moved)
 
     def lying(self, targets: Targets) -> Targets:
         """Return targets of all joints with the legs folded."""
-        return self._robot.place(self._lying, targets)
+        return self.robot.place(self._lying, targets)
 
 
 class StateMachine:
@@ -83,6 +91,7 @@ class StateMachine:
         generator: GaitGenerator,
         parameters: StateParameters,
         policy: Policy | None,
+        get_up_policy: Policy | None = None,
     ) -> None:
         """Start relaxed, without targets.
 
@@ -91,7 +100,9 @@ class StateMachine:
             generator: The gait.
             parameters: How fast.
             policy: What POLICY follows; it cannot be entered without.
+            get_up_policy: What GET_UP follows; None for its own poses.
         """
+        self._get_up_policy = get_up_policy
         self._poses, self._generator, self._policy = poses, generator, policy
         self._parameters = parameters
         self._walk = Walk(generator)
@@ -104,6 +115,8 @@ class StateMachine:
     @property
     def title(self) -> str:
         """Name of the state, with the way to it as long as it stands up, lies down or stops."""
+        if self.state is State.GET_UP:
+            return State.GET_UP.value
         there = self.at_rest if self.state is State.STAND else self.motion.finished
         return self.state.value if there else f'to {self.state.value}'
 
@@ -123,6 +136,11 @@ class StateMachine:
         """Whether the gait's last step was within the legs' reach."""
         return self.motion is not self._walk or self._walk.reachable
 
+    @property
+    def way_up(self) -> GetUp | None:
+        """What brings the robot to its feet after a fall; None while nothing does."""
+        return self.motion if isinstance(self.motion, GetUp) else None
+
     def retune(self, generator: GaitGenerator) -> None:
         """Walk with another generator from now on; for when no leg is walking."""
         walk = Walk(generator)
@@ -133,6 +151,22 @@ class StateMachine:
     def hold(self, last: Targets) -> None:
         """Stay at some targets [rad]."""
         self.motion = Hold(last, self._parameters.hold_band)
+
+    def stop(self, last: Targets | None) -> bool:
+        """End what follows velocities, or getting up; return whether there was any of it.
+
+        Args:
+            last: The last targets of all joints in [rad]; None before the first.
+        """
+        if State.GET_UP in {self.state, self.goal} and last is not None:
+            self.state = self.goal = State.RELAX
+            self.hold(last)
+            return True
+        if self.goal in MOVING_STATES:
+            down = self.state in {State.LIE, State.RELAX}
+            self.request(self.state if down else State.STAND)
+            return True
+        return self.state in MOVING_STATES
 
     def request(self, goal: State) -> None:
         """Go to a state from now on; out of FAULT only down."""
@@ -187,6 +221,10 @@ class StateMachine:
             reaction: What the faults require.
             last: The last targets of all joints in [rad].
         """
+        if self.state is State.GET_UP:
+            reaction = Reaction.HOLD  # legs that bear nothing can neither stand nor lie down
+        elif self.state is State.FAULT and self._reaction is not None:
+            reaction = max(reaction, self._reaction)
         self.state = self.goal = State.FAULT
         self._reaction = reaction
         if reaction is Reaction.HOLD:
@@ -226,6 +264,8 @@ class StateMachine:
                 self.goal = State.WALK if walks else State.STAND
             self._enter(State.STAND, last)
         self._stand_after_blend()
+        if self.state is self.goal is State.GET_UP and self.motion.finished:
+            self.goal = State.STAND
         following = self._next()
         if following is not None:
             self._enter(following, last)
@@ -241,6 +281,8 @@ class StateMachine:
             return goal if ready else None
         if not motion.settled:
             return None
+        if goal is State.GET_UP:
+            return State.GET_UP
         if goal is State.LIE or (goal is State.RELAX and state is not State.LIE):
             return State.LIE
         if goal is State.RELAX:
@@ -252,6 +294,8 @@ class StateMachine:
             self.hold(last)
         elif state is State.LIE:
             self._lie(last)
+        elif state is State.GET_UP:
+            self.motion = self._get_up(last)
         elif state is State.POLICY and self._policy is not None:
             self.motion = PolicyMotion(self._policy, last, EASE_TIME)
         elif self.motion is not self._walk:
@@ -277,6 +321,11 @@ class StateMachine:
     def _lie(self, last: Targets) -> None:
         if self.motion is not self._lie_down:
             self.motion = self._lie_down = self._blend(last, self._poses.lying(last))
+
+    def _get_up(self, last: Targets) -> GetUp:
+        self._generator.others = self._poses.with_arm(last)
+        final = FinalPoses(self._poses.lying(last), self._generator.stand_targets)
+        return GetUp(self._poses.robot, last, final, self._get_up_policy)
 
     def _stand(self, last: Targets) -> None:
         self._generator.others = self._poses.with_arm(last)

@@ -19,6 +19,7 @@ class State(Enum):
     WALK = 'walk'
     TURN = 'turn'
     POLICY = 'policy'
+    GET_UP = 'get_up'
     FAULT = 'fault'
 
 
@@ -28,7 +29,22 @@ GAIT_STATES = frozenset({State.STAND, State.WALK, State.TURN})
 MOVING_STATES = frozenset({State.WALK, State.TURN, State.POLICY})
 """States in which the robot follows velocities."""
 
-ALIASES = {'sit': 'lie', 'trot': 'gait:trot', 'crawl': 'gait:crawl', 'pace': 'gait:pace'}
+ON_FEET = GAIT_STATES | {State.POLICY}
+"""States in which the legs carry the robot."""
+
+UPRIGHT_STATES = ON_FEET | {State.GET_UP, State.FAULT}
+"""States in which the robot is on its legs or getting there, and what is wrong is a fault."""
+
+WAYS_DOWN = frozenset({State.LIE, State.RELAX})
+"""Modes that no fault keeps a robot from: they need nothing but the last targets."""
+
+ALIASES = {
+    'sit': 'lie',
+    'recovery_stand': 'get_up',
+    'trot': 'gait:trot',
+    'crawl': 'gait:crawl',
+    'pace': 'gait:pace',
+}
 """Other words for modes, which other robots have."""
 
 GAIT_PREFIX = 'gait:'

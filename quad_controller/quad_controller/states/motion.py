@@ -107,7 +107,11 @@ class Hold(Motion):
 
 
 class Blend(Motion):
-    """Goes from one pose to another, all joints together, with a soft start and end."""
+    """Goes from one pose to another, all joints together, with a soft start and end.
+
+    Attributes:
+        duration: How long it takes in [s].
+    """
 
     def __init__(self, start: Targets, end: Targets, speed: float, least: float) -> None:
         """Plan it.
@@ -121,20 +125,20 @@ class Blend(Motion):
         self._start, self._end = start, end
         way = max(abs(b - a) for a, b in zip(start, end, strict=True))
         # a cosine is pi / 2 times as fast in its middle as on average
-        self._duration = max(least, way * math.pi / 2 / speed)
+        self.duration = max(least, way * math.pi / 2 / speed)
         self._time = 0.0
 
     @property
     def finished(self) -> bool:
         """Whether it is there."""
-        return self._time >= self._duration
+        return self._time >= self.duration
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets."""
         self._time += dt
         if self.finished:
             return self._end
-        share = 0.5 * (1.0 - math.cos(math.pi * self._time / self._duration))
+        share = 0.5 * (1.0 - math.cos(math.pi * self._time / self.duration))
         return tuple(a + share * (b - a) for a, b in zip(self._start, self._end, strict=True))
 
 

@@ -67,7 +67,7 @@ def hint(view: View) -> str:
     """
     report = view.report
     if report is not None and report.has_fault:
-        return f'fault: {report.message}; Backspace clears it, 0 lies down'
+        return f'fault: {report.message}; Backspace clears it, 0 lies down, 9 gets up'
     if view.velocity is None or not view.has_subscriber:
         return ''
     moves = report.follows_velocities if report else view.mode is None or view.mode.moves

@@ -71,7 +71,7 @@ DRIVE_SERVICES = (
     'cyclic_position_mode',
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
-WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax')
+WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax', 'get_up')
 TRIGGER = 'std_srvs/srv/Trigger'
 STOP = 'stop'
 """Service of a robot that stops all of it."""

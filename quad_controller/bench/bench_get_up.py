@@ -1,0 +1,172 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""How often the mode `get_up` brings a robot to its feet, by the side on which it lies.
+
+The robot is dropped with random attitude, joints and friction; its legs are held until it rests.
+Few come to rest on a side: more are dropped there until there are enough.
+
+    python bench_get_up.py --drops 1000 --each 200      # for figures that are steadier
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+import multiprocessing
+import os
+
+import numpy as np
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.states.controller import Controller
+from quad_controller.states.lying import Lying, lying_on
+from quad_controller.states.modes import State
+from quad_controller.states.parameters import StateParameters
+from quad_description import quadruped, robot_urdf
+from quad_description.rotations import down_in_body, normalized, Quaternion
+from quad_sim.physics import PhysicsBackend, Robot, Variation
+
+FRICTION = (0.4, 1.3)  # of the ground
+DROP = (0.0, 0.15)  # [m] of the lowest point above the ground
+SETTLE_TIME = 2.0  # [s]
+LONGEST = 90.0  # [s] until it stands, or has given up
+STAND_TIME = 1.0  # [s] for which it has to stand
+MAX_TILT = 0.2  # [rad] of a robot that stands
+BATCH = 50  # drops, until it is looked how many came to rest where
+MAX_BATCHES = 100
+URDF = robot_urdf()
+MODEL = quadruped(URDF)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a drop.
+
+    Attributes:
+        lay: Where it came to rest.
+        stood: Whether it stood in the end.
+        time: How long it took in [s].
+        words: What the controller answered or latched where it did not.
+    """
+
+    lay: Lying
+    stood: bool
+    time: float
+    words: str
+
+
+def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
+    """Return any attitude, or any with a side below."""
+    while True:
+        x, y, z, w = random.standard_normal(4).tolist()
+        rotation = normalized((x, y, z, w))
+        if side is None or lying_on(down_in_body(rotation)) is side:
+            return rotation
+
+
+def fallen(seed: int, side: Lying | None) -> PhysicsBackend:
+    """Return a robot that was dropped and came to rest.
+
+    Args:
+        seed: Of everything random.
+        side: With which side below it is dropped; None for any attitude.
+    """
+    random = np.random.default_rng(seed)
+    robot = Robot(URDF)
+    pose = tuple(random.uniform(limits.lower, limits.upper) for limits in MODEL.limits)
+    robot.reset(
+        pose=dict(zip(MODEL.names, pose, strict=True)),
+        orientation=attitude(random, side),
+        drop=random.uniform(*DROP),
+        variation=Variation(friction=random.uniform(*FRICTION)),
+    )
+    backend = PhysicsBackend(robot)
+    for _ in range(round(SETTLE_TIME / backend.period)):
+        backend.step(pose)
+    return backend
+
+
+def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
+    """Drop a robot, and let it get up.
+
+    Args:
+        seed: Of everything random.
+        side: With which side below it is dropped; None for any attitude.
+        only: Do nothing where it came to rest on another side.
+    """
+    backend = fallen(seed, side)
+    state = backend.observe()
+    assert state.imu is not None
+    lay = lying_on(state.imu.down)
+    if only and lay is not side:
+        return Outcome(lay, False, 0.0, '')
+    controller = Controller(MODEL, GaitParameters(), StateParameters())
+    state = backend.step(controller.step(state, backend.period).targets)
+    answer = controller.set_mode('get_up')
+    begun = state.time
+    while answer.accepted and state.time - begun < LONGEST:
+        state = backend.step(controller.step(state, backend.period).targets)
+        status = controller.status
+        if status.title in {State.STAND.value, State.FAULT.value}:
+            break
+    time = state.time - begun
+    for _ in range(round(STAND_TIME / backend.period)):
+        state = backend.step(controller.step(state, backend.period).targets)
+    stood = (
+        controller.status.title == State.STAND.value
+        and state.imu is not None
+        and state.imu.tilt < MAX_TILT
+    )
+    return Outcome(lay, stood, time, '; '.join(controller.status.faults) or answer.message)
+
+
+def dropped_on(pool: ProcessPoolExecutor, side: Lying, count: int) -> Iterator[Outcome]:
+    """Yield what became of robots that came to rest on a side, as many as there are to be."""
+    found = 0
+    for batch in range(MAX_BATCHES):
+        seeds = range(batch * BATCH, (batch + 1) * BATCH)
+        for outcome in pool.map(partial(get_up, side=side, only=True), seeds):
+            if outcome.lay is side and found < count:
+                found += 1
+                yield outcome
+        if found >= count:
+            return
+
+
+def report(title: str, outcomes: list[Outcome]) -> None:
+    """Print how many stood, how long it took, and what became of the others."""
+    stood = sorted(outcome.time for outcome in outcomes if outcome.stood)
+    times = f'{stood[len(stood) // 2]:.1f} s, at most {stood[-1]:.1f} s' if stood else ''
+    share = len(stood) / max(len(outcomes), 1)
+    print(f'{title:28} {len(stood):4} of {len(outcomes):4}  {share:5.1%}  {times}', flush=True)
+    for words, times_said in Counter(
+        outcome.words for outcome in outcomes if not outcome.stood
+    ).most_common(3):
+        print(f'    {times_said:4} x {words}')
+
+
+def main() -> None:
+    """Entry point."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--drops', type=int, default=60, help='with any attitude')
+    parser.add_argument('--each', type=int, default=10, help='that lie on each side')
+    options = parser.parse_args()
+    context = multiprocessing.get_context('spawn')
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=context) as pool:
+        outcomes = list(pool.map(get_up, range(options.drops)))
+        print('dropped with any attitude, by where they came to rest')
+        for side in Lying:
+            report(side.value, [outcome for outcome in outcomes if outcome.lay is side])
+        print('dropped with that side below, those that stayed on it')
+        for side in Lying:
+            if side is not Lying.BACK:
+                report(side.value, list(dropped_on(pool, side, options.each)))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,268 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Getting up after a fall: from whatever side the robot lies on to its feet.
+
+::
+
+    REST -> (side, nose or tail: stages of a try) -> REST -> ... until it lies on its belly
+    REST -> (belly: FOLD -> STAND) -> finished
+    REST -> (back, or too many tries) -> failure
+
+Where it lies is measured whenever the body has come to rest, so that a stage that did something
+else than it was made for leads to the tries of where it lies now.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+import math
+
+from quad_description import ImuSample, Quadruped, Targets
+from quad_description.rotations import Vector
+
+from ..policy.interface import Policy
+from .faults import Fault, FaultLatch
+from .get_up_poses import WAYS_UP, WaysUp
+from .health import Health
+from .lying import Lying, lying_on
+from .motion import Blend, Hold, Motion, Situation
+from .policy_motion import PolicyMotion
+
+STILL_ANGLE = 0.05  # [rad] by which the body of a robot at rest may turn
+STILL_TIME = 0.4  # [s] for which it must not have turned more
+REST_DEADLINE = 3.0  # [s] after a movement; then it counts as at rest wherever it is
+BLIND_DEADLINE = 2.0  # [s] without an attitude
+MAX_TRIES = 8  # from all sides together
+MIN_BLEND_TIME = 0.02  # [s]
+LEVEL = 0.35  # [rad] of tilt of a robot that stands
+FOLD_SPEED = 3.0  # [rad/s] of legs that bear nothing yet
+STAND_SPEED = 1.5  # [rad/s]
+POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
+EASE_TIME = 0.3  # [s] over which a policy takes over
+
+BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
+ON_ITS_BACK = (
+    'it lies on its back, and no movement of its legs is known that turns it over; put it on its '
+    'feet or on a side by hand, then request get_up again'
+)
+"""Why nothing moves on the back."""
+
+
+@dataclass(frozen=True, slots=True)
+class FinalPoses:
+    """Where every way up leads.
+
+    Attributes:
+        folded: Targets of a robot that lies with its feet under its hips [rad].
+        standing: Targets of one that stands [rad].
+    """
+
+    folded: Targets
+    standing: Targets
+
+
+class StillnessWatch:
+    """How long the body has not turned; by its attitude, as not every IMU has a gyro."""
+
+    def __init__(self) -> None:
+        """Begin in motion."""
+        self._reference: Vector | None = None
+        self.time = 0.0
+
+    def reset(self) -> None:
+        """Begin in motion again."""
+        self._reference, self.time = None, 0.0
+
+    def step(self, down: Vector, dt: float) -> None:
+        """Take the direction of gravity in the body after some [s]."""
+        if self._reference is None or _angle(self._reference, down) > STILL_ANGLE:
+            self._reference, self.time = down, 0.0
+        else:
+            self.time += dt
+
+
+def stands(imu: ImuSample | None) -> bool:
+    """Return whether the body of a robot is upright; also when nobody knows."""
+    return imu is None or imu.is_uncertain or imu.tilt < LEVEL
+
+
+def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> str:
+    """Return why a robot cannot get up now, nothing when it may try.
+
+    Args:
+        health: What is measured.
+        latch: The latched faults; a fall is what getting up is for.
+        policy: What brings it to its feet, which may do so from its back; None for the poses.
+    """
+    if others := latch.texts_without(Fault.FALLEN):
+        return f'{"; ".join(others)}; call ~/clear_fault when that is corrected'
+    for fault, reason in health.faults():
+        if fault is not Fault.FALLEN:
+            return f'{fault.value}: {reason}'
+    imu = health.attitude
+    if health.joints is None or imu is None:
+        return 'getting up needs joint states and an attitude; there are none'
+    if health.uncertainty:
+        return health.uncertainty
+    if policy is None and lying_on(imu.down) is Lying.BACK:
+        return ON_ITS_BACK
+    return health.unmeasured(policy)
+
+
+class GetUp(Motion):
+    """Brings a robot to its feet, by poses or by a policy.
+
+    Attributes:
+        text: What it is doing, for people.
+    """
+
+    def __init__(
+        self,
+        robot: Quadruped,
+        last: Targets,
+        final: FinalPoses,
+        policy: Policy | None = None,
+        ways: WaysUp = WAYS_UP,
+    ) -> None:
+        """Begin with waiting for rest.
+
+        Args:
+            robot: The robot.
+            last: The last targets of all joints in [rad].
+            final: Where it leads.
+            policy: What brings it to its feet instead of poses; None for the poses.
+            ways: Those poses.
+        """
+        self._ways = ways
+        self._robot, self._last, self._final, self._policy = robot, last, final, policy
+        self._motion: Motion = Hold(last, math.inf)
+        self._rests, self._deadline = True, REST_DEADLINE
+        self._time = self._blind = 0.0
+        self._still = StillnessWatch()
+        self._lying, self._tilt = Lying.BELLY, 0.0
+        self._tries: Counter[Lying] = Counter()
+        self._finished, self._failure = False, ''
+        self._stages = self._script()
+        self.text = 'waits until it is at rest'
+        next(self._stages)
+
+    @property
+    def finished(self) -> bool:
+        """Whether it stands."""
+        return self._finished
+
+    @property
+    def failure(self) -> str:
+        """Why it does not get up: where it lies, what was tried and what to do."""
+        return self._failure
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets; the last ones while the attitude is not known."""
+        imu = situation.imu
+        if self._finished or self._failure:
+            return self._last
+        if imu is None or imu.is_uncertain:
+            self._blind += dt
+            if self._blind > BLIND_DEADLINE:
+                self._failure = f'nobody measures how it lies; look at /imu, or {BY_HAND}'
+            return self._last
+        self._blind = 0.0
+        self._time += dt
+        self._last = self._motion.step(situation, dt)
+        if not self._motion.finished:
+            self._still.reset()
+        self._still.step(imu.down, dt)
+        if self._is_over(imu):
+            if self._rests:
+                self._lying, self._tilt = lying_on(imu.down), imu.tilt
+            next(self._stages, None)
+        return self._last
+
+    def _is_over(self, imu: ImuSample) -> bool:
+        """Whether a stage has come to its end, or takes too long."""
+        if self._motion.failure or self._time >= self._deadline:
+            return True
+        is_still = self._still.time >= STILL_TIME
+        if isinstance(self._motion, PolicyMotion):
+            return is_still and imu.tilt < LEVEL
+        return self._motion.finished and (is_still or not self._rests)
+
+    def _script(self) -> Iterator[None]:
+        """Begin one stage after another, each when the one before is over."""
+        yield
+        if self._policy is not None:
+            yield from self._follow(self._policy)
+            return
+        while self._tries.total() < MAX_TRIES:
+            lying = self._lying
+            if lying is Lying.BACK:
+                self._failure = ON_ITS_BACK
+                return
+            self._tries[lying] += 1
+            if lying is not Lying.BELLY:
+                yield from self._turn_over(lying)
+                continue
+            yield from self._stand_up()
+            if self._finished:
+                return
+        tried = ', '.join(f'{side.value} {count}' for side, count in self._tries.items())
+        self._failure = (
+            f'it lies {self._lying.value}, tilted by {math.degrees(self._tilt):.0f} deg, after '
+            f'{MAX_TRIES} tries ({tried}); look for what hinders its legs, and {BY_HAND}'
+        )
+
+    def _turn_over(self, lying: Lying) -> Iterator[None]:
+        """Try one of the ways from a side, the next one when that was tried before."""
+        ways = self._ways[lying]
+        for stage in ways[(self._tries[lying] - 1) % len(ways)]:
+            targets = list(self._last)
+            for indices, angles in zip(self._robot.leg_indices, stage.legs, strict=True):
+                for index, angle in zip(indices, angles, strict=True):
+                    targets[index] = angle
+            self._go(self._robot.clamp(targets), stage.speed, rests=stage.rests)
+            self.text = f'lies {lying.value}; turns over, try {self._tries[lying]}'
+            yield
+            if self._lying is not lying:
+                return
+
+    def _stand_up(self) -> Iterator[None]:
+        """Gather the legs, and stand on them."""
+        self.text = f'lies {Lying.BELLY.value}; folds its legs, try {self._tries[Lying.BELLY]}'
+        self._go(self._final.folded, FOLD_SPEED)
+        yield
+        if self._lying is not Lying.BELLY:
+            return
+        self.text = 'stands up'
+        self._go(self._final.standing, STAND_SPEED)
+        yield
+        self._finished = self._lying is Lying.BELLY and self._tilt < LEVEL
+
+    def _follow(self, policy: Policy) -> Iterator[None]:
+        """Follow a policy until the robot is upright and at rest."""
+        self.text = f'lies {self._lying.value}; follows the policy {policy.name}'
+        self._motion = PolicyMotion(policy, self._last, EASE_TIME)
+        self._rests, self._time, self._deadline = True, 0.0, POLICY_DEADLINE
+        self._still.reset()
+        yield
+        if self._motion.failure:
+            self._failure = f'the policy {policy.name} failed: {self._motion.failure}; {BY_HAND}'
+        elif self._tilt < LEVEL:
+            self._finished = True
+        else:
+            self._failure = (
+                f'it lies {self._lying.value} after {POLICY_DEADLINE:g} s of the policy '
+                f'{policy.name}; {BY_HAND}'
+            )
+
+    def _go(self, targets: Targets, speed: float, *, rests: bool = True) -> None:
+        """Begin a stage that leads to a pose."""
+        blend = Blend(self._last, targets, speed, MIN_BLEND_TIME)
+        self._motion, self._rests = blend, rests
+        self._time, self._deadline = 0.0, blend.duration + REST_DEADLINE
+
+
+def _angle(one: Vector, other: Vector) -> float:
+    """Return the angle between two unit vectors in [rad]."""
+    return math.acos(min(max(sum(a * b for a, b in zip(one, other, strict=True)), -1.0), 1.0))

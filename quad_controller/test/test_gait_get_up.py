@@ -1,0 +1,346 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The mode get_up: when it is possible, what it does, and what it says when it gives up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+import math
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.states.controller import Controller
+from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES, POLICY_DEADLINE
+from quad_controller.states.get_up_poses import WAYS_UP
+from quad_controller.states.lying import Lying, lying_on
+from quad_controller.states.modes import State
+from quad_controller.states.parameters import StateParameters
+from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
+from quad_description.rotations import about, from_roll_pitch_yaw, Quaternion, rotate
+from quad_gait_policies import STAND
+from quad_gait_rig import FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+
+QUARTER = math.pi / 2
+ATTITUDES: dict[Lying, Quaternion] = {
+    Lying.BELLY: (0.0, 0.0, 0.0, 1.0),
+    Lying.LEFT: about((1.0, 0.0, 0.0), -QUARTER),
+    Lying.RIGHT: about((1.0, 0.0, 0.0), QUARTER),
+    Lying.NOSE: about((0.0, 1.0, 0.0), QUARTER),
+    Lying.TAIL: about((0.0, 1.0, 0.0), -QUARTER),
+    Lying.BACK: about((1.0, 0.0, 0.0), math.pi),
+}
+LONGEST = 200.0  # [s] that all tries together may take
+
+
+def lying(side: Lying) -> ImuSample:
+    """Return the attitude of a body that lies still on a side."""
+    return replace(UPRIGHT, orientation=ATTITUDES[side])
+
+
+def fallen(side: Lying, controller: Controller | None = None) -> Rig:
+    """Return a robot that fell while it stood, and lies on a side."""
+    rig = Rig(controller)
+    rig.step()
+    rig.ask('stand')
+    rig.until(State.STAND)
+    rig.imu = lying(side)
+    rig.until(State.FAULT)
+    return rig
+
+
+def gives_up(rig: Rig) -> str:
+    """Let a robot try until it gives up; return the fault."""
+    for _ in range(round(LONGEST / PERIOD)):
+        rig.step()
+        if rig.is_in(State.FAULT):
+            return rig.controller.status.faults[0]
+    raise AssertionError(f'it tries for ever; {rig.log}')
+
+
+@pytest.mark.parametrize('side', Lying)
+def test_what_is_below_is_where_it_lies(side: Lying) -> None:
+    """Gravity in the body says so, as the attitude is defined in REP 103."""
+    assert lying_on(lying(side).down) is side
+
+
+angles = st.floats(-math.pi, math.pi)
+
+
+@given(roll=angles, pitch=angles, yaw=angles)
+def test_left_and_right_are_mirror_images(roll: float, pitch: float, yaw: float) -> None:
+    """And the heading does not matter; each attitude has a side within 55 degrees of down."""
+    down = ImuSample(from_roll_pitch_yaw(roll, pitch, yaw), None, None).down
+    mirrored = ImuSample(from_roll_pitch_yaw(-roll, pitch, 0.0), None, None).down
+    ranked = sorted(map(abs, down))
+    if ranked[2] - ranked[1] > 1e-6:  # on the edge between two sides it may be either
+        assert lying_on(mirrored) is lying_on(down).mirrored
+    below = {
+        Lying.BELLY: (0.0, 0.0, -1.0), Lying.BACK: (0.0, 0.0, 1.0), Lying.LEFT: (0.0, 1.0, 0.0),
+        Lying.RIGHT: (0.0, -1.0, 0.0), Lying.NOSE: (1.0, 0.0, 0.0), Lying.TAIL: (-1.0, 0.0, 0.0),
+    }[lying_on(down)]  # fmt: skip
+    assert sum(a * b for a, b in zip(below, down, strict=True)) >= 1 / math.sqrt(3) - 1e-9
+    world = rotate(from_roll_pitch_yaw(roll, pitch, yaw), below)
+    assert world[2] <= -1 / math.sqrt(3) + 1e-9
+
+
+def test_ways_up_are_within_the_joints_and_mirrored() -> None:
+    """Of every preset; each way ends at rest, where it is measured what came of it."""
+    for ways in WAYS_UP.values():
+        assert ways
+        for way in ways:
+            assert way[-1].rests
+    for preset in PRESETS:
+        robot = quadruped(robot_urdf(preset))
+        for stage in (stage for ways in WAYS_UP.values() for way in ways for stage in way):
+            for indices, leg in zip(robot.leg_indices, stage.legs, strict=True):
+                for index, angle in zip(indices, leg, strict=True):
+                    limits = robot.limits[index]
+                    assert limits.lower - 0.006 <= angle <= limits.upper + 0.006
+    for side, ways in WAYS_UP.items():
+        back = tuple(tuple(stage.mirrored.mirrored for stage in way) for way in ways)
+        assert back == ways
+        mirrored = tuple(tuple(stage.mirrored for stage in way) for way in ways)
+        assert side.mirrored is side or mirrored == WAYS_UP[side.mirrored]
+
+
+def test_a_robot_that_fell_gets_up_and_stands() -> None:
+    """Asking for it clears the fall; it folds its legs when it lies on its belly, and stands."""
+    rig = fallen(Lying.LEFT)
+    assert 'get_up' in rig.controller.status.faults[0]
+    assert not rig.controller.set_mode('stand').accepted
+    assert rig.ask('get_up') == 'get_up, coming from fault'
+    assert not rig.controller.status.faults
+    before = rig.positions
+    rig.run(1.5)
+    assert rig.is_in(State.GET_UP)
+    assert rig.controller.status.title == 'get_up'
+    assert rig.positions != before
+    rig.imu = UPRIGHT
+    rig.until(State.STAND)
+    rig.run(2.0)
+    assert rig.controller.status.title == 'stand'
+    assert rig.positions == pytest.approx(STAND)
+    assert any('on its left side' in line for line in rig.log)
+    assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
+
+
+@pytest.mark.parametrize('mode', ['relax', 'lie', 'stand', 'walk'])
+def test_it_may_be_asked_for_in_any_mode(mode: str) -> None:
+    """A robot on its feet stays as it is; one that lies stands up."""
+    rig = Rig()
+    rig.step()
+    rig.ask(mode)
+    rig.until(State(mode))
+    on_its_feet = mode in {'stand', 'walk'}
+    answer = rig.ask('recovery_stand')
+    assert answer == (
+        f'{mode}: it is on its feet' if on_its_feet else f'get_up, coming from {mode}'
+    )
+    rig.run(8.0)
+    assert rig.controller.status.title == (mode if on_its_feet else 'stand')
+
+
+def test_on_its_back_it_says_so_and_moves_nothing() -> None:
+    """At once, with what a person has to do; the fall stays latched."""
+    rig = fallen(Lying.BACK)
+    held = rig.positions
+    answer = rig.controller.set_mode('get_up')
+    assert not answer.accepted
+    assert 'stays in fault: it lies on its back' in answer.message
+    assert 'put it on its feet' in answer.message
+    rig.run(2.0)
+    assert rig.is_in(State.FAULT)
+    assert rig.positions == held
+
+
+def test_a_robot_that_comes_to_rest_on_its_back_stops() -> None:
+    """Where the legs are then, with a fault in words; on its feet again, it is cleared."""
+    rig = fallen(Lying.LEFT)
+    rig.ask('get_up')
+    rig.run(1.0)
+    rig.imu = lying(Lying.BACK)
+    assert 'lies on its back' in gives_up(rig)
+    held = rig.positions
+    rig.run(2.0)
+    assert rig.positions == held
+    rig.imu = UPRIGHT
+    rig.step()
+    assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
+
+
+@pytest.mark.parametrize('side', [Lying.LEFT, Lying.RIGHT, Lying.NOSE, Lying.TAIL])
+def test_it_gives_up_after_some_tries(side: Lying) -> None:
+    """It says where it lies, what was tried, and what a person has to do; then it may be asked."""
+    rig = fallen(side)
+    rig.ask('get_up')
+    words = gives_up(rig)
+    assert f'it lies {side.value}, tilted by 90 deg, after {MAX_TRIES} tries' in words
+    assert f'({side.value} {MAX_TRIES})' in words
+    assert 'by hand' in words
+    held = rig.positions
+    rig.run(1.0)
+    assert rig.positions == held
+    rig.ask('get_up')
+    rig.run(0.5)
+    assert rig.is_in(State.GET_UP)
+
+
+def test_one_that_does_not_stand_level_tries_again() -> None:
+    """A heap of legs that keeps it askew is no stand, and a fault in the end."""
+    rig = Rig()
+    rig.imu = tilted(0.6)
+    rig.step()
+    rig.ask('get_up')
+    assert f'({Lying.BELLY.value} {MAX_TRIES})' in gives_up(rig)
+
+
+def test_a_tumbling_robot_is_waited_for() -> None:
+    """Nothing moves before the body is at rest, or that takes too long."""
+    rig = fallen(Lying.LEFT)
+    rig.ask('get_up')
+    held = rig.positions
+    for step in range(round(2.0 / PERIOD)):
+        rig.imu = tilted(-1.5 + 0.3 * (-1) ** step)
+        rig.step()
+    assert rig.positions == held
+    rig.imu = lying(Lying.LEFT)
+    rig.run(1.0)
+    assert rig.positions != held
+
+
+@pytest.mark.parametrize('what', ['battery', 'joints', 'imu'])
+def test_other_faults_come_first(what: str) -> None:
+    """Getting up clears a fall and nothing else; what fails on the way stops the legs."""
+    rig = fallen(Lying.LEFT)
+    rig.ask('get_up')
+    rig.run(1.0)
+    if what == 'battery':
+        rig.battery = 0.01
+    elif what == 'joints':
+        rig.joints = False
+    else:
+        rig.imu = None
+    rig.run(3.5)
+    assert rig.is_in(State.FAULT)
+    held = rig.positions
+    rig.run(1.0)
+    assert rig.positions == held
+    answer = rig.controller.set_mode('get_up')
+    assert not answer.accepted
+    assert 'clear_fault' in answer.message
+    rig.battery, rig.joints, rig.imu = 0.9, True, lying(Lying.LEFT)
+    rig.run(1.0)
+    assert not rig.controller.set_mode('get_up').accepted
+    rig.imu = UPRIGHT
+    rig.run(1.0)
+    assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
+
+
+def test_without_an_attitude_it_does_not_begin() -> None:
+    """Even where the parameters let a robot walk without one."""
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(require_imu=False))
+    rig = Rig(controller)
+    rig.imu = None
+    rig.run(0.1)
+    assert 'attitude' in controller.set_mode('get_up').message
+    rig.imu = lying(Lying.LEFT)
+    rig.run(0.1)
+    rig.ask('get_up')
+    rig.run(1.0)
+    rig.imu = None
+    rig.run(BLIND_DEADLINE + 0.5)
+    assert 'nobody measures how it lies' in controller.status.faults[0]
+
+
+def test_stop_ends_it_where_it_is() -> None:
+    """No posture is half-way for a robot that lies."""
+    rig = fallen(Lying.TAIL)
+    rig.ask('get_up')
+    rig.run(1.0)
+    assert rig.controller.stop().message == 'stopped: get_up; the mode is relax'
+    held = rig.positions
+    rig.run(1.0)
+    assert rig.positions == held
+    assert rig.is_in(State.RELAX)
+
+
+@pytest.mark.parametrize('mode', ['lie', 'relax'])
+def test_there_is_a_way_down(mode: str) -> None:
+    """At any time, as from every other state."""
+    rig = fallen(Lying.RIGHT)
+    rig.ask('get_up')
+    rig.run(1.2)
+    rig.ask(mode)
+    rig.until(State(mode))
+
+
+def policy_rig(policy: StillPolicy) -> Rig:
+    """Return a robot whose get_up follows a policy, on its back."""
+    controller = Controller(ROBOT, GaitParameters(), StateParameters(), get_up_policy=policy)
+    return fallen(Lying.BACK, controller)
+
+
+def test_a_policy_may_bring_it_to_its_feet() -> None:
+    """From the back, too; upright and at rest, the gait takes over and it stands."""
+    policy = StillPolicy(FOLDED)
+    rig = policy_rig(policy)
+    rig.ask('get_up')
+    rig.run(4.0)
+    assert rig.is_in(State.GET_UP)
+    assert policy.resets == 1
+    assert rig.positions == pytest.approx(FOLDED)
+    assert all(velocity.at_rest for velocity in policy.velocities)
+    rig.imu = UPRIGHT
+    rig.until(State.STAND)
+    rig.run(3.0)
+    assert rig.controller.status.title == 'stand'
+    assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
+
+
+def test_a_policy_has_a_deadline() -> None:
+    """And one that fails is given up; both say so."""
+    policy = StillPolicy(FOLDED)
+    rig = policy_rig(policy)
+    rig.ask('get_up')
+    words = gives_up(rig)
+    assert f'it lies on its back after {POLICY_DEADLINE:g} s of the policy still' in words
+    policy.targets = None
+    rig.ask('get_up')
+    assert 'the policy still failed: broken on purpose' in gives_up(rig)
+
+
+sides = st.sampled_from([*Lying, None])
+
+
+@settings(max_examples=30)
+@given(
+    script=st.lists(st.tuples(sides, st.floats(0.05, 3.0)), min_size=1, max_size=12),
+    ends=st.sampled_from(['stop', 'lie', 'relax', None]),
+)
+def test_whatever_it_rolls_to_it_ends(
+    script: list[tuple[Lying | None, float]], ends: str | None
+) -> None:
+    """Standing, or in a fault that says why; targets are bounded and within the limits."""
+    rig = fallen(Lying.LEFT)
+    rig.ask('get_up')
+    for side, duration in script:
+        rig.imu = lying(side) if side is not None else None
+        rig.run(duration)
+        for target, limits in zip(rig.positions, ROBOT.limits, strict=True):
+            assert limits.lower - 1e-9 <= target <= limits.upper + 1e-9
+    assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
+    if ends == 'stop':
+        rig.controller.stop()
+    elif ends is not None:
+        rig.ask(ends)
+    for _ in range(round(LONGEST / PERIOD)):
+        if not rig.is_in(State.GET_UP):
+            break
+        rig.step()
+    rig.run(0.5)
+    state = rig.controller.status.state
+    assert state in {State.STAND, State.FAULT, State.RELAX, State.LIE}
+    assert state is not State.FAULT or rig.controller.status.faults
