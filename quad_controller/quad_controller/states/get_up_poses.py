@@ -70,8 +70,8 @@ _STRAIGHT = (0.0, 0.0, 0.8)
 """Straight legs bring the centre of mass to the belly's side."""
 
 _OFF_THE_NOSE: tuple[Way, ...] = (
-    (_ends(front=(0.0, 1.57, 0.5), back=(0.0, 1.0, 0.5)),),
     (_ends(front=_STRAIGHT, back=_STRAIGHT),),
+    (_ends(front=(0.0, 1.57, 0.5), back=(0.0, 1.0, 0.5)),),
 )
 _OFF_THE_TAIL: tuple[Way, ...] = (
     (_ends(front=(0.1, 1.25, -0.7), back=(-0.2, -1.2, -0.5)),),
