@@ -40,7 +40,9 @@ PICTURES = Path(__file__).parents[1] / 'build' / 'screenshots'
 """Where pictures of the tests are kept, to be looked at."""
 PANEL = 330  # [px] width of the controls at the right
 TOP = 170  # [px] height of STOP and of messages
-_opened: list[Page] = []
+
+
+_started: list[Browser] = []
 
 
 def url_of(robot: RunningProcess, timeout: float) -> str:
@@ -85,9 +87,14 @@ def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
         script.write_text(f'#!/bin/sh\nexec {shlex.join([*prefix, _program()])} "$@"\n')
         script.chmod(0o700)
         started = launch(playwright.chromium, str(script))
+        _started.append(started)
         try:
             yield started
+        except BaseException:
+            print('pages:', *texts(), sep='\n')  # pytest shows it with the failure
+            raise
         finally:
+            _started.remove(started)
             started.close()
 
 
@@ -122,7 +129,6 @@ def asleep() -> Iterator[None]:
 def open_page(browser: Browser, url: str, **options: object) -> Page:
     """Open a page and wait until it shows the robot's controls."""
     page = browser.new_page(**({'viewport': SIZE} | options))  # type: ignore[arg-type]
-    _opened.append(page)
     page.set_default_timeout(PAGE_TIMEOUT)
     page.goto(url)
     page.get_by_role('tab', name='Joints').wait_for()
@@ -130,12 +136,12 @@ def open_page(browser: Browser, url: str, **options: object) -> Page:
 
 
 def texts() -> Iterator[str]:
-    """Yield what the pages that are open say, for whoever looks for the cause of a failure."""
-    from playwright.sync_api import Error
+    """Yield what the pages say that are open, for whoever looks for the cause of a failure."""
+    for started in _started:
+        from playwright.sync_api import Error
 
-    for page in _opened:
-        with suppress(Error):  # of one that was killed
-            if not page.is_closed():
+        for page in (page for context in started.contexts for page in context.pages):
+            with suppress(Error):  # of one that was killed
                 yield page.locator('body').inner_text(timeout=TEXT_TIMEOUT)
 
 

@@ -5,28 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import math
 import time
 from typing import Any, TYPE_CHECKING
 
-from rcl_interfaces.srv import GetParameterTypes
 import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.node import Node
 from std_srvs.srv import Trigger
+
+from node_runner import ServerMatch
 
 if TYPE_CHECKING:
     from types import TracebackType
 
     from typing_extensions import Self
-
-
-ANSWER_TIME = 1.0
-"""Time in [s] after which an answer counts as lost."""
 
 
 class RosClient:
@@ -52,64 +48,18 @@ class RosClient:
 
     def call_async(self, service_type: Any, name: str, request: Any, timeout: float = 60.0) -> Any:
         """Wait for a service, call it and return the future."""
-        client = self.client_of(service_type, name, timeout)
-        self._wait_for(client, timeout)
-        return client.call_async(request)
+        return self.client_of(service_type, name, timeout).call_async(request)
 
     def client_of(self, service_type: Any, name: str, timeout: float = 60.0) -> Client:
         """Return the client of a service, which knows it."""
         if name not in self._clients:
             self._clients[name] = client = self.node.create_client(service_type, name)
-            self._wait_for(client, timeout)
-            self._become_known(client.service_name, timeout)
-        return self._clients[name]
-
-    @staticmethod
-    def _wait_for(client: Client, timeout: float) -> None:
+            matched = ServerMatch(self.node, [name])
+            self.spin_until(matched.advance, timeout, f'node of {name} that knows this client')
+        client = self._clients[name]
         if not client.wait_for_service(timeout):
             raise AssertionError(f'there is no service {client.service_name}')
-
-    def _become_known(self, service: str, timeout: float) -> None:
-        """Wait until the node of a service knows the client of it.
-
-        On a busy machine DDS loses the answer to a client that the server does not know yet.
-        Clients become known in the order in which they were made; so once an answer has come to
-        one that was made later, and may be asked for again and again, the others are known.
-        """
-        services: list[str] = []
-
-        def found() -> bool:
-            for node in self.node.get_node_names_and_namespaces():
-                services[:] = self._services_of(*node)
-                if service in services:
-                    return True
-            return False
-
-        self.spin_until(found, timeout, f'node of {service}')
-        probes = [name for name in services if name.endswith('/get_parameter_types')]
-        if not probes:
-            return
-        probe = self.node.create_client(GetParameterTypes, probes[0])
-        self._wait_for(probe, timeout)
-        answers: list[Any] = []
-        asked = -math.inf
-
-        def answered() -> bool:
-            nonlocal asked
-            if time.monotonic() - asked > ANSWER_TIME:
-                answers.append(probe.call_async(GetParameterTypes.Request()))
-                asked = time.monotonic()
-            return any(answer.done() for answer in answers)
-
-        self.spin_until(answered, timeout, f'an answer of {probes[0]}')
-        self.node.destroy_client(probe)
-
-    def _services_of(self, node: str, namespace: str) -> list[str]:
-        try:
-            found = self.node.get_service_names_and_types_by_node(node, namespace)
-        except NodeNameNonExistentError:  # it has ended in between
-            return []
-        return [name for name, _ in found]
+        return client
 
     def trigger(self, name: str, timeout: float = 60.0) -> Any:
         """Call a std_srvs/Trigger."""

@@ -5,18 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-import math
 import time
 from typing import Any
 
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 
+from node_runner import ServerMatch
 from process_supervisor import CallError
 from process_supervisor.graph_client import GraphClient
-
-ANSWER_TIME = 10.0
-"""After which an answer counts as lost in [s]; enabling takes less."""
 
 
 class ServiceClient(GraphClient):
@@ -32,6 +28,7 @@ class ServiceClient(GraphClient):
         """
         super().__init__(name, given_up, namespace)
         self._clients: dict[str, Any] = {}
+        self._known: set[str] = set()
 
     def prepare(self, services: Iterable[str]) -> None:
         """Look for services that will be called, so that they are known when they are needed.
@@ -45,9 +42,7 @@ class ServiceClient(GraphClient):
     def call(self, services: list[str], timeout: float) -> dict[str, str]:
         """Call services side by side.
 
-        One that does not answer is called again: DDS loses the answer where the server does not
-        know this client yet, which takes a while on a busy machine. So they may be none that do
-        more when they are called twice.
+        Each is called once, when its node knows this client.
 
         Args:
             services: Names that were prepared.
@@ -67,25 +62,24 @@ class ServiceClient(GraphClient):
             timeout,
             f'the services {", ".join(services)}',
         )
-        answers: dict[str, Trigger.Response] = {}
-        asked: dict[str, list[Future]] = {name: [] for name in services}
-        called = -math.inf
-
-        def answered() -> bool:
-            nonlocal called
-            for name, futures in asked.items():
-                done = [future for future in futures if future.done()]
-                if done and name not in answers:
-                    answers[name] = done[0].result()
-            if time.monotonic() - called > ANSWER_TIME:
-                called = time.monotonic()
-                for name in asked.keys() - answers.keys():
-                    asked[name].append(clients[name].call_async(Trigger.Request()))
-            return answers.keys() == asked.keys()
-
-        left = max(0.0, end - time.monotonic())
-        self.wait_until(answered, left, f'the answers of {", ".join(services)}')
+        self._be_known(services, max(0.0, end - time.monotonic()))
+        futures = {name: client.call_async(Trigger.Request()) for name, client in clients.items()}
+        self.wait_until(
+            lambda: all(future.done() for future in futures.values()),
+            max(0.0, end - time.monotonic()),
+            f'the answers of {", ".join(services)}',
+        )
+        answers = {name: future.result() for name, future in futures.items()}
         refused = [f'{name}: {each.message}' for name, each in answers.items() if not each.success]
         if refused:
             raise CallError('; '.join(refused))
         return {name: each.message for name, each in answers.items()}
+
+    def _be_known(self, services: list[str], timeout: float) -> None:
+        """Wait until the nodes of services know this client, and all that is prepared."""
+        if self._known.issuperset(services):
+            return
+        there = {name for name, client in self._clients.items() if client.service_is_ready()}
+        matched = ServerMatch(self.node, there - self._known)
+        self.wait_until(matched.advance, timeout, f'the nodes of {", ".join(services)}')
+        self._known |= there

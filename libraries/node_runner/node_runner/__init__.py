@@ -15,6 +15,7 @@ from .program import run_node, run_program
 from .qos import LATCHED
 from .readiness import notify_ready
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
+from .server_match import ServerMatch
 from .signals import stop_on_signals
 from .spinning import LINGER, make_executor, spin, spin_beside, WAKE_PERIOD
 
@@ -25,6 +26,7 @@ __all__ = [
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',
+    'ServerMatch',
     'create_deferred_service',
     'declare_black_box',
     'declare_given',
