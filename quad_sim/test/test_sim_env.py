@@ -20,6 +20,9 @@ from quad_description import robot_urdf
 from quad_sim import SetupError, SimulationError, TargetError
 from quad_sim.env import (
     CommandRanges,
+    Drop,
+    GetUpEnv,
+    GetUpWeights,
     ID,
     NO_RANDOMIZATION,
     Observation,
@@ -300,6 +303,15 @@ def test_ranges_from_which_nothing_can_be_drawn_are_refused(wrong: dict[str, obj
         lambda: CommandRanges(rest=2.0),
         lambda: RewardWeights(tracking=math.nan),
         lambda: RewardWeights(turning_width=0.0),
+        lambda: GetUpWeights(upright=math.inf),
+        lambda: GetUpWeights(height_width=-0.1),
+        lambda: Drop(tilt=(0.0, 4.0)),
+        lambda: Drop(height=(-0.1, 0.1)),
+        lambda: Drop(joints=1.5),
+        lambda: Drop(limp=-0.1),
+        lambda: Drop(time=math.inf),
+        lambda: GetUpEnv(duration=2.0, shortest=3.0),
+        lambda: WalkingEnv(duration=0.01),
     ],
 )
 def test_commands_and_weights_of_no_use_are_refused(make: Callable[[], object]) -> None:

@@ -30,7 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import SetupError, SimulationError
-from .walking import Floats, WalkingEnv
+from .get_up import GetUpEnv
+from .observation import Floats
+from .walking import WalkingEnv
 
 Env = gymnasium.Env[Floats, Floats]
 Seed = int | list[int | None] | None
@@ -222,6 +224,16 @@ def walking_processes(num_envs: int = 1, **keywords: Any) -> ProcessVectorEnv:  
         **keywords: Of :class:`.walking.WalkingEnv`.
     """
     return ProcessVectorEnv(partial(WalkingEnv, **keywords), num_envs)
+
+
+def get_up_processes(num_envs: int = 1, **keywords: Any) -> ProcessVectorEnv:  # noqa: ANN401
+    """Make many robots that are to get up.
+
+    Args:
+        num_envs: How many.
+        **keywords: Of :class:`.get_up.GetUpEnv`.
+    """
+    return ProcessVectorEnv(partial(GetUpEnv, **keywords), num_envs)
 
 
 Answer = list[tuple[int, Any]] | str

@@ -6,35 +6,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
 import math
 from typing import Any
 
 import gymnasium
 from gymnasium import spaces
 import numpy as np
-from numpy.typing import NDArray
 
-from quad_description import (
-    ImuSample,
-    JointSample,
-    movable_joints,
-    Pose,
-    pose_positions,
-    robot_urdf,
-    RobotState,
-)
-from quad_description.rotations import down_in_body, Vector
+from quad_description import RobotState
+from quad_description.rotations import Vector
 
-from ..exceptions import SetupError, TargetError
-from ..physics import ImuBias, Robot
+from ..exceptions import SetupError
 from ..plant.servo import ServoModel, ServoParameters
+from .episode import Episode
+from .observation import Floats, Observation, row_of, WALKING
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
-from .rewards import Moved, RewardWeights
+from .randomized_robot import PERIOD, RandomizedRobot
+from .rewards import RewardWeights
 
-Floats = NDArray[np.float32]
-
-PERIOD = 0.02  # [s]
 MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
 
 
@@ -78,21 +67,6 @@ class CommandRanges:
         return x, y, yaw
 
 
-class Observation(Enum):
-    """Parts of an observation in their order: what it is, and how many numbers (0: a joint)."""
-
-    ANGULAR_VELOCITY = ('of base_link in its own frame in [rad/s]', 3)
-    DOWN = ('direction of gravity in base_link', 3)
-    COMMAND = ('velocity ahead and to the left in [m/s], turning in [rad/s]', 3)
-    POSITIONS = ('of the joints, from those of a robot that stands, in [rad]', 0)
-    VELOCITIES = ('of the joints in [rad/s]', 0)
-    ACTION = ('of the step before in [rad]', 0)
-
-    def width(self, joints: int) -> int:
-        """Return how many numbers it has."""
-        return self.value[1] or joints
-
-
 class WalkingEnv(gymnasium.Env[Floats, Floats]):
     """A quadruped that is to walk as commanded.
 
@@ -102,7 +76,7 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
 
     Attributes:
         robot: The robot in physics.
-        state: What its sensors measured last.
+        period: Time of a step in [s].
         command: Velocity that is commanded: ahead and to the left in [m/s], turning in [rad/s].
         stand: Joint positions of a robot that stands in [rad].
     """
@@ -133,29 +107,21 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             SetupError: A time is not above 0, or a target may come later than its step ends.
             DescriptionError: There is no such preset.
         """
-        if not (0.0 < period < math.inf and period <= duration < math.inf):
-            raise SetupError(
-                f'period {period} s, duration {duration} s: give 0 < period < duration'
-            )
-        urdf = robot_urdf(preset)
-        self.robot = Robot(urdf, servo, noise=randomization.noise)
-        self.period, self.duration = period, duration
-        self.vary(randomization)
-        self._commands = commands or CommandRanges()
         self._weights = weights or RewardWeights()
-        names = self.robot.joint_names
-        limits = [joint.limits for joint in movable_joints(urdf)]
-        stand = pose_positions(Pose.STAND)
-        self.stand: Floats = np.array([stand[name] for name in names], np.float32)
-        self._lowest: Floats = np.array([each.lower for each in limits], np.float32) - self.stand
-        self._highest: Floats = np.array([each.upper for each in limits], np.float32) - self.stand
-        self.action_space = spaces.Box(self._lowest, self._highest)
-        width = sum(part.width(len(names)) for part in Observation)
+        self._episode = Episode(period, duration, self._weights.names)
+        self._body = RandomizedRobot(preset, servo, randomization, period)
+        self.robot, self.period, self.stand = self._body.robot, period, self._body.stand
+        self._commands = commands or CommandRanges()
+        self.action_space = self._body.action_space
+        width = sum(part.width(len(self.stand)) for part in WALKING)
         self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
         self.command: Vector = (0.0, 0.0, 0.0)
-        self.state = RobotState()
-        self._action: Floats = np.zeros_like(self.stand)
         self._begin()
+
+    @property
+    def state(self) -> RobotState:
+        """What its sensors measured last."""
+        return self._body.state
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -184,40 +150,16 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             TargetError: A number is not finite, or there are too many or few.
             SimulationError: The physics blew up.
         """
-        wanted = np.asarray(action, np.float32)
-        if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
-            raise TargetError(
-                f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
-            )
-        wanted = np.clip(wanted, self._lowest, self._highest)
-        robot, random = self.robot, self.np_random
-        interval = self._randomization.kick_interval
-        if interval and random.random() < self.period / interval:
-            robot.kick((*random.uniform(*self._randomization.kick, 2).tolist(), 0.0))
-        if self._delay:
-            robot.step(self._delay)
-        robot.set_targets((self.stand + wanted).astype(np.float64))
-        robot.step(self.period - self._delay)
-        self._steps += 1
-        moved = self._moved(wanted)
-        terms = self._weights.terms(moved, self.period)
-        for name, value in terms.items():
-            self._sums[name] += value
-        self._action = wanted
-        is_over = self._steps >= round(self.duration / self.period)
-        info: dict[str, Any] = {}
-        if moved.fallen or is_over:
-            info['reward_terms'] = dict(self._sums)
-        if not self._is_command_lasting and self._steps % self._command_steps == 0:
-            self.command = self._commands.draw(random)  # what is seen now is judged next
-        self.state = self._sense()
-        return (
-            self._observation(),
-            sum(terms.values()),
-            moved.fallen,
-            is_over and not moved.fallen,
-            info,
-        )
+        motion = self._body.step(action, self.np_random)
+        fallen = motion.tilt > MAX_TILT
+        terms = self._weights.terms(motion, self.command, self.period, fallen=fallen)
+        reward = self._episode.add(terms)
+        is_over = self._episode.is_over
+        info = self._episode.info if fallen or is_over else {}
+        if not self._is_command_lasting and self._episode.steps % self._command_steps == 0:
+            # what is seen now is judged next
+            self.command = self._commands.draw(self.np_random)
+        return self._observation(), reward, fallen, is_over and not fallen, info
 
     def vary(self, randomization: Randomization) -> None:
         """Let other things differ from the next episode on; noise stays as it was made.
@@ -225,72 +167,17 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         Raises:
             SetupError: A target may come later than its step ends.
         """
-        if randomization.delay[1] >= self.period:
-            raise SetupError(
-                f'delay {randomization.delay} s: give less than a period, {self.period} s'
-            )
-        self._randomization = randomization
+        self._body.vary(randomization)
 
     def _begin(self, command: Vector | None = None) -> None:
-        random, ranges = self.np_random, self._randomization
-        self.robot.reset(seed=int(random.integers(2**31)), variation=ranges.variation(random))
-        self._delay = float(random.uniform(*ranges.delay))
-        x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
-        self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
+        self._body.begin(self.np_random)
         self._is_command_lasting = command is not None
-        self.command = command or self._commands.draw(random)
-        self._steps = 0
+        self.command = command or self._commands.draw(self.np_random)
         self._command_steps = max(round(self._commands.time / self.period), 1)
-        self._sums = dict.fromkeys(self._weights.names, 0.0)
-        self._action = np.zeros_like(self.stand)
-        self.state = self._sense()
-
-    def _sense(self) -> RobotState:
-        measured = self.robot.measure()
-        imu = measured.imu
-        orientation = self._bias.orientation(*imu.roll_pitch_yaw)
-        rates = self._bias.rates(imu.angular_velocity)
-        return RobotState(
-            JointSample(
-                tuple(measured.positions.tolist()),
-                tuple(measured.velocities.tolist()),
-                self.robot.time,
-            ),
-            ImuSample(orientation, rates, imu.specific_force),
-            time=self.robot.time,
-        )
+        self._episode.begin()
 
     def _observation(self) -> Floats:
-        joints, imu = self.state.joints, self.state.imu
-        if (
-            joints is None
-            or imu is None
-            or joints.velocities is None
-            or imu.angular_velocity is None
-        ):
-            raise SetupError('a robot in physics measures joints and attitude')
-        parts = {
-            Observation.ANGULAR_VELOCITY: imu.angular_velocity,
-            Observation.DOWN: imu.down,
-            Observation.COMMAND: self.command,
-            Observation.POSITIONS: np.asarray(joints.positions) - self.stand,
-            Observation.VELOCITIES: joints.velocities,
-            Observation.ACTION: self._action,
-        }
-        return np.concatenate([np.asarray(parts[part], np.float32) for part in Observation])
-
-    def _moved(self, action: Floats) -> Moved:
-        robot = self.robot
-        pose = robot.base_pose
-        return Moved(
-            commanded=self.command,
-            velocity=robot.base_velocity,
-            down=down_in_body(pose.orientation),
-            torques=robot.joint_torques,
-            velocities=robot.joint_velocities,
-            target_speed=(action.astype(np.float64) - self._action) / self.period,
-            fallen=pose.tilt > MAX_TILT,
-        )
+        return row_of({**self._body.seen, Observation.COMMAND: self.command}, WALKING)
 
 
 def _lasting_command(options: Mapping[str, Any]) -> Vector | None:

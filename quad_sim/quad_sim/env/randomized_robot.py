@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""The robot that every environment has: another one in each episode, moved and sensed in steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from gymnasium import spaces
+import numpy as np
+from numpy.typing import ArrayLike
+
+from quad_description import (
+    ImuSample,
+    JointSample,
+    movable_joints,
+    Pose,
+    pose_positions,
+    robot_urdf,
+    RobotState,
+)
+from quad_description.rotations import down_in_body
+
+from ..exceptions import SetupError, TargetError
+from ..physics import ImuBias, Robot
+from ..plant.servo import ServoModel, ServoParameters
+from .observation import Floats, Observation
+from .randomization import Randomization
+from .rewards import Motion
+
+PERIOD = 0.02  # [s]
+
+
+class RandomizedRobot:
+    """A robot in physics that differs in each episode, by ranges that are data.
+
+    Actions are how far the targets of the joints are from a robot that stands in [rad].
+
+    Attributes:
+        robot: The robot in physics.
+        period: Time of a step in [s].
+        stand: Joint positions of a robot that stands in [rad].
+        lowest: Actions that lead to the lower limits of the joints in [rad].
+        highest: Actions that lead to their upper limits in [rad].
+        action_space: All between them.
+        action: The one of the step before; what the set-points are at the start of an episode.
+        state: What the sensors measured last.
+    """
+
+    def __init__(
+        self,
+        preset: str,
+        servo: ServoModel | ServoParameters,
+        randomization: Randomization,
+        period: float,
+    ) -> None:
+        """Put the robot on the ground.
+
+        Args:
+            preset: The robot.
+            servo: How its servos follow.
+            randomization: What differs in each episode.
+            period: Time of a step in [s].
+
+        Raises:
+            SetupError: A target may come later than its step ends.
+            DescriptionError: There is no such preset.
+        """
+        urdf = robot_urdf(preset)
+        self.robot = Robot(urdf, servo, noise=randomization.noise)
+        self.period = period
+        self.vary(randomization)
+        limits = [joint.limits for joint in movable_joints(urdf)]
+        stand = pose_positions(Pose.STAND)
+        self.stand: Floats = np.array([stand[name] for name in self.robot.joint_names], np.float32)
+        self.lowest: Floats = np.array([each.lower for each in limits], np.float32) - self.stand
+        self.highest: Floats = np.array([each.upper for each in limits], np.float32) - self.stand
+        self.action_space = spaces.Box(self.lowest, self.highest)
+        self.action: Floats = np.zeros_like(self.stand)
+        self.state = RobotState()
+
+    def vary(self, randomization: Randomization) -> None:
+        """Let other things differ from the next episode on; noise stays as it was made.
+
+        Raises:
+            SetupError: A target may come later than its step ends.
+        """
+        if randomization.delay[1] >= self.period:
+            raise SetupError(
+                f'delay {randomization.delay} s: give less than a period, {self.period} s'
+            )
+        self._randomization = randomization
+
+    def begin(self, random: np.random.Generator, **start: Any) -> None:  # noqa: ANN401
+        """Be another robot of the ranges.
+
+        Args:
+            random: What is drawn comes from it.
+            **start: Where it is, as for :meth:`.Robot.reset`; it stands on the ground without.
+        """
+        ranges = self._randomization
+        seed = int(random.integers(2**31))
+        self.robot.reset(seed=seed, variation=ranges.variation(random), **start)
+        self._delay = float(random.uniform(*ranges.delay))
+        x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
+        self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
+        self.settle(0.0)
+
+    def settle(self, duration: float, *, limp: bool = False) -> None:
+        """Let time pass before the first step; the servos hold what they are at in the end.
+
+        Args:
+            duration: How long in [s].
+            limp: The servos have no torque until then.
+        """
+        if duration:
+            self.robot.set_torque(not limp)
+            self.robot.step(duration)
+            self.robot.set_torque(True)
+        self.action = self.robot.joint_targets.astype(np.float32) - self.stand
+        self.state = self._sense()
+
+    def step(self, action: Floats, random: np.random.Generator) -> Motion:
+        """Send joint targets, let a period pass, and sense.
+
+        Args:
+            action: What leads beyond a limit is taken to the limit.
+            random: Kicks are drawn from it.
+
+        Returns:
+            What the step brought about.
+
+        Raises:
+            TargetError: A number is not finite, or there are too many or few.
+            SimulationError: The physics blew up.
+        """
+        wanted = np.asarray(action, np.float32)
+        if wanted.shape != self.stand.shape or not np.isfinite(wanted).all():
+            raise TargetError(
+                f'action {wanted}: give a finite number for each of {len(self.stand)} joints'
+            )
+        wanted = np.clip(wanted, self.lowest, self.highest)
+        robot, interval = self.robot, self._randomization.kick_interval
+        if interval and random.random() < self.period / interval:
+            robot.kick((*random.uniform(*self._randomization.kick, 2).tolist(), 0.0))
+        if self._delay:
+            robot.step(self._delay)
+        robot.set_targets((self.stand + wanted).astype(np.float64))
+        robot.step(self.period - self._delay)
+        motion = self._motion(wanted)
+        self.action = wanted
+        self.state = self._sense()
+        return motion
+
+    @property
+    def seen(self) -> Mapping[Observation, ArrayLike]:
+        """What a policy may see of it now."""
+        joints, imu = self.state.joints, self.state.imu
+        if (
+            joints is None
+            or imu is None
+            or joints.velocities is None
+            or imu.angular_velocity is None
+        ):
+            raise SetupError('a robot in physics measures joints and attitude')
+        return {
+            Observation.ANGULAR_VELOCITY: imu.angular_velocity,
+            Observation.DOWN: imu.down,
+            Observation.POSITIONS: np.asarray(joints.positions) - self.stand,
+            Observation.VELOCITIES: joints.velocities,
+            Observation.ACTION: self.action,
+        }
+
+    def _sense(self) -> RobotState:
+        measured = self.robot.measure()
+        imu = measured.imu
+        orientation = self._bias.orientation(*imu.roll_pitch_yaw)
+        rates = self._bias.rates(imu.angular_velocity)
+        return RobotState(
+            JointSample(
+                tuple(measured.positions.tolist()),
+                tuple(measured.velocities.tolist()),
+                self.robot.time,
+            ),
+            ImuSample(orientation, rates, imu.specific_force),
+            time=self.robot.time,
+        )
+
+    def _motion(self, action: Floats) -> Motion:
+        robot = self.robot
+        pose = robot.base_pose
+        return Motion(
+            velocity=robot.base_velocity,
+            height=pose.position[2],
+            tilt=pose.tilt,
+            down=down_in_body(pose.orientation),
+            off_stand=robot.joint_positions - self.stand,
+            torques=robot.joint_torques,
+            velocities=robot.joint_velocities,
+            target_speed=(action.astype(np.float64) - self.action) / self.period,
+        )
