@@ -37,7 +37,7 @@ help:
 	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers, manual'
 	@echo 'make docs       build the manual as a site in build/site, to be read without a network'
 	@echo 'make bench      print the figures'
-	@echo 'make train      train a policy that walks, check it and compare it with the gait (MINUTES=30, SEED=1)'
+	@echo 'make train      train a policy, check it and compare it: that walks, or gets up after a fall (TASK=walk or getup, MINUTES=30, SEED=1)'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
 	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'
 	@echo 'make setup      make the environment only'

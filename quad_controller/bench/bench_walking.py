@@ -16,7 +16,6 @@ import argparse
 
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy.shipped import shipped_policies
 from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table, text_of
@@ -25,6 +24,7 @@ from quad_controller.policy_check.trial import (
     chain_duration,
     run_chain,
     run_trials,
+    shipped_walkers,
     Trial,
 )
 
@@ -63,7 +63,7 @@ def main() -> None:
     parser.add_argument('--chain-minutes', type=float, default=0.8, help='0: leave it out')
     options = parser.parse_args()
     walkers = {'gait': Candidate(), 'gait, low, wide': Candidate(gait=LOW_AND_WIDE)}
-    walkers |= {name: Candidate(path) for name, path in shipped_policies().items()}
+    walkers |= shipped_walkers()
     commands = course_for(None)
     trials = {
         (name, title): Trial(who, commands, options.duration, ground)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The environment as a policy with a contract sees it: what is trained is what runs later.
+"""The environments as a policy with a contract sees them: what is trained is what runs later.
 
 Observations and targets are made by the runner that the controller has, and the targets pass its
 limiter of speeds.
@@ -8,29 +8,33 @@ limiter of speeds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import math
 from typing import Any
 
 from gait_teacher import GaitTeacher
+from get_up_teacher import GetUpTeacher
 import gymnasium
 from gymnasium import spaces
 import numpy as np
-from trained_contract import contract_of, contract_values, PERIOD, SCALE, Values
+from trained_contract import (
+    contract_of,
+    get_up_values,
+    PERIOD,
+    Values,
+    walking_values,
+)
 
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.velocity import Velocity
-from quad_controller.policy.contract.model import RecurrentState, Source
+from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.policy.contract.model import PolicyContract, RecurrentState, Source
 from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.network import Floats, Port
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.limiter import StepLimiter
-from quad_description import Quadruped, quadruped, robot_urdf
-from quad_sim.env import Randomization, WalkingEnv
-
-IMITATED = 'imitation of the trot (DAgger in quad_sim/Walk-v0, firm servos)'
-PRACTISED = 'imitation of the trot, then PPO (quad_sim/Walk-v0, firm servos)'
+from quad_description import Quadruped, quadruped, robot_urdf, Targets
+from quad_sim.env import Drop, GetUpEnv, Randomization, WalkingEnv
 
 
 def teacher_of(robot: Quadruped) -> GaitTeacher:
@@ -38,15 +42,31 @@ def teacher_of(robot: Quadruped) -> GaitTeacher:
     return GaitTeacher(robot, LOW_AND_WIDE)
 
 
-def values_for(robot: Quadruped, kind: str = '') -> Values:
-    """Return the contract of a policy for a robot.
+DROP = Drop(tilt=(0.5, 2.2))
+"""Fewer robots on their backs than after any drop, and more on their sides."""
+SHORTEST, LONGEST = 3.0, 8.0
+"""Times of an episode of getting up in [s]; different ones keep environments out of step."""
+
+
+def walking_contract(robot: Quadruped, kind: str = '') -> Values:
+    """Return the contract of a policy that walks.
 
     Args:
         robot: The robot.
         kind: How the policy is made, for people.
     """
     teacher = teacher_of(robot)
-    return contract_values(robot.names, teacher.stand, teacher.schedule.period, kind)
+    return walking_values(robot.names, teacher.stand, teacher.schedule.period, kind)
+
+
+def get_up_contract(robot: Quadruped, kind: str = '') -> Values:
+    """Return the contract of a policy that gets up.
+
+    Args:
+        robot: The robot.
+        kind: How the policy is made, for people.
+    """
+    return get_up_values(robot.names, GetUpTeacher(robot).stand, kind)
 
 
 class NoNetwork:
@@ -73,19 +93,30 @@ class NoNetwork:
 
 
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
-    """Walking, with the observations and actions of the contract.
+    """A task with the observations and actions of a contract.
 
     Attributes:
         contract: The contract.
-        walking: The environment below.
+        simulation: The environment below.
     """
 
-    def __init__(self, env: WalkingEnv) -> None:
-        """Wrap an environment."""
+    def __init__(
+        self,
+        env: WalkingEnv | GetUpEnv,
+        values: Values,
+        commanded: Callable[[], Velocity] = lambda: REST,
+    ) -> None:
+        """Wrap an environment.
+
+        Args:
+            env: The environment.
+            values: The contract.
+            commanded: Returns the velocity that is commanded now.
+        """
         super().__init__(env)
-        self.walking = env
+        self.simulation, self._commanded = env, commanded
         robot = quadruped(robot_urdf())
-        self.contract = contract_of(values_for(robot))
+        self.contract = contract_of(values)
         self._runner = PolicyRunner(
             'training', NoNetwork(), self.contract, robot, options=PolicyOptions(), period=PERIOD
         )
@@ -97,19 +128,19 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats, dict[str, Any]]:
-        """Stand on the ground again, somewhere in the cycle of the gait."""
-        _, info = self.walking.reset(seed=seed, options=options)
-        stand = tuple(self.walking.stand.tolist())
-        self._runner.reset(stand)
-        self._limiter.start(stand)
-        self._runner.advance(float(self.walking.np_random.uniform()))
+        """Begin an episode where the set-points are, somewhere in the cycle of a gait."""
+        _, info = self.simulation.reset(seed=seed, options=options)
+        start = tuple(self.simulation.robot.joint_targets.tolist())
+        self._runner.reset(start)
+        self._limiter.start(start)
+        self._runner.advance(float(self.simulation.np_random.uniform()))
         return self._observe(), info
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Do what an answer of the network means, and let a period pass."""
         wanted = self._runner.act(np.asarray(action, np.float32), PERIOD)
         targets = np.array(self._limiter.step(wanted, PERIOD), np.float32)
-        _, reward, fallen, over, info = self.walking.step(targets - self.walking.stand)
+        _, reward, fallen, over, info = self.simulation.step(targets - self.simulation.stand)
         self._runner.advance(PERIOD)
         return self._observe(), float(reward), fallen, over, info
 
@@ -120,51 +151,79 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         Raises:
             ValueError: The environment measures no joints or no attitude.
         """
-        joints, imu = self.walking.state.joints, self.walking.state.imu
+        joints, imu = self.simulation.state.joints, self.simulation.state.imu
         if joints is None or imu is None:
             raise ValueError('a robot in physics measures joints and attitude')
-        return PolicyInputs(joints, imu, Velocity(*self.walking.command))
+        return PolicyInputs(joints, imu, self._commanded())
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()
         return seen
 
 
+Teacher = Callable[[PolicyInputs, Floats], Targets]
+"""Answers joint targets [rad] for what is measured, and the observation that is made of it."""
+
+
 class TaughtEnv(gymnasium.ObservationWrapper[Floats, Floats, Floats]):
     """With what the teacher would do behind each observation."""
 
-    def __init__(self, env: ContractEnv) -> None:
+    def __init__(self, env: ContractEnv, teacher: Teacher) -> None:
         """Wrap an environment."""
         super().__init__(env)
-        self._env = env
-        robot = quadruped(robot_urdf())
-        self._teacher = teacher_of(robot)
-        self._defaults = np.array(env.contract.default_positions)
-        terms = env.contract.terms
-        place = [term.source for term in terms].index(Source.PHASE)
-        self._phase = sum(term.width for term in terms[:place])
-        width = env.contract.width + len(robot.names)
+        self._env, self._teacher = env, teacher
+        action = env.contract.action
+        self._offset, self._scale = np.array(action.offset), np.array(action.scale)
+        width = env.contract.width + len(action.offset)
         self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
 
     def observation(self, observation: Floats) -> Floats:
         """Return an observation with the action of the teacher behind it."""
-        inputs = self._env.inputs
-        sine, cosine = observation[self._phase : self._phase + 2].tolist()
+        targets = self._teacher(self._env.inputs, observation)
+        wanted = (np.array(targets) - self._offset) / self._scale
+        return np.concatenate([observation, wanted.astype(np.float32)])
+
+
+def walking_teacher(contract: PolicyContract) -> Teacher:
+    """Return the gait, at the phase that is observed."""
+    teacher = teacher_of(quadruped(robot_urdf()))
+    place = [term.source for term in contract.terms].index(Source.PHASE)
+    phase = sum(term.width for term in contract.terms[:place])
+
+    def targets(inputs: PolicyInputs, observation: Floats) -> Targets:
+        sine, cosine = observation[phase : phase + 2].tolist()
         moves = math.hypot(sine, cosine) > 0.0
-        targets = self._teacher.targets(
+        return teacher.targets(
             inputs.velocity if moves else Velocity(),
             math.atan2(sine, cosine) / math.tau % 1.0,
             inputs.imu.roll_pitch_yaw[:2],
         )
-        wanted = (np.array(targets) - self._defaults) / SCALE
-        return np.concatenate([observation, wanted.astype(np.float32)])
+
+    return targets
 
 
-def practice_env(randomization: Randomization) -> ContractEnv:
-    """Make an environment to practise in."""
-    return ContractEnv(WalkingEnv(randomization=randomization, period=PERIOD))
+def walking_env(randomization: Randomization) -> ContractEnv:
+    """Make an environment to practise walking in."""
+    env = WalkingEnv(randomization=randomization, period=PERIOD)
+    values = walking_contract(quadruped(robot_urdf()))
+    return ContractEnv(env, values, lambda: Velocity(*env.command))
 
 
-def taught_env(randomization: Randomization) -> TaughtEnv:
-    """Make an environment in which the teacher is beside the robot."""
-    return TaughtEnv(practice_env(randomization))
+def taught_walking_env(randomization: Randomization) -> TaughtEnv:
+    """Make an environment in which the teacher of walking is beside the robot."""
+    env = walking_env(randomization)
+    return TaughtEnv(env, walking_teacher(env.contract))
+
+
+def get_up_env(randomization: Randomization) -> ContractEnv:
+    """Make an environment to practise getting up in."""
+    env = GetUpEnv(
+        randomization=randomization, drop=DROP, period=PERIOD, shortest=SHORTEST, duration=LONGEST
+    )
+    return ContractEnv(env, get_up_contract(quadruped(robot_urdf())))
+
+
+def taught_get_up_env(randomization: Randomization) -> TaughtEnv:
+    """Make an environment in which the teacher of getting up is beside the robot."""
+    teacher = GetUpTeacher(quadruped(robot_urdf()))
+    return TaughtEnv(get_up_env(randomization), lambda inputs, _: teacher.targets(inputs.imu.down))

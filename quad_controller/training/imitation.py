@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The first minutes: an imitation of the gait, which practice begins with (DAgger).
+"""The first minutes: an imitation of a teacher, which practice begins with (DAgger).
 
-The network walks, the teacher says at every step what it would have done, and the network learns
+The network acts, the teacher says at every step what it would have done, and the network learns
 from all of that (Ross, Gordon and Bagnell, 2011).
 """
 
@@ -19,7 +19,6 @@ from networks import Actor, answer, Normaliser
 import numpy as np
 import optax
 from policy_export import Floats
-from trained_contract import SCALE
 
 from quad_controller.policy.statistics import ObservationStatistics
 from quad_sim.env import ProcessVectorEnv
@@ -68,17 +67,20 @@ class Imitation:
         normaliser: Of the observations; there is none before the first round.
     """
 
-    def __init__(self, actor: Actor, envs: ProcessVectorEnv, lessons: Lessons, seed: int) -> None:
+    def __init__(
+        self, actor: Actor, envs: ProcessVectorEnv, lessons: Lessons, *, scale: float, seed: int
+    ) -> None:
         """Prepare it.
 
         Args:
             actor: What learns.
             envs: Their observations end with the actions of the teacher.
             lessons: How much.
+            scale: What an action of one moves a joint by in [rad].
             seed: Of everything that is drawn.
         """
         self.normaliser: Normaliser | None = None
-        self._actor, self._envs, self._lessons = actor, envs, lessons
+        self._actor, self._envs, self._lessons, self._scale = actor, envs, lessons, scale
         self._random = np.random.default_rng(seed)
         self._count = actor.num_actions
         self._rows: list[Floats] = []
@@ -131,7 +133,7 @@ class Imitation:
                 losses.append(loss)
             error = float(np.mean(jax.device_get(losses)))
         self._actor.state_dict = self._actor.state_dict.replace(params=params)
-        return float(np.sqrt(error)) * SCALE
+        return float(np.sqrt(error)) * self._scale
 
 
 def _learning_step(actor: Actor, optimiser: optax.GradientTransformation) -> Any:  # noqa: ANN401

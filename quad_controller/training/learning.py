@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A whole training: imitation of the gait, then practice; writes both policies."""
+"""A whole training: imitation of a teacher, then practice; writes both policies."""
 
 from __future__ import annotations
 
@@ -8,26 +8,23 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from contract_env import IMITATED, practice_env, PRACTISED, taught_env, values_for
 from imitation import Imitation, Lessons
 import jax
-from networks import Actor, answer, layers_of, Normaliser
+from networks import Actor, answer, explore, layers_of, Normaliser
 import numpy as np
 from policy_export import export
-from practice import Practice
+from practice import Practice, Practised
 from progress import Progress
 import skrl
-from trained_contract import metadata_of, PERIOD
+from tasks import Task
+from trained_contract import metadata_of, PERIOD, Values
 
 from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_description import quadruped, robot_urdf
-from quad_sim.env import ProcessVectorEnv, Randomization
+from quad_sim.env import ProcessVectorEnv
 
-RANDOMIZATION = Randomization(
-    friction=(0.35, 1.3), trunk_mass=(0.9, 1.3), kick=(-1.6, 1.6), kick_interval=2.0
-)
-"""What differs in the end."""
 OBSERVED_STEPS = 500  # of each environment, for the ranges that replay_policy compares with
+IMITATION, PRACTICE = 'imitation', 'practice'
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +42,12 @@ class Plan:
     lessons: Lessons = field(default_factory=Lessons)
 
 
-def train(folder: Path, plan: Plan, progress: Progress) -> dict[str, Path]:
+def train(folder: Path, task: Task, plan: Plan, progress: Progress) -> dict[str, Path]:
     """Train until the time is over.
 
     Args:
         folder: For policies and curves.
+        task: What is learned.
         plan: How.
         progress: Has the time, and shows how it goes.
 
@@ -59,41 +57,46 @@ def train(folder: Path, plan: Plan, progress: Progress) -> dict[str, Path]:
     skrl.config.jax.device = 'cpu'
     skrl.config.jax.key = plan.seed
     skrl.logger.setLevel('WARNING')
-    actor, normaliser, observed = _imitate(plan, progress)
-    imitated = _write(actor, normaliser, observed, folder / 'imitation.onnx', IMITATED)
-    envs = ProcessVectorEnv(partial(practice_env, RANDOMIZATION), plan.environments)
+    robot = quadruped(robot_urdf())
+    example = task.make(task.randomization)
+    actor = Actor(example.observation_space, example.action_space)
+    actor.init_state_dict(role='policy')
+    scale = example.contract.action.scale[0]
+    policies = {name: folder / f'{name}.onnx' for name in (IMITATION, PRACTICE)}
+    normaliser, observed = _imitate(actor, task, plan, progress, scale)
+    imitated = task.contract(robot, task.teaching.kind)
+    _write(policies[IMITATION], actor, normaliser, observed, imitated)
+    envs = ProcessVectorEnv(partial(task.make, task.randomization), plan.environments)
     try:
+        explore(actor, task.deviation)
         practice = Practice(
             actor,
             normaliser,
             envs,
-            RANDOMIZATION,
+            task.randomization,
             period=PERIOD,
             curves=folder / 'curves',
             seed=plan.seed,
         )
         before = progress.share
         for each in practice.until(lambda: (progress.share - before) / max(1.0 - before, 1e-6)):
-            progress.figures(
-                f'reward {each.reward:5.2f}/s  falls {each.falls:5.2f}/min  '
-                f'{each.steps / 1e6:.2f} M steps  randomized {each.share:.0%}'
-            )
+            progress.figures(_text_of(each, task))
         practice.close()
         observed = _observe(actor, normaliser, envs, plan.seed)
     finally:
         envs.close()
-    practised = _write(actor, normaliser, observed, folder / 'practice.onnx', PRACTISED)
-    return {'imitation': imitated, 'practice': practised}
+    practised = task.contract(robot, task.kind)
+    _write(policies[PRACTICE], actor, normaliser, observed, practised)
+    return policies
 
 
-def _imitate(plan: Plan, progress: Progress) -> tuple[Actor, Normaliser, ObservationStatistics]:
-    ranges = RANDOMIZATION.scaled(0.5)
-    envs = ProcessVectorEnv(partial(taught_env, ranges), plan.environments)
+def _imitate(
+    actor: Actor, task: Task, plan: Plan, progress: Progress, scale: float
+) -> tuple[Normaliser, ObservationStatistics]:
+    ranges = task.randomization.scaled(0.5)
+    envs = ProcessVectorEnv(partial(task.teaching.make, ranges), plan.environments)
     try:
-        example = practice_env(ranges)
-        actor = Actor(example.observation_space, example.action_space)
-        actor.init_state_dict(role='policy')
-        imitation = Imitation(actor, envs, plan.lessons, plan.seed)
+        imitation = Imitation(actor, envs, plan.lessons, scale=scale, seed=plan.seed)
         for each in imitation.rounds():
             progress.say(
                 f'imitation, round {each.number}: {each.examples} examples, '
@@ -101,7 +104,7 @@ def _imitate(plan: Plan, progress: Progress) -> tuple[Actor, Normaliser, Observa
             )
         if imitation.normaliser is None:
             raise ValueError('an imitation has one round at least')
-        return actor, imitation.normaliser, imitation.observed
+        return imitation.normaliser, imitation.observed
     finally:
         envs.close()
 
@@ -119,13 +122,21 @@ def _observe(
     return ObservationStatistics.of(np.concatenate(rows))
 
 
+def _text_of(practised: Practised, task: Task) -> str:
+    """Return what came of an update, for people."""
+    falls = f'falls {practised.falls:5.2f}/min  ' if task.ends_with_a_fall else ''
+    return (
+        f'reward {practised.reward:5.2f}/s  {falls}'
+        f'{practised.steps / 1e6:.2f} M steps  randomized {practised.share:.0%}'
+    )
+
+
 def _write(
+    path: Path,
     actor: Actor,
     normaliser: Normaliser,
     observed: ObservationStatistics,
-    path: Path,
-    kind: str,
-) -> Path:
-    metadata = metadata_of(values_for(quadruped(robot_urdf()), kind))
-    export(layers_of(actor, normaliser), path, {**metadata, STATISTICS_KEY: observed.to_json()})
-    return path
+    contract: Values,
+) -> None:
+    statistics = {STATISTICS_KEY: observed.to_json()}
+    export(layers_of(actor, normaliser), path, metadata_of(contract) | statistics)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from flax import linen
@@ -15,7 +16,6 @@ from policy_export import Floats, Layers
 from skrl.models.jax import DeterministicMixin, GaussianMixin, Model
 
 HIDDEN = (128, 128)
-FIRST_LOG_DEVIATION = -1.7  # of actions that are tried: 0.18, or 0.05 rad
 
 
 class Actor(GaussianMixin, Model):  # type: ignore[misc]
@@ -37,9 +37,7 @@ class Actor(GaussianMixin, Model):  # type: ignore[misc]
     def __call__(self, inputs: dict[str, Any], role: str) -> tuple[jax.Array, dict[str, Any]]:
         """Return the mean actions, and the logarithm of the deviation."""
         mean = _layers(inputs['observations'], self.num_actions, last=0.1)
-        deviation = self.param(
-            'log_std', linen.initializers.constant(FIRST_LOG_DEVIATION), (self.num_actions,)
-        )
+        deviation = self.param('log_std', linen.initializers.zeros, (self.num_actions,))
         return mean, {'log_std': deviation}
 
 
@@ -92,6 +90,15 @@ class Normaliser:
     def __call__(self, values: Any, *, train: bool = False, inverse: bool = False) -> Any:  # noqa: ANN401
         """Return normalised observations."""
         return None if values is None else (values - self.mean) / self.deviation
+
+
+def explore(actor: Actor, deviation: float) -> None:
+    """Let an actor try actions that deviate so far from its mean."""
+    params = actor.state_dict.params
+    tried = jnp.full((actor.num_actions,), math.log(deviation))
+    actor.state_dict = actor.state_dict.replace(
+        params={**params, 'params': {**params['params'], 'log_std': tried}}
+    )
 
 
 def answer(actor: Actor, params: Any, observations: jax.Array) -> jax.Array:  # noqa: ANN401

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The rest of the time: practice by PPO, with robots and ground that differ more and more."""
+"""Practice by PPO, with robots and ground that differ more and more."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Practised:
         reward: Mean reward of a second.
         falls: In a minute of an environment.
         share: Of the randomization.
-        terms: What each term of the reward was worth in a second, of the episodes that ended.
+        terms: What each term of the reward was worth, mean of the episodes that ended.
     """
 
     updates: int
@@ -49,7 +49,7 @@ class Practised:
 
 
 class Practice:
-    """Goes on with a policy that walks already."""
+    """Goes on with a policy that does already what its teacher did."""
 
     def __init__(
         self,
@@ -100,12 +100,12 @@ class Practice:
         while (passed := progress()) < 1.0:
             self._vary(passed)
             before = self._actor.state_dict
-            walked = self._rollout()
+            came = self._rollout()
             self._updates += 1
             if self._updates <= JUDGE_ALONE:
                 # a judge that knows nothing yet would spoil what has been learned
                 self._actor.state_dict = before
-            yield walked
+            yield came
 
     def close(self) -> None:
         """Write the curves out."""
@@ -163,9 +163,9 @@ class Practice:
     def _track(self, practised: Practised) -> None:
         """Have it in the curves with what skrl tracks."""
         track = self._agent.track_data
-        track('Walking / Reward of a second', practised.reward)
-        track('Walking / Falls in a minute', practised.falls)
-        track('Walking / Share of the randomization', practised.share)
+        track('Practice / Reward of a second', practised.reward)
+        track('Practice / Falls in a minute', practised.falls)
+        track('Practice / Share of the randomization', practised.share)
         for name, worth in practised.terms.items():
             track(f'Reward of an episode / {name}', worth)
 
