@@ -12,6 +12,7 @@ from pathlib import Path
 import shlex
 import shutil
 import signal
+import sys
 import tempfile
 import time
 from typing import TYPE_CHECKING
@@ -91,7 +92,7 @@ def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
         try:
             yield started
         except BaseException:
-            print('pages:', *texts(), sep='\n')  # pytest shows it with the failure
+            sys.stderr.write('\n'.join(texts()))  # pytest shows it with the failure
             raise
         finally:
             _started.remove(started)
