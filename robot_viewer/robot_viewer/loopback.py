@@ -34,4 +34,6 @@ def binding_problem(host: str) -> str:
             server.bind(address)
     except OSError as error:
         return error.strerror or str(error)
+    except UnicodeError:
+        return 'no name of a host'
     return ''

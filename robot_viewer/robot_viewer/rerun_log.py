@@ -55,15 +55,21 @@ class RobotLog:
         self._stream = stream
         self._tree: KinematicTree | None = None
         self._paths: dict[str, str] = {}
+        self._shown: dict[str, type[rerun.AsComponents]] = {}
+        self._is_placed = False
         stream.log('/', rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def describe(self, tree: KinematicTree) -> list[str]:
         """Show a robot; return what of it cannot be shown, in words."""
-        if self._tree is not None:
-            self._stream.log(BASE, rerun.Clear(recursive=True))
-        self._tree, self._paths = tree, link_paths(tree, BASE)
+        for path, kind in self._shown.items():  # what is of all times is not cleared otherwise
+            self._stream.log(path, kind.cleared(), static=True)
+        self._shown.clear()
+        self._tree, self._paths, self._is_placed = tree, link_paths(tree, BASE), False
+        movable = {joint.name for joint in tree.movable()}
         for joint in tree.joints:
-            self._put(self._paths[joint.child], joint_transform(joint, joint_position(joint, {})))
+            if joint.name not in movable:
+                place = joint_transform(joint, joint_position(joint, {}))
+                self._put(self._paths[joint.child], place, static=True)
         meshes, missing = Meshes(), dict[str, list[str]]()
         for number, shape in enumerate(shapes_of(tree)):
             try:
@@ -77,16 +83,17 @@ class RobotLog:
         self._stream.set_time(TIMELINE, timestamp=np.datetime64(stamp, 'ns'))
 
     def joints(self, positions: Mapping[str, float]) -> None:
-        """Move the joints that are named, and those that follow one of them.
+        """Move the joints that are named, and those that follow one of them; at first, all.
 
         Args:
             positions: In [rad] or [m] by name.
         """
         for joint in () if self._tree is None else self._tree.movable():
             source = joint.name if joint.mimic is None else joint.mimic.source
-            if math.isfinite(positions.get(source, math.nan)):
+            if math.isfinite(positions.get(source, math.nan if self._is_placed else 0.0)):
                 place = joint_transform(joint, joint_position(joint, positions))
                 self._put(self._paths[joint.child], place)
+        self._is_placed = self._tree is not None
 
     def base(self, pose: Transform) -> None:
         """Move the whole robot: pose of its root link in the world."""
@@ -113,12 +120,13 @@ class RobotLog:
         """
         self._stream.log(entity, rerun.TextLog(text, level=level))
 
-    def _put(self, path: str, place: Transform) -> None:
+    def _put(self, path: str, place: Transform, *, static: bool = False) -> None:
         self._stream.log(
             path,
             rerun.Transform3D(
                 translation=place.translation, quaternion=rerun.Quaternion(xyzw=place.rotation)
             ),
+            static=static,
         )
 
     def _add_shape(self, path: str, shape: UrdfShape, meshes: Meshes) -> None:
@@ -148,6 +156,7 @@ class RobotLog:
                 )
             case _:
                 raise MeshFileError(f'<{shape.shape}> is no box, cylinder, sphere or mesh')
+        self._shown[path] = type(seen)
         self._stream.log(path, seen, static=True)
         self._stream.log(
             path,

@@ -105,6 +105,8 @@ def test_what_topics_say_is_in_a_file(isolation: Isolation, tmp_path: Path) -> N
             robot.spin_for(0.1)
         node.get_logger().warning('something happened')
         robot.spin_for(1.0)
+        described.publish(String(data='<robot name="r"><link name="base"/></robot>'))
+        robot.spin_for(1.0)
         assert process.stop() == 0, process.output
     last = (STAMP + 19) * 10**9
     assert (last, [0.25]) in rows(file, '/position/lift', 'scalars')
@@ -113,8 +115,14 @@ def test_what_topics_say_is_in_a_file(isolation: Isolation, tmp_path: Path) -> N
     assert (last, [[0.0, 0.0, 0.25]]) in rows(file, slide, 'translation')
     assert (last, [[0.5, 0.0, 0.0]]) in rows(file, tip, 'translation')
     assert (last, [[0.0, 3.0, 0.0]]) in rows(file, '/robot', 'translation')
-    ((always, vertices),) = rows(file, f'{slide}/shape1', 'vertex_positions')
+    ((fixed, _),) = rows(file, f'{tip}/lost', 'translation')
+    assert fixed is None, 'what never moves is there at all times'
+    assert {time for time, _ in rows(file, slide, 'translation')} <= {
+        (STAMP + number) * 10**9 for number in range(20)
+    }
+    (always, vertices), removed = rows(file, f'{slide}/shape1', 'vertex_positions')
     assert always is None
+    assert removed == (None, []), 'another description has come'
     assert max(map(max, vertices)) == 1.0, 'half of a box of 1 m, twice'
     assert [each for _, each in rows(file, '/diagnostics', 'text')] == [['drive: is warm']]
     assert ['robot: something happened'] in [each for _, each in rows(file, '/log', 'text')]

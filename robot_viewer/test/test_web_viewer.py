@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+import socket
 import threading
 from typing import Any
 
@@ -346,9 +347,19 @@ def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
         robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
 
 
-@pytest.mark.parametrize('host', ['192.0.2.1', 'no.such.host.invalid'])
-def test_a_host_that_is_none_of_this_computer_is_refused(isolation: Isolation, host: str) -> None:
+@pytest.mark.parametrize('host', ['192.0.2.1', 'no.such.host.invalid', 'x..y'])
+def test_a_host_that_is_none_of_this_computer_is_refused(
+    isolation: Isolation, host: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """At once, with its name: the server of the page would look for a free port without end."""
+    find = socket.getaddrinfo
+
+    def found(name: str, *arguments: Any, **options: Any) -> Any:
+        if name.endswith('.invalid'):  # a network that answers nothing would take its time
+            raise socket.gaierror(socket.EAI_NONAME, 'Name or service not known')
+        return find(name, *arguments, **options)
+
+    monkeypatch.setattr(socket, 'getaddrinfo', found)
     rclpy.init(args=['--ros-args', '-p', f'host:={host}'], domain_id=isolation.domain_id)
     try:
         with pytest.raises(ParameterError, match=f"host is '{host}': .*; give an address"):

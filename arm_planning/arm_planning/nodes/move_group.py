@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
 
-from arm_model import ArmError
+from arm_model import ArmError, LimitsError
 from arm_model.ros import Description
 from node_runner import (
     destroyed_when_refused,
@@ -149,10 +149,10 @@ def _robot(description: Description) -> RobotGroups:
     try:
         return RobotGroups(description.urdf, description.srdf, description.limits)
     except PlanningError as error:
-        file = description.limits_file
-        raise PlanningError(
-            error.code, f'{error} (joint_limits: {file})' if file else str(error)
-        ) from error
+        if not isinstance(error.__cause__, LimitsError):
+            raise
+        text = f'{error} (joint_limits: {description.limits_file})'
+        raise PlanningError(error.code, text) from error
 
 
 def _arguments() -> argparse.Namespace:

@@ -28,10 +28,10 @@ from ..rerun_log import DIAGNOSTICS, layout, LEVELS, LOG, RobotLog
 VIEWER = 'rerun+http://127.0.0.1:9876/proxy'
 """Where the program `rerun` listens."""
 SUFFIX = '.rrd'
-CLOSING = 10.0
+FLUSH_TIMEOUT = 10.0
 """What is waited for the viewer at the end in [s]."""
 ROSOUT = QoSProfile(depth=1000)
-STATES = ('OK', 'WARN', 'ERROR', 'STALE')
+LEVEL_NAMES = ('OK', 'WARN', 'ERROR', 'STALE')
 """Levels of diagnostic_msgs."""
 
 
@@ -78,7 +78,10 @@ class RerunSink(Node):
 
     def close(self) -> None:
         """Write what is left, and close the recording."""
-        self._stream.flush(timeout_sec=CLOSING)
+        try:
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT)
+        except Exception as error:  # noqa: BLE001  # rerun does not say which there are
+            self.get_logger().error(f'not all was sent, is there a viewer? {error}')
         self._stream.disconnect()
 
     def _describe(self, message: String) -> None:
@@ -88,7 +91,6 @@ class RerunSink(Node):
             self.get_logger().error(f'robot_description cannot be shown: {error}')
             return
         self._root = tree.root
-        self._log.at(self.get_clock().now().nanoseconds)
         for note in self._log.describe(tree):
             self.get_logger().warning(f'not shown: {note}')
 
@@ -135,15 +137,17 @@ class RerunSink(Node):
             level = int.from_bytes(status.level, 'little')
             if self._statuses.get(status.name) != (level, status.message):
                 self._statuses[status.name] = level, status.message
-                state = STATES[level] if level < len(STATES) else STATES[-1]
-                self._log.text(DIAGNOSTICS, state, f'{status.name}: {status.message}')
+                name = LEVEL_NAMES[min(level, len(LEVEL_NAMES) - 1)]
+                self._log.text(DIAGNOSTICS, name, f'{status.name}: {status.message}')
 
     def _take_log(self, message: Log) -> None:
         self._at(message.stamp)
         self._log.text(LOG, LEVELS.get(message.level, 'INFO'), f'{message.name}: {message.msg}')
 
     def _at(self, stamp: Time) -> None:
-        self._log.at(stamp.sec * 1_000_000_000 + stamp.nanosec)
+        """Let what comes have a stamp; a message without one has the time of its arrival."""
+        found = stamp.sec * 1_000_000_000 + stamp.nanosec
+        self._log.at(found or self.get_clock().now().nanoseconds)
 
 
 def _opened(to: str) -> rerun.RecordingStream:
@@ -155,19 +159,33 @@ def _opened(to: str) -> rerun.RecordingStream:
     Raises:
         SinkError: It is neither, or the file cannot be written.
     """
-    stream = rerun.RecordingStream('robot')
-    if to.startswith(('rerun://', 'rerun+http://', 'rerun+https://')):
-        stream.connect_grpc(to, default_blueprint=layout())
-        return stream
     path = Path(to)
+    try:
+        stream = rerun.RecordingStream('robot')
+        if to.startswith(('rerun://', 'rerun+http://', 'rerun+https://')):
+            stream.connect_grpc(to, default_blueprint=layout())
+            return stream
+        _check(path)
+        stream.save(path, default_blueprint=layout())
+    except SinkError:
+        raise
+    except Exception as error:  # rerun does not say which there are
+        raise SinkError(f'{to}: {error}') from error
+    return stream
+
+
+def _check(path: Path) -> None:
+    """Refuse what is no new file of Rerun.
+
+    Raises:
+        SinkError: With the reason.
+    """
     if path.suffix != SUFFIX:
         raise SinkError(
-            f'to {to!r} is neither a file that ends with {SUFFIX} nor the URL of a viewer; start '
-            f'`rerun`, which listens at {VIEWER}'
+            f'{str(path)!r} is neither a file that ends with {SUFFIX} nor the URL of a viewer; '
+            f'start `rerun`, which listens at {VIEWER}'
         )
     if path.exists():
         raise SinkError(f'{path} is there already; give another name')
     if not path.parent.is_dir():
         raise SinkError(f'{path}: there is no folder {path.parent}')
-    stream.save(path, default_blueprint=layout())
-    return stream

@@ -328,8 +328,13 @@ class WebViewer(Node):
     def _stop(self) -> None:
         self._controllers.stop()
         self._first_motion.stop()
+        self._planning.stop()
         called = {service for service in self._stops if self._call(service)}
-        doubtful = self._doubtful_stops(called)
+        try:
+            doubtful = self._doubtful_stops(called)
+        except Exception as error:  # noqa: BLE001  # whatever it is, the drives are halted
+            self.get_logger().error(f'STOP: {type(error).__name__}: {error}')
+            doubtful = {service: [] for service in called}
         for drive in self._drives:
             if _stop_beside(drive) not in called - doubtful.keys():
                 self._call(f'{drive}/halt')
@@ -337,7 +342,6 @@ class WebViewer(Node):
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
             self._report(service, f'{text}, too. Give that service another name', failed=True)
-        self._planning.stop()
         if not self._drives and not self._stops:
             self.page.say('STOP: nothing here offers to be stopped', failed=True)
 
