@@ -6,15 +6,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
+import re
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
 from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
 from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES, POLICY_DEADLINE
-from quad_controller.states.get_up_poses import WAYS_UP
+from quad_controller.states.get_up_poses import RECOVERIES
 from quad_controller.states.lying import Lying, lying_on
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
@@ -32,7 +34,7 @@ ATTITUDES: dict[Lying, Quaternion] = {
     Lying.TAIL: about((0.0, 1.0, 0.0), -QUARTER),
     Lying.BACK: about((1.0, 0.0, 0.0), math.pi),
 }
-LONGEST = 200.0  # [s] that all tries together may take
+MAX_DURATION = 200.0  # [s] that all tries together may take
 
 
 def lying(side: Lying) -> ImuSample:
@@ -53,7 +55,7 @@ def fallen(side: Lying, controller: Controller | None = None) -> Rig:
 
 def gives_up(rig: Rig) -> str:
     """Let a robot try until it gives up; return the fault."""
-    for _ in range(round(LONGEST / PERIOD)):
+    for _ in range(round(MAX_DURATION / PERIOD)):
         rig.step()
         if rig.is_in(State.FAULT):
             return rig.controller.status.faults[0]
@@ -86,24 +88,20 @@ def test_left_and_right_are_mirror_images(roll: float, pitch: float, yaw: float)
     assert world[2] <= -1 / math.sqrt(3) + 1e-9
 
 
-def test_ways_up_are_within_the_joints_and_mirrored() -> None:
-    """Of every preset; each way ends at rest, where it is measured what came of it."""
-    for ways in WAYS_UP.values():
-        assert ways
-        for way in ways:
-            assert way[-1].rests
+def test_recoveries_are_within_the_joints_and_mirrored() -> None:
+    """Of every preset."""
+    stages = [stage for tried in RECOVERIES.values() for recovery in tried for stage in recovery]
     for preset in PRESETS:
         robot = quadruped(robot_urdf(preset))
-        for stage in (stage for ways in WAYS_UP.values() for way in ways for stage in way):
+        for stage in stages:
             for indices, leg in zip(robot.leg_indices, stage.legs, strict=True):
                 for index, angle in zip(indices, leg, strict=True):
                     limits = robot.limits[index]
                     assert limits.lower - 0.006 <= angle <= limits.upper + 0.006
-    for side, ways in WAYS_UP.items():
-        back = tuple(tuple(stage.mirrored.mirrored for stage in way) for way in ways)
-        assert back == ways
-        mirrored = tuple(tuple(stage.mirrored for stage in way) for way in ways)
-        assert side.mirrored is side or mirrored == WAYS_UP[side.mirrored]
+    for side, tried in RECOVERIES.items():
+        mirrored = tuple(tuple(stage.mirrored for stage in recovery) for recovery in tried)
+        assert side.mirrored is side or mirrored == RECOVERIES[side.mirrored]
+    assert all(stage.mirrored.mirrored == stage for stage in stages)
 
 
 def test_a_robot_that_fell_gets_up_and_stands() -> None:
@@ -234,9 +232,12 @@ def test_other_faults_come_first(what: str) -> None:
     rig.battery, rig.joints, rig.imu = 0.9, True, lying(Lying.LEFT)
     rig.run(1.0)
     assert not rig.controller.set_mode('get_up').accepted
+    answer = rig.controller.clear_fault()
+    assert not answer.accepted
+    assert re.match('cleared .*; still fall: ', answer.message)
+    rig.ask('get_up')
     rig.imu = UPRIGHT
-    rig.run(1.0)
-    assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
+    rig.until(State.STAND)
 
 
 def test_without_an_attitude_it_does_not_begin() -> None:
@@ -267,6 +268,47 @@ def test_stop_ends_it_where_it_is() -> None:
     assert rig.is_in(State.RELAX)
 
 
+def test_stop_lets_a_robot_stand_whose_legs_bear_it() -> None:
+    """Half-way nobody would watch it; a fall is watched again."""
+    rig = Rig()
+    rig.step()
+    rig.ask('get_up')
+    for _ in range(round(10.0 / PERIOD)):
+        if any('stands up' in line for line in rig.log):
+            break
+        rig.step()
+    assert rig.controller.stop().message == 'stopped: get_up; the mode is stand'
+    rig.until(State.STAND)
+    rig.imu = lying(Lying.LEFT)
+    rig.until(State.FAULT)
+
+
+@pytest.mark.parametrize('mode', ['stand', 'walk'])
+def test_a_robot_on_its_legs_does_not_get_up(mode: str) -> None:
+    """Tilted as it may be: a fall is watched as ever, and stops it."""
+    rig = Rig()
+    rig.step()
+    rig.ask(mode)
+    rig.until(State(mode))
+    rig.run(1.0)
+    rig.imu = tilted(0.5)
+    rig.run(0.5)
+    answer = rig.controller.set_mode('get_up')
+    assert not answer.accepted
+    assert 'on its legs' in answer.message
+    rig.imu = lying(Lying.LEFT)
+    rig.run(0.3)
+    assert rig.is_in(State.FAULT)
+
+
+def test_a_body_that_spins_is_refused() -> None:
+    """It tumbles, or the gyro is wrong."""
+    rig = fallen(Lying.LEFT)
+    rig.imu = replace(lying(Lying.LEFT), angular_velocity=(0.0, 0.0, 20.0))
+    rig.run(0.3)
+    assert 'max_turn_rate' in rig.controller.set_mode('get_up').message
+
+
 @pytest.mark.parametrize('mode', ['lie', 'relax'])
 def test_there_is_a_way_down(mode: str) -> None:
     """At any time, as from every other state."""
@@ -288,7 +330,7 @@ def test_a_policy_may_bring_it_to_its_feet() -> None:
     policy = StillPolicy(FOLDED)
     rig = policy_rig(policy)
     rig.ask('get_up')
-    rig.run(4.0)
+    rig.run(4.0, Velocity(0.2))
     assert rig.is_in(State.GET_UP)
     assert policy.resets == 1
     assert rig.positions == pytest.approx(FOLDED)
@@ -300,16 +342,24 @@ def test_a_policy_may_bring_it_to_its_feet() -> None:
     assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
 
 
-def test_a_policy_has_a_deadline() -> None:
-    """And one that fails is given up; both say so."""
+def test_a_policy_that_does_not_succeed_is_followed_by_poses() -> None:
+    """After its deadline, or when it fails; both are said. On the back there are none."""
     policy = StillPolicy(FOLDED)
     rig = policy_rig(policy)
     rig.ask('get_up')
-    words = gives_up(rig)
-    assert f'it lies on its back after {POLICY_DEADLINE:g} s of the policy still' in words
+    assert 'it lies on its back, and no movement' in gives_up(rig)
+    given_up = f'the policy still is given up: it lies on its back after {POLICY_DEADLINE:g} s'
+    assert any(given_up in line for line in rig.log)
     policy.targets = None
     rig.ask('get_up')
-    assert 'the policy still failed: broken on purpose' in gives_up(rig)
+    while not any('given up: broken on purpose' in line for line in rig.log):
+        rig.step()
+        assert rig.is_in(State.GET_UP), rig.log[-6:]
+    rig.imu = lying(Lying.LEFT)
+    rig.run(3.0)
+    assert any('lies on its left side; turns over' in line for line in rig.log)
+    rig.imu = UPRIGHT
+    rig.until(State.STAND)
 
 
 sides = st.sampled_from([*Lying, None])
@@ -336,7 +386,7 @@ def test_whatever_it_rolls_to_it_ends(
         rig.controller.stop()
     elif ends is not None:
         rig.ask(ends)
-    for _ in range(round(LONGEST / PERIOD)):
+    for _ in range(round(MAX_DURATION / PERIOD)):
         if not rig.is_in(State.GET_UP):
             break
         rig.step()

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from search_get_up import clearance
 
-from quad_controller.states.get_up_poses import Stage, WAYS_UP
+from quad_controller.states.get_up_poses import RECOVERIES, Stage
 from quad_controller.states.lying import Lying
 from quad_sim.physics import Robot
 
 pytestmark = pytest.mark.slow
 
 DROPS = 5  # on each side
-MIN_STOOD = 0.6  # of the robots; the bench has what it is with more of them
+MIN_STOOD = 0.8  # of the robots; the bench has what it is with more of them
 
 
 def outcomes(side: Lying) -> list[Outcome]:
@@ -30,10 +30,13 @@ def outcomes(side: Lying) -> list[Outcome]:
     return found
 
 
-@pytest.mark.parametrize('stage', [s for ways in WAYS_UP.values() for way in ways for s in way])
+STAGES = [stage for tried in RECOVERIES.values() for recovery in tried for stage in recovery]
+
+
+@pytest.mark.parametrize('stage', STAGES)
 def test_no_pose_presses_a_leg_into_another_one(stage: Stage) -> None:
     """Nor a shank into the trunk; physics would let it pass."""
-    assert clearance(Robot(URDF)._model, np.array(stage.legs).ravel()) > 0.002  # [m]
+    assert clearance(Robot(URDF)._model, np.array(stage.legs).ravel()) > 0.005  # [m]
 
 
 @pytest.mark.parametrize('side', [side for side in Lying if side is not Lying.BACK])

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
 import sys
@@ -45,7 +44,7 @@ from quad_description import DescriptionError
 from quad_msgs.msg import FootContacts, JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
 
-from ..exceptions import PolicyError, QuadControllerError
+from ..exceptions import ParameterError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
@@ -214,7 +213,13 @@ class ControllerNode(Node):
         """Return what the mode get_up follows; None for its poses, and when it does not fit."""
         if not self._settings.get_up_policy:
             return None
-        options = replace(self._settings.policy_options, contract=None)  # that of the other one
+        if self._settings.policy_dry_run:
+            raise ParameterError(
+                'get_up_policy and policy_dry_run: what gets up is followed, and not only asked; '
+                'leave one of them out'
+            )
+        given = self._settings.policy_options  # the others are for a policy that walks
+        options = PolicyOptions(gravity_source=given.gravity_source, servo=given.servo)
         try:
             return self._load_policy(self._settings.get_up_policy, options).runner
         except PolicyError:

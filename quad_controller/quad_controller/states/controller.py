@@ -171,12 +171,15 @@ class Controller:
         return self._commands.set_pose(pose)
 
     def clear_fault(self) -> Answer:
-        """Forget the latched faults if their reasons are gone; nothing moves by this."""
+        """Forget the latched faults whose reasons are gone; nothing moves by this."""
         machine = self._machine
         if not self._latch.texts:
             return Answer(True, f'no fault; the mode is {machine.state.value}')
-        if still := [f'{fault.value}: {reason}' for fault, reason in self._health.faults()]:
-            return Answer(False, f'still {"; ".join(still)}')
+        if still := dict(self._health.faults()):
+            gone = self._latch.keep(still)
+            cleared = f'cleared {", ".join(gone)}; ' if gone else ''
+            reasons = '; '.join(f'{fault.value}: {reason}' for fault, reason in still.items())
+            return Answer(False, f'{cleared}still {reasons}')
         self._latch.clear()
         machine.clear()
         return Answer(True, f'cleared; the mode is {machine.state.value}')
@@ -389,8 +392,8 @@ class Controller:
     def _latch_faults(self, last: Targets, events: list[Event]) -> None:
         """Latch faults of a robot that is on its legs, or on its way down."""
         machine = self._machine
-        if machine.way_up is not None and machine.way_up.failure:
-            events += self._latch_fault(Fault.FALLEN, machine.way_up.failure, last)
+        if machine.getting_up is not None and machine.getting_up.failure:
+            events += self._latch_fault(Fault.FALLEN, machine.getting_up.failure, last)
         upright, goes_down = machine.state in UPRIGHT_STATES, machine.goal in WAYS_DOWN
         if not upright and machine.motion.finished:
             return
@@ -413,8 +416,8 @@ class Controller:
             conditions['following'] = self._tracking.text
         if self._health.uncertainty and state in UPRIGHT_STATES:
             conditions['uncertain'] = self._health.uncertainty
-        if (way_up := self._machine.way_up) is not None:
-            conditions[way_up.text] = f'get_up: {way_up.text}'
+        if (getting_up := self._machine.getting_up) is not None:
+            conditions[getting_up.text] = f'get_up: {getting_up.text}'
         gait = self._generator
         if state in GAIT_STATES and gait.clamped:
             asked, walked = self._commands.velocity(state), gait.goal
@@ -473,6 +476,8 @@ class Controller:
         if request.state in WAYS_DOWN and self._limiter.last is not None:
             return ''
         if request.state is State.GET_UP:
+            if self._machine.state in ON_FEET:
+                return 'it is on its legs, and tilted; a fall stops it, then it may get up'
             return get_up_refusal(self._health, self._latch, self._get_up_policy)
         if self._latch.texts:
             return (

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import Enum, IntEnum
 
 
@@ -73,3 +73,9 @@ class FaultLatch:
     def clear(self) -> None:
         """Forget all."""
         self._faults.clear()
+
+    def keep(self, faults: Collection[Fault]) -> tuple[str, ...]:
+        """Forget all but these; return what was forgotten, by name."""
+        gone = tuple(fault.value for fault in self._faults if fault not in faults)
+        self._faults = {f: reason for f, reason in self._faults.items() if f in faults}
+        return gone

@@ -7,6 +7,7 @@
     REST -> (side, nose or tail: stages of a try) -> REST -> ... until it lies on its belly
     REST -> (belly: FOLD -> STAND) -> finished
     REST -> (back, or too many tries) -> failure
+    REST -> (a policy, where there is one) -> finished, or REST and the poses
 
 Where it lies is measured whenever the body has come to rest, so that a stage that did something
 else than it was made for leads to the tries of where it lies now.
@@ -24,7 +25,7 @@ from quad_description.rotations import Vector
 
 from ..policy.interface import Policy
 from .faults import Fault, FaultLatch
-from .get_up_poses import WAYS_UP, WaysUp
+from .get_up_poses import RECOVERIES
 from .health import Health
 from .lying import Lying, lying_on
 from .motion import Blend, Hold, Motion, Situation
@@ -41,6 +42,8 @@ FOLD_SPEED = 3.0  # [rad/s] of legs that bear nothing yet
 STAND_SPEED = 1.5  # [rad/s]
 POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
 EASE_TIME = 0.3  # [s] over which a policy takes over
+
+MIN_REACH = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
 ON_ITS_BACK = (
@@ -106,6 +109,8 @@ def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> 
         return 'getting up needs joint states and an attitude; there are none'
     if health.uncertainty:
         return health.uncertainty
+    if health.spins:
+        return 'it turns faster than max_turn_rate: wait until it is at rest, or look at the gyro'
     if policy is None and lying_on(imu.down) is Lying.BACK:
         return ON_ITS_BACK
     return health.unmeasured(policy)
@@ -124,7 +129,6 @@ class GetUp(Motion):
         last: Targets,
         final: FinalPoses,
         policy: Policy | None = None,
-        ways: WaysUp = WAYS_UP,
     ) -> None:
         """Begin with waiting for rest.
 
@@ -132,18 +136,16 @@ class GetUp(Motion):
             robot: The robot.
             last: The last targets of all joints in [rad].
             final: Where it leads.
-            policy: What brings it to its feet instead of poses; None for the poses.
-            ways: Those poses.
+            policy: What brings it to its feet before poses are tried; None for the poses alone.
         """
-        self._ways = ways
         self._robot, self._last, self._final, self._policy = robot, last, final, policy
         self._motion: Motion = Hold(last, math.inf)
-        self._rests, self._deadline = True, REST_DEADLINE
+        self._deadline = REST_DEADLINE
         self._time = self._blind = 0.0
         self._still = StillnessWatch()
         self._lying, self._tilt = Lying.BELLY, 0.0
         self._tries: Counter[Lying] = Counter()
-        self._finished, self._failure = False, ''
+        self._finished, self._failure, self._rises = False, '', False
         self._stages = self._script()
         self.text = 'waits until it is at rest'
         next(self._stages)
@@ -157,6 +159,11 @@ class GetUp(Motion):
     def failure(self) -> str:
         """Why it does not get up: where it lies, what was tried and what to do."""
         return self._failure
+
+    @property
+    def rises(self) -> bool:
+        """Whether its legs are being straightened below it."""
+        return self._rises
 
     def step(self, situation: Situation, dt: float) -> Targets:
         """Return the next targets; the last ones while the attitude is not known."""
@@ -175,8 +182,7 @@ class GetUp(Motion):
             self._still.reset()
         self._still.step(imu.down, dt)
         if self._is_over(imu):
-            if self._rests:
-                self._lying, self._tilt = lying_on(imu.down), imu.tilt
+            self._lying, self._tilt = lying_on(imu.down), imu.tilt
             next(self._stages, None)
         return self._last
 
@@ -187,14 +193,15 @@ class GetUp(Motion):
         is_still = self._still.time >= STILL_TIME
         if isinstance(self._motion, PolicyMotion):
             return is_still and imu.tilt < LEVEL
-        return self._motion.finished and (is_still or not self._rests)
+        return self._motion.finished and is_still
 
     def _script(self) -> Iterator[None]:
         """Begin one stage after another, each when the one before is over."""
         yield
         if self._policy is not None:
             yield from self._follow(self._policy)
-            return
+            if self._finished:
+                return
         while self._tries.total() < MAX_TRIES:
             lying = self._lying
             if lying is Lying.BACK:
@@ -203,6 +210,8 @@ class GetUp(Motion):
             self._tries[lying] += 1
             if lying is not Lying.BELLY:
                 yield from self._turn_over(lying)
+                if self._failure:
+                    return
                 continue
             yield from self._stand_up()
             if self._finished:
@@ -214,14 +223,18 @@ class GetUp(Motion):
         )
 
     def _turn_over(self, lying: Lying) -> Iterator[None]:
-        """Try one of the ways from a side, the next one when that was tried before."""
-        ways = self._ways[lying]
-        for stage in ways[(self._tries[lying] - 1) % len(ways)]:
+        """Try one of the recoveries from a side, the next one when that was tried before."""
+        recoveries = RECOVERIES[lying]
+        for stage in recoveries[(self._tries[lying] - 1) % len(recoveries)]:
             targets = list(self._last)
             for indices, angles in zip(self._robot.leg_indices, stage.legs, strict=True):
                 for index, angle in zip(indices, angles, strict=True):
                     targets[index] = angle
-            self._go(self._robot.clamp(targets), stage.speed, rests=stage.rests)
+            reached = self._robot.clamp(targets)
+            if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > MIN_REACH:
+                self._failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
+                return
+            self._start_stage(reached, stage.speed)
             self.text = f'lies {lying.value}; turns over, try {self._tries[lying]}'
             yield
             if self._lying is not lying:
@@ -230,36 +243,36 @@ class GetUp(Motion):
     def _stand_up(self) -> Iterator[None]:
         """Gather the legs, and stand on them."""
         self.text = f'lies {Lying.BELLY.value}; folds its legs, try {self._tries[Lying.BELLY]}'
-        self._go(self._final.folded, FOLD_SPEED)
+        self._start_stage(self._final.folded, FOLD_SPEED)
         yield
         if self._lying is not Lying.BELLY:
             return
-        self.text = 'stands up'
-        self._go(self._final.standing, STAND_SPEED)
+        self.text, self._rises = 'stands up', True
+        self._start_stage(self._final.standing, STAND_SPEED)
         yield
+        self._rises = False
         self._finished = self._lying is Lying.BELLY and self._tilt < LEVEL
 
     def _follow(self, policy: Policy) -> Iterator[None]:
         """Follow a policy until the robot is upright and at rest."""
         self.text = f'lies {self._lying.value}; follows the policy {policy.name}'
         self._motion = PolicyMotion(policy, self._last, EASE_TIME)
-        self._rests, self._time, self._deadline = True, 0.0, POLICY_DEADLINE
+        self._time, self._deadline = 0.0, POLICY_DEADLINE
         self._still.reset()
         yield
-        if self._motion.failure:
-            self._failure = f'the policy {policy.name} failed: {self._motion.failure}; {BY_HAND}'
-        elif self._tilt < LEVEL:
-            self._finished = True
-        else:
-            self._failure = (
-                f'it lies {self._lying.value} after {POLICY_DEADLINE:g} s of the policy '
-                f'{policy.name}; {BY_HAND}'
-            )
+        failure = self._motion.failure
+        self._finished = not failure and self._tilt < LEVEL
+        if not self._finished:
+            why = failure or f'it lies {self._lying.value} after {POLICY_DEADLINE:g} s'
+            self.text = f'the policy {policy.name} is given up: {why}; waits for rest'
+            self._motion = Hold(self._last, math.inf)
+            self._time, self._deadline = 0.0, REST_DEADLINE
+            yield
 
-    def _go(self, targets: Targets, speed: float, *, rests: bool = True) -> None:
+    def _start_stage(self, targets: Targets, speed: float) -> None:
         """Begin a stage that leads to a pose."""
         blend = Blend(self._last, targets, speed, MIN_BLEND_TIME)
-        self._motion, self._rests = blend, rests
+        self._motion = blend
         self._time, self._deadline = 0.0, blend.duration + REST_DEADLINE
 
 

@@ -22,26 +22,22 @@ _SPEED = 3.0  # [rad/s]
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One pose on the way up.
+    """One pose of a recovery.
 
     Attributes:
         legs: Hip, thigh and calf of each leg in [rad], in the order of
             :data:`quad_description.LEGS`.
         speed: Of the fastest joint in [rad/s].
-        rests: Whether the body comes to rest before the next one.
     """
 
     legs: Sequence[Vector]
     speed: float
-    rests: bool = True
 
     @property
     def mirrored(self) -> Stage:
         """The same for a robot that is this one's mirror image, left for right."""
         front_left, front_right, back_left, back_right = self.legs
-        return Stage(
-            (front_right, front_left, back_right, back_left), self.speed, rests=self.rests
-        )
+        return Stage((front_right, front_left, back_right, back_left), self.speed)
 
 
 def _on_left(lower: Vector, upper: Vector) -> Stage:
@@ -54,13 +50,10 @@ def _ends(front: Vector, back: Vector) -> Stage:
     return Stage((front, front, back, back), _SPEED)
 
 
-Way = tuple[Stage, ...]
-"""Stages in a row; the body comes to rest after the last one."""
+Recovery = tuple[Stage, ...]
+"""Stages in a row; the body comes to rest after each."""
 
-WaysUp = Mapping[Lying, tuple[Way, ...]]
-"""For each side the ways in the order in which they are tried."""
-
-_ROLL: Way = (
+_ROLL: Recovery = (
     # feet of the lower legs, past the back, push the body onto their thighs, 60 deg from upright
     _on_left(lower=(0.52, -1.2, -1.1), upper=(0.52, 0.0, 0.8)),
     # thighs that point backward leave nothing below the belly: it tips over
@@ -69,11 +62,11 @@ _ROLL: Way = (
 _STRAIGHT = (0.0, 0.0, 0.8)
 """Straight legs bring the centre of mass to the belly's side."""
 
-_OFF_THE_NOSE: tuple[Way, ...] = (
+_OFF_THE_NOSE: tuple[Recovery, ...] = (
     (_ends(front=_STRAIGHT, back=_STRAIGHT),),
     (_ends(front=(0.0, 1.57, 0.5), back=(0.0, 1.0, 0.5)),),
 )
-_OFF_THE_TAIL: tuple[Way, ...] = (
+_OFF_THE_TAIL: tuple[Recovery, ...] = (
     (_ends(front=(0.1, 1.25, -0.7), back=(-0.2, -1.2, -0.5)),),
     (
         _ends(front=_STRAIGHT, back=_STRAIGHT),
@@ -81,10 +74,13 @@ _OFF_THE_TAIL: tuple[Way, ...] = (
     ),
 )
 
-WAYS_UP: WaysUp = {
+RECOVERIES: Mapping[Lying, tuple[Recovery, ...]] = {
     Lying.LEFT: (_ROLL,),
     Lying.RIGHT: (tuple(stage.mirrored for stage in _ROLL),),
     Lying.NOSE: _OFF_THE_NOSE,
     Lying.TAIL: _OFF_THE_TAIL,
 }
-"""None leads up from the back: see the README, "Measured in simulation"."""
+"""For each side, in the order in which they are tried.
+
+None leads up from the back: see the README, "Measured in simulation".
+"""

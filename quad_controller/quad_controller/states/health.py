@@ -124,6 +124,12 @@ class Health:
         return self._foot_contacts if fresh else None
 
     @property
+    def spins(self) -> bool:
+        """Whether the body turns faster than a robot at rest does, or the gyro is wrong."""
+        imu = self.attitude
+        return imu is not None and _turn_rate(imu) > self._parameters.max_turn_rate
+
+    @property
     def complete(self) -> bool:
         """Whether everything has been received that a robot on its legs needs."""
         return self.joints is not None and (
@@ -210,8 +216,7 @@ class Health:
         imu = self.attitude
         if imu is None:
             return False
-        turns = _turn_rate(imu) > self._parameters.max_turn_rate
-        return turns or imu.tilt > self._parameters.max_tilt
+        return self.spins or imu.tilt > self._parameters.max_tilt
 
     def _fall(self, imu: ImuSample) -> str:
         most, fastest = self._parameters.max_tilt, self._parameters.max_turn_rate

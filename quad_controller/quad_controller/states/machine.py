@@ -137,7 +137,7 @@ class StateMachine:
         return self.motion is not self._walk or self._walk.reachable
 
     @property
-    def way_up(self) -> GetUp | None:
+    def getting_up(self) -> GetUp | None:
         """What brings the robot to its feet after a fall; None while nothing does."""
         return self.motion if isinstance(self.motion, GetUp) else None
 
@@ -155,12 +155,18 @@ class StateMachine:
     def stop(self, last: Targets | None) -> bool:
         """End what follows velocities, or getting up; return whether there was any of it.
 
+        A robot whose legs bear it already goes on to stand, as from every other posture.
+
         Args:
             last: The last targets of all joints in [rad]; None before the first.
         """
-        if State.GET_UP in {self.state, self.goal} and last is not None:
-            self.state = self.goal = State.RELAX
-            self.hold(last)
+        if self.state is State.GET_UP and last is not None:
+            rises = self.getting_up is not None and self.getting_up.rises
+            self.goal = State.STAND if rises else State.RELAX
+            self._enter(self.goal, last)
+            return True
+        if self.goal is State.GET_UP:  # it has not begun
+            self.goal = self.state = State.RELAX if self.state is State.FAULT else self.state
             return True
         if self.goal in MOVING_STATES:
             down = self.state in {State.LIE, State.RELAX}
