@@ -71,6 +71,24 @@ def test_what_is_not_there(ros2: Ros2, words: tuple[str, ...], message: str) -> 
     assert (outcome.code, outcome.out, outcome.err) == (1, '', message)
 
 
+@pytest.mark.usefixtures('prefix')
+def test_a_package_of_the_workspace_is_to_be_built(
+    ros2: Ros2, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No name that is like it, but what makes it known: a build, or the environment of one."""
+    monkeypatch.setattr('sys.prefix', str(tmp_path / '.venv'))
+    manifest = tmp_path / 'libraries/tool_pkg/package.xml'
+    manifest.parent.mkdir(parents=True)
+    manifest.touch()
+    not_found = "Package 'tool_pkg' not found\n"
+    outcome = ros2('pkg', 'executables', 'tool_pkg')
+    assert outcome.code == 1
+    assert outcome.err == f'{not_found}It may not be built yet: make build, then source env.sh\n'
+    (tmp_path / 'install/tool_pkg').mkdir(parents=True)
+    again = ros2('pkg', 'executables', 'tool_pkg')
+    assert again.err == f'{not_found}It was built after this shell was set up: source env.sh\n'
+
+
 def test_without_an_environment_the_remedy_is_named(
     ros2: Ros2, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import os
 from pathlib import Path
+import sys
 
 from ..cli.errors import FrontendError, UnknownNameError
 from ..cli.suggest import hint
@@ -42,12 +43,24 @@ def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
         Its prefix path.
 
     Raises:
-        UnknownNameError: When there is none of that name; it names the nearest.
+        UnknownNameError: When there is none of that name; it names the nearest, or what makes
+            one of this workspace known.
     """
     prefixes = package_prefixes()
     if package not in prefixes:
-        raise UnknownNameError(message.format(package) + hint(package, prefixes))
+        remedy = _remedy(package, Path(sys.prefix).parent) or hint(package, prefixes)
+        raise UnknownNameError(message.format(package) + remedy)
     return Path(prefixes[package])
+
+
+def _remedy(package: str, workspace: Path) -> str:
+    """Say what is to be done about a package whose sources are in the workspace."""
+    folders = ('.', 'libraries', 'interfaces')
+    if not any((workspace / folder / package / 'package.xml').is_file() for folder in folders):
+        return ''
+    if (workspace / 'install' / package).is_dir():
+        return '\nIt was built after this shell was set up: source env.sh'
+    return '\nIt may not be built yet: make build, then source env.sh'
 
 
 def executables(package: str) -> list[Path]:
