@@ -9,22 +9,22 @@ import sys
 
 
 def fake_slave() -> None:
-    """Run canopen_sim's fake_slave."""
+    """Simulate one device: fake_slave of canopen_sim, by its former name."""
     _run('canopen_sim', 'nodes.fake_slave')
 
 
 def fake_slaves() -> None:
-    """Run canopen_sim's fake_slaves."""
+    """Simulate all slaves of a bus.yml: fake_slaves of canopen_sim, by its former name."""
     _run('canopen_sim', 'nodes.fake_slaves')
 
 
 def candump() -> None:
-    """Run canopen_tools' candump."""
+    """Show the frames of a bus in words: candump of canopen_tools, by its former name."""
     _run('canopen_tools', 'candump')
 
 
 def canopen() -> None:
-    """Run canopen_tools' canopen."""
+    """Check, make and scan a bus: canopen of canopen_tools, by its former name."""
     _run('canopen_tools', 'cli.main')
 
 

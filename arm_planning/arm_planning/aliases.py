@@ -9,7 +9,7 @@ import sys
 
 
 def srdf() -> None:
-    """Run arm_bringup's srdf."""
+    """Make the SRDF of a robot from its description, or refresh it, with a report."""
     try:
         program = import_module('arm_bringup.srdf')
     except ModuleNotFoundError as error:

@@ -9,7 +9,7 @@ import sys
 
 
 def fake_xgo() -> None:
-    """Run quad_sim's fake_xgo."""
+    """Simulate an XGO on a pseudo-terminal: fake_xgo of quad_sim, by its former name."""
     try:
         program = import_module('quad_sim.fake_xgo')
     except ModuleNotFoundError as error:

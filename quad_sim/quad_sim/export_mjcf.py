@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Command line of ``export_mjcf``."""
+"""``export_mjcf``: the simulated robot as a model for MuJoCo."""
 
 from __future__ import annotations
 

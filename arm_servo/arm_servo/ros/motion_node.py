@@ -126,22 +126,22 @@ def main() -> int:
 
 
 def motion_master() -> int:
-    """Run with drives on a CAN bus."""
+    """Run motion_node with drives on a CAN bus."""
     return run_motion('master', Program(Backend.CANOPEN))
 
 
 def motion_controller() -> int:
-    """Run with drives elsewhere."""
+    """Run motion_node with drives elsewhere."""
     return run_motion('motion_controller', Program(Backend.TOPICS))
 
 
 def trajectory_controller() -> int:
-    """Run with drives elsewhere, without jogging: beside a servo of MoveIt, or none."""
+    """Run motion_node with drives elsewhere, for trajectories only: beside a servo, or none."""
     return run_motion('trajectory_controller', Program(Backend.TOPICS, Offers(jogging=False)))
 
 
 def servo_node() -> int:
-    """Run with drives elsewhere, beside a joint_trajectory_controller of ros2_control."""
+    """Run motion_node with drives elsewhere, for jogging only: beside ros2_control."""
     return run_motion('servo_node', Program(Backend.TOPICS, Offers(trajectories=False)))
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Command line of ``check_policy``."""
+"""``check_policy``: compares an ONNX policy with the robot, and lets it walk in physics."""
 
 from __future__ import annotations
 
