@@ -5,7 +5,8 @@
 
 # with a name, .venv is made from that interpreter: make PYTHON=python3.12 build
 PYTHON ?=
-# seconds; without it a demo runs until Ctrl-C, chaos for 10 minutes, soak for an hour
+# seconds; of motion in demo, of walking in demo-quad (at least 6), of whole rounds in demo-arm and demo-plan (at least one);
+# without it a demo runs until Ctrl-C, chaos for 10 minutes, soak for an hour
 DURATION ?=
 # a robot of arm_bringup, or the path of a robot folder
 ROBOT ?= panda
@@ -27,10 +28,10 @@ PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n au
 .DEFAULT_GOAL := help
 
 help:
-	@echo 'make demo       watch a simulated arm move (DURATION=20 ends it, ROBOT=prbt is another arm, NO_VIEW=1 opens no page)'
-	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110)'
-	@echo 'make demo-plan  have it pick and place among obstacles, with move_group (ROBOT=prbt, DURATION=20)'
-	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20 ends it after that)'
+	@echo 'make demo       watch a simulated arm move (DURATION=20: for 20 s, ROBOT=prbt is another arm, NO_VIEW=1 opens no page)'
+	@echo 'make demo-arm   jog it and send it trajectories, with what was measured (ROBOT=gp110, DURATION=60: rounds within 60 s, one of 25 s to 40 s at least)'
+	@echo 'make demo-plan  have it pick and place among obstacles, with move_group (ROBOT=prbt, DURATION=60: rounds within 60 s, one of about 30 s at least)'
+	@echo 'make demo-quad  watch a simulated quadruped walk (DURATION=20: for 20 s, at least 6)'
 	@echo 'make test       build everything and run all tests'
 	@echo 'make check      lint, types, and the tests that take no time: between two edits'
 	@echo 'make build      build every package; then: source env.sh'
