@@ -144,6 +144,10 @@ def test_what_is_recorded_is_played(env: Mapping[str, str], tmp_path: Path) -> N
         words = ['bag', 'play', str(first), '--remap', '/numbers:=/counted', '--delay', '2']
         with RunningProcess([*PROGRAM, *words], env) as player:
             assert player.wait(60.0) == 0
+        assert f"topics of '{first}', " in player.output
+        assert 'Set rate to 1\n' in player.output
+        assert 'Playback until timestamp: -1' in player.output
+        assert 'SPACE' not in player.output  # there is no keyboard
         until(lambda: arrived(second, '/counted') == 300, recorder)
         recorder.stop()
     before, after = read(first), read(second)

@@ -12,6 +12,8 @@ from frontend_cli import PROGRAM, Ros2
 from processes import RunningProcess
 import pytest
 
+from ros2_frontend.ros.calls import Client
+
 pytestmark = [pytest.mark.scenario, pytest.mark.usefixtures('zoo')]
 
 ANSWER = """\
@@ -92,3 +94,11 @@ def test_a_service_of_another_type(ros2: Ros2) -> None:
     assert outcome.code == 1
     expected = "Service '/trigger' has the type std_srvs/srv/Trigger, not std_srvs/srv/SetBool"
     assert outcome.err.splitlines()[0] == expected
+
+
+def test_a_service_that_is_only_discovered(ros2: Ros2, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its name is known before its endpoints are matched, on a slow machine for seconds."""
+    monkeypatch.setattr(Client, 'is_ready', lambda _: False)
+    outcome = ros2('service', 'call', '--timeout', '1.2', '/trigger', 'std_srvs/srv/Trigger')
+    assert outcome.out == 'waiting for service to become available...\n'
+    assert outcome.err.splitlines() == ["Service '/trigger' did not appear within 1.2 s"]

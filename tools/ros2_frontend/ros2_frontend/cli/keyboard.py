@@ -22,7 +22,7 @@ def keys(enabled: bool = True) -> Iterator[Callable[[], str]]:
         A function that returns what was typed since it was called last; always nothing where
         standard input is no terminal, or belongs to another process group.
     """
-    if not enabled or not _is_ours():
+    if not enabled or not has_keyboard():
         yield lambda: ''
         return
     import termios
@@ -37,7 +37,8 @@ def keys(enabled: bool = True) -> Iterator[Callable[[], str]]:
         termios.tcsetattr(number, termios.TCSADRAIN, before)
 
 
-def _is_ours() -> bool:
+def has_keyboard() -> bool:
+    """Whether standard input is a terminal that this process may read."""
     try:
         number = sys.stdin.fileno()
         return os.isatty(number) and os.tcgetpgrp(number) == os.getpgrp()

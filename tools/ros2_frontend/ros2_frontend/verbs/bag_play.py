@@ -17,7 +17,7 @@ from ..bag.files import bag_errors, BagReader, load_overrides, open_bag
 from ..bag.selection import topic_filter
 from ..cli.arguments import positive_float, unsigned_int
 from ..cli.errors import FrontendError
-from ..cli.keyboard import keys
+from ..cli.keyboard import has_keyboard, keys
 from ..cli.verb import argument, flag, verb
 from ..ros.graph import Graph
 from ..ros.names import absolute
@@ -128,6 +128,8 @@ def play(args: Namespace) -> None:
         player = Player(session, chosen, clock, overrides, dict(args.remap))
         typed = stack.enter_context(keys(not args.disable_keyboard_controls))
         keyboard = _Keyboard(clock, typed, session.node.get_logger())
+        for line in _introduction(args, reader, len(chosen)):
+            keyboard.log.info(line)
         Graph(session).settle()  # who is there already receives the first message, too
         if args.clock:
             stack.enter_context(_publishing_clock(session, clock, args.clock))
@@ -135,13 +137,30 @@ def play(args: Namespace) -> None:
             _play_rounds(player, reader, names, args, keyboard.poll)
 
 
+def _introduction(args: Namespace, reader: BagReader, chosen: int) -> Iterator[str]:
+    """Yield what is played and by which keys it is controlled, in the words of rosbag2."""
+    recorded = reader.metadata
+    topics = f"{chosen} of {len(recorded.topics)} topics of '{args.bag_path}'"
+    yield f'Playing {topics}, {recorded.duration / _NANO:.1f} s'
+    yield f'Set rate to {args.rate:g}'
+    if has_keyboard() and not args.disable_keyboard_controls:
+        yield 'Press SPACE for Pause/Resume'
+        yield 'Press CURSOR_RIGHT for Play Next Message'
+    end = _end(args, recorded.start + round(args.start_offset * _NANO))
+    yield f'Playback until timestamp: {-1 if end is None else end}'
+
+
+def _end(args: Namespace, start: int) -> int | None:
+    """Return the time at which a play that begins at a time ends in [ns]; None for no end."""
+    duration = args.playback_duration
+    return start + round(duration * _NANO) if duration >= 0.0 else None
+
+
 def _play_rounds(
     player: Player, reader: BagReader, names: set[str], args: Namespace, poll: Callable[[], int]
 ) -> None:
     start = reader.metadata.start + round(args.start_offset * _NANO)
-    end = None
-    if args.playback_duration >= 0.0:
-        end = start + round(args.playback_duration * _NANO)
+    end = _end(args, start)
     while True:
         time.sleep(args.delay)
         count = player.play(reader.messages(names, start), start, end, poll)

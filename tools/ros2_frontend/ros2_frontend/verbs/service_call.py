@@ -88,6 +88,8 @@ def _await(client: Client, graph: Graph, args: Namespace) -> None:
 
 def _explain(name: str, wanted: str, services: dict[str, list[str]]) -> None:
     """Print on stderr why the wait may be in vain."""
+    if wanted in services.get(name, ()):
+        return  # discovery has the service, and has not matched its endpoints yet
     if name in services:
         offered = ', '.join(services[name])
         print(f"Service '{name}' has the type {offered}, not {wanted}", file=sys.stderr)
