@@ -7,11 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+import re
 
 import yaml
 
 from .exceptions import BusEditError
 
+BEFORE = 'before: '
+"""What a comment behind a value that is changed begins with: it is about the old one."""
 NOT_DEVICES = frozenset({'options', 'master', 'defaults', 'nodes'})
 
 
@@ -36,7 +39,8 @@ def edited(
     """Return the text with keys of a device changed.
 
     A key that stands there gets its new value; others are added below the first key. Comments,
-    order and quotes of everything else stay. A line above says why.
+    order and quotes of everything else stay. A line above says why, and a comment behind a value
+    that is changed begins with ``before:``.
 
     Args:
         text: A bus.yml that could be read.
@@ -50,7 +54,7 @@ def edited(
     """
     section = _section(text, device, channel, values)
     in_flow = section.flow_style
-    splices = _in_flow(section, values) if in_flow else _in_block(section, values, reason)
+    splices = _in_flow(section, values) if in_flow else _in_block(text, section, values, reason)
     new = _spliced(text, splices)
     section = _section(new, device, channel, values)
     for name, value in values.items():
@@ -137,13 +141,13 @@ def _in_flow(section: yaml.MappingNode, values: Mapping[str, float | bool]) -> l
 
 
 def _in_block(
-    section: yaml.MappingNode, values: Mapping[str, float | bool], reason: str
+    text: str, section: yaml.MappingNode, values: Mapping[str, float | bool], reason: str
 ) -> list[_Splice]:
     first = section.value[0][0].start_mark
     indent = ' ' * first.column
     new = [name for name in values if _value(section, name) is None]
     old = [key for key, _ in section.value if key.value in values]
-    splices = _replacements(section, values)
+    splices = [*_replacements(section, values), *_dated_comments(text, section, values)]
     comment = f'# {reason}\n{indent}'
     if new:
         # before the first key: what stands behind its value may be a comment or a block
@@ -166,6 +170,20 @@ def _replacements(section: yaml.MappingNode, values: Mapping[str, float | bool])
                 f'{key.value} is an alias (*); write by hand: {key.value}: {written}'
             )
         splices.append(_Splice(value.start_mark.index, value.end_mark.index, written))
+    return splices
+
+
+def _dated_comments(
+    text: str, section: yaml.MappingNode, values: Mapping[str, float | bool]
+) -> list[_Splice]:
+    """Have comments behind values that are changed say that they are of the old value."""
+    splices = []
+    for key, value in section.value:
+        end = value.end_mark.index
+        found = re.compile(rf'[ \t]+#[ \t]*(?!{BEFORE}|[ \t])').match(text, end)
+        changes = key.value in values and value.value != yaml_text(values[key.value])
+        if found is not None and changes:
+            splices.append(_Splice(found.end(), found.end(), BEFORE))
     return splices
 
 

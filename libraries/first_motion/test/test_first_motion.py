@@ -346,6 +346,18 @@ def test_any_device_is_edited_as_yaml_means_it(
     assert yaml.safe_load(edited(text, 'first', values, 'why', None)) == document
 
 
+def test_a_comment_of_the_old_value_says_so() -> None:
+    """Once: what was read from the drive is not what is written now."""
+    text = 'nodes:\n  b:\n    node_id: 2  # the left one\n    by_group: true  # read; 5 a turn\n'
+    changed = edited(text, 'b', {'by_group': False}, 'why', None)
+    assert changed == (
+        'nodes:\n  b:\n    node_id: 2  # the left one\n'
+        '    # why\n    by_group: false  # before: read; 5 a turn\n'
+    )
+    again = edited(changed, 'b', {'by_group': True}, 'because', None)
+    assert again.count('# before: read; 5 a turn\n') == again.count('before') == 1
+
+
 @pytest.mark.parametrize(
     ('text', 'channel', 'words'),
     [
