@@ -254,6 +254,25 @@ def test_drives_with_the_same_trouble_are_named_together() -> None:
     )
 
 
+@pytest.mark.parametrize('cause', [RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED])
+def test_before_the_first_command_nothing_is_taken_over(cause: RefusalCause) -> None:
+    """Who enables the drives takes them from nobody; later it is named."""
+    drives = attached()
+    ready = 'are ready; the next command takes them back'
+    for moved, words in ((False, ready), (True, ': init; ')):
+        if moved:
+            drives.attach()
+            drives.run(2)
+            swing(drives)
+            drives.run(10)
+        for name in drives.source.axes:
+            drives.source.released(name, Refusal(cause, 'init'))
+        drives.run(500)
+        blocked = drives.gateway.snapshot.blocked
+        assert words in blocked
+        assert blocked.endswith(ready) is not moved
+
+
 def test_a_drive_on_its_way_to_a_single_target_is_waited_for_or_halted() -> None:
     """The command that is refused is the next one already: it does not take the drive back."""
     drives = Drives()

@@ -15,6 +15,10 @@ POWER = 'look after its power and its cable'
 MODE = 'call its ~/cyclic_position_mode or ~/interpolated_position_mode'
 COMMAND = 'the next command takes it back'
 
+UNUSED = f'is ready; {COMMAND}'
+PREPARATIONS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED)
+"""What clients do to a drive before it is moved."""
+
 REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.OFFLINE: POWER,
     RefusalCause.NOT_OPERATIONAL: 'call its ~/init',
@@ -123,6 +127,17 @@ def taken_away(axis: str, refusal: Refusal) -> str:
         refusal: What happened.
     """
     return _sentence([(axis, refusal)])
+
+
+def before_first_command(refusal: Refusal) -> Refusal | str:
+    """Return why an arm that nobody has moved yet has to be commanded first.
+
+    A drive that was initialized, or got its mode, before that was taken from nobody.
+
+    Args:
+        refusal: What happened to a drive.
+    """
+    return UNUSED if refusal.cause in PREPARATIONS else refusal
 
 
 def _is_silent(axis: AxisFeedback) -> bool:

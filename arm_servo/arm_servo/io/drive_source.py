@@ -14,7 +14,14 @@ from arm_model import frozen, RobotState
 
 from ..core.gateway import CommandGateway
 from ..core.set_point import Source
-from .drive_reasons import COMMAND, taken_away, too_fast, what_happened, why_not
+from .drive_reasons import (
+    before_first_command,
+    COMMAND,
+    taken_away,
+    too_fast,
+    what_happened,
+    why_not,
+)
 
 if TYPE_CHECKING:
     from arm_canopen import AxisFeedback, MotionSource, Refusal, Setpoint
@@ -46,6 +53,7 @@ class DriveSource:
         self._following = False
         self._left: set[str] = set()  # drives that dropped out since all of them followed
         self._lost = ''
+        self._has_moved = False  # on behalf of anybody
 
     @property
     def axes(self) -> Sequence[str]:
@@ -82,7 +90,8 @@ class DriveSource:
             axis: Name of the drive.
             refusal: Why it was taken away.
         """
-        self._released = {axis: refusal, **self._released}
+        reason = refusal if self._has_moved else before_first_command(refusal)
+        self._released = {axis: reason, **self._released}
         self._gateway.refuse_earlier(taken_away(axis, refusal))
 
     def update(
@@ -129,6 +138,7 @@ class DriveSource:
             self._following, self._lost = False, ''
             return [None] * len(feedback)
         point = self._gateway.step(now, period, measured, self._lost, ages)
+        self._has_moved |= point.source is not Source.NONE
         if self._lost and point.source is Source.NONE and not point.state.moving:
             self._following, self._lost = False, ''
         rows = zip(point.state.position, point.state.velocity, feedback, strict=True)
