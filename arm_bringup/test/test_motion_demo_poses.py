@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from arm_bringup.demos.motion.poses import (
+    can_go,
     choose_start,
     free_end,
     free_way,
@@ -21,11 +23,31 @@ from arm_bringup.demos.motion.poses import (
     square_fits,
     square_speed,
 )
+from arm_bringup.demos.motion.samples import Sample
+from arm_bringup.demos.motion.sequence import MotionSequence, straight_ahead
 from arm_bringup.description import expand_xacro
 from arm_model import load_limits, RobotModel, start_pose
 
 pytestmark = pytest.mark.slow
 
+TWO_JOINTS = """<robot name="two">
+  <link name="base"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/> <child link="upper_arm"/>
+    <origin xyz="0 0 0.2"/> <axis xyz="0 1 0"/>
+    <limit lower="-1.5" upper="1.5" velocity="1.0" effort="50"/>
+  </joint>
+  <link name="upper_arm"/>
+  <joint name="elbow" type="revolute">
+    <parent link="upper_arm"/> <child link="forearm"/>
+    <origin xyz="0 0 0.4"/> <axis xyz="0 1 0"/>
+    <limit lower="-2.0" upper="2.0" velocity="1.0" effort="30"/>
+  </joint>
+  <link name="forearm"/>
+</robot>"""
+SEMANTIC = """<robot name="two">
+  <group name="arm"><chain base_link="base" tip_link="forearm"/></group>
+</robot>"""
 ROBOTS = Path(__file__).parents[1] / 'robots'
 
 
@@ -45,6 +67,22 @@ def test_our_arms_start_where_their_files_say(name: str) -> None:
     arm = model(name)
     assert square_fits(arm, start_pose(arm))
     assert choose_start(arm).tolist() == start_pose(arm).tolist()
+
+
+def test_an_arm_of_two_joints_has_no_way_outwards() -> None:
+    """It cannot lead its tool along a line, so that the demo leaves the way out and back out."""
+    arm = RobotModel(TWO_JOINTS, SEMANTIC, {'shoulder': {}, 'elbow': {}})
+    start, still = np.array([0.4, 0.8]), np.zeros(2)
+    tool = arm.pose(start, arm.tip).position
+    client = SimpleNamespace(last=Sample(0.0, start, still, still, start, 1.0, tool, tool))
+    sequence = MotionSequence(client, arm, start, 0.01, lambda _: None, lambda: None)  # type: ignore[arg-type]
+    sequence.singularity()
+    assert 'left out: this arm cannot lead its tool' in sequence.results.lines()[0]
+    assert sequence.results.problems == []
+    for name in ('panda', 'prbt', 'gp110'):
+        arm = model(name)
+        start = choose_start(arm)
+        assert can_go(arm, start, straight_ahead(arm.pose(start, arm.tip).position))
 
 
 def test_a_slow_arm_reaches_the_speed_of_its_square_early() -> None:

@@ -72,6 +72,23 @@ def square_fits(model: RobotModel, start: Array) -> bool:
     return all(_fits(model, start, frame) for frame in (model.base, model.tip))
 
 
+def can_go(model: RobotModel, start: Array, direction: Array) -> bool:
+    """Whether the tool can be led along a direction from a pose.
+
+    An arm of few joints cannot: its tool would leave the line, so that jogging does not move it.
+
+    Args:
+        model: The arm.
+        start: Joint positions in [rad].
+        direction: Of the tool, in the base frame.
+    """
+    jacobian = model.jacobian(start)
+    twist = np.concatenate([direction, np.zeros(3)])
+    shares = np.linalg.lstsq(jacobian * model.limits.velocity, twist, rcond=1e-3)[0]
+    off = np.linalg.norm((jacobian @ (model.limits.velocity * shares) - twist)[:3])
+    return bool(off <= OFF_LINE * np.linalg.norm(direction))
+
+
 def square_speed(model: RobotModel, start: Array) -> float:
     """Return a speed for the squares that is reached early on each side in [m/s].
 

@@ -18,7 +18,7 @@ from process_supervisor import CallError
 from ..client import ActionRun
 from .client import MotionClient
 from .goals import duration
-from .poses import free_end, free_way, SIDE, SIDES, square_fits, square_speed
+from .poses import can_go, free_end, free_way, SIDE, SIDES, square_fits, square_speed
 from .results import MotionResults, Square, WORST_PATH
 from .samples import away_from_line, peak_jerk, tool_speed, tracking_error
 
@@ -155,8 +155,12 @@ class MotionSequence:
     def singularity(self) -> None:
         """Jog the tool outwards until the arm is straight, or something else ends it, and back."""
         self.enter('into the straight arm, and back')
-        begin = self.client.last.tool
-        outwards = straight_ahead(begin)
+        state = self.client.last
+        begin, outwards = state.tool, straight_ahead(state.tool)
+        if not can_go(self.model, state.position, outwards):
+            why = 'left out: this arm cannot lead its tool along a line outwards'
+            self.results.add('singularity', why)
+            return
         first = len(self.client.samples)
         self.client.limited.clear()
         self._jog(FAST * outwards, self.model.base, LONGEST, self._stuck)
