@@ -435,19 +435,20 @@ def test_warnings_of_defaults_are_reported_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ('bitrate', 'kind'),
-    [(1_000_000, None), (250_000, None), (80_000, 'warning'), (50_000, 'error')],
+    [(1_000_000, None), (250_000, None), (100_000, 'warning'), (50_000, 'error')],
 )
 def test_load(tmp_path: Path, bitrate: int, kind: str | None) -> None:
     """The load by hand: 70 % is a warning, more than the bus carries an error.
 
-    A second has 100 SYNC of 0 bytes, 400 PDOs of 6 bytes, 200 TPDOs of 4 bytes, and 25 heartbeats
-    of 1 byte. Bits of a frame of n bytes: 47 + 8n, and stuffing of (33 + 8n) / 30 on average.
+    A second has 100 SYNC of 0 bytes, 400 PDOs of 6 bytes, 200 TPDOs of 4 bytes, 25 heartbeats of
+    1 byte, and 200 SDOs of 8 bytes: 0x6061 of two drives is polled every 10 ms and a cycle. Bits
+    of a frame of n bytes: 47 + 8n, and stuffing of (33 + 8n) / 30 on average.
     """
     report = report_of(tmp_path, CLEAN, bitrate)
     assert report.load is not None
     bits = 100 * (47 + 33 / 30) + 400 * (95 + 81 / 30) + 200 * (79 + 65 / 30)
-    bits += 25 * (55 + 41 / 30)
-    assert report.load.frames_per_second == pytest.approx(725)
+    bits += 25 * (55 + 41 / 30) + 200 * (111 + 97 / 30)
+    assert report.load.frames_per_second == pytest.approx(925)
     assert report.load.load == pytest.approx(bits / bitrate)
     assert report.load.load_worst > report.load.load
     reported = [

@@ -79,13 +79,15 @@ def test_an_eds_without_factor_group_has_no_radians(tmp_path: Path) -> None:
 
 
 def test_the_default_is_reported_where_the_drive_counts_otherwise(tmp_path: Path) -> None:
-    """1.0 is 0.01 rad here, as with ros2_canopen; with the scale written nothing is said."""
+    """1.0 is 0.01 rad here, as with ros2_canopen; a scale that is written is doubted below 0.1."""
     config = load_text(tmp_path, eds=EDS)
     assert ['0.01 rad' in warning.message for warning in check_bus(config).warnings].count(
         True
     ) == 1
-    written = load_text(tmp_path, added(JOINT, 'scale_pos_to_dev: 1000'), eds=EDS)
-    assert not any('0.01 rad' in warning.message for warning in check_bus(written).warnings)
+    for scale, is_doubted in ((20_000, False), (1000, True)):
+        written = load_text(tmp_path, added(JOINT, f'scale_pos_to_dev: {scale}'), eds=EDS)
+        found = [w.message for w in check_bus(written).warnings if 'factor group' in w.message]
+        assert ['one of them is wrong' in message for message in found] == [True] * is_doubted
 
 
 def test_two_rules_are_refused(tmp_path: Path) -> None:

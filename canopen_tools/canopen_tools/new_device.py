@@ -29,6 +29,8 @@ TURN = 2.0 * math.pi
 """A turn in [rad]."""
 SAME = 0.01
 """Share by which two scales may differ and still say the same."""
+FAR = 10.0
+"""How many times the increments of the factor group somebody may say without being asked."""
 UNSET = 1.0
 """Ratio of 0x6096 that nobody has set."""
 
@@ -179,9 +181,16 @@ def velocity_scale(device: NewDevice, units: Units) -> tuple[float, str]:
 
 
 def contradiction(device: NewDevice, units: Units) -> str:
-    """Return what to look at where 0x60A8 and the factor group differ; else nothing."""
+    """Return what to look at where the units and the factor group differ; else nothing.
+
+    What somebody says may differ by a gear that the drive does not know, but not by far; where it
+    is far less than the factor group has, the check of the file warns.
+    """
     factors = device.factors
-    if device.units is not None or not says_units(factors) or _is_same(factors, units):
+    if not says_units(factors) or _is_same(factors, units):
+        return ''
+    is_said, ratio_to_group = device.units is not None, abs(units.scale) / factors.position_scale
+    if is_said and (units.slides or ratio_to_group < FAR):
         return ''
     return (
         f'its factor group has {factors.position_scale:g} per rad: try which it is, canopen'
@@ -212,7 +221,8 @@ def _position_units(device: NewDevice) -> Units | None:
     if not is_written or not says_units(factors):
         return None
     source = device.source(*FACTOR_OBJECTS.values())
-    return Units(scale, f'0x608F, 0x6091, 0x6092 of {source}; per rad')
+    objects = ', '.join(f'0x{index:04X}' for index in factors.position_objects)
+    return Units(scale, f'{objects} of {source}; per rad')
 
 
 def _is_of_joint(device: NewDevice, units: Units) -> bool:

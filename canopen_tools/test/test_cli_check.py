@@ -79,6 +79,15 @@ def test_equal_frames_of_several_devices_are_one_row(capsys: pytest.CaptureFixtu
     assert [row.split()[4] for row in rows] == [f'{0x280 + node:03X}' for node in range(2, 9)]
 
 
+def test_what_is_polled_is_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Request and response of a mode that no TPDO carries, every 10 ms and a cycle."""
+    main(['check', str(write_bus(tmp_path, eds=eds_text()))])
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line for line in lines if line.startswith('SDO 0x6061'))
+    assert row.split()[2:5] == ['1', '8', '100.0']
+    assert row.endswith('polled, as no TPDO carries it')
+
+
 def test_a_full_bus_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
     """What a bit rate cannot carry is refused, with the figures."""
     assert main(['check', str(PANDA), '--bitrate', '250000']) == 1
@@ -99,6 +108,38 @@ def test_units_are_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     main(['check', str(write_bus(tmp_path, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
     assert row.split()[:4] == ['joint1', '1000', '0.01', '1000']
+
+
+@pytest.mark.parametrize(('gone', 'named'), [(None, '0x608F, 0x6092'), (0x6092, '0x608F')])
+def test_only_objects_that_the_eds_has_are_named(
+    gone: int | None, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the source of the units."""
+    rows = [*DRIVE_ROWS, *(row for row in FACTOR_ROWS if row.index != gone)]
+    text = BUS.replace('    node_id: 2\n', '    node_id: 2\n    scale_from_factor_group: true\n')
+    main(['check', str(write_bus(tmp_path, text, eds=eds_text(rows)))])
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith('joint1'))
+    assert row.endswith(f'factor group of the EDS ({named})')
+
+
+@pytest.mark.parametrize(
+    ('scale', 'rad', 'is_far'), [(1e4, '0.1', False), (999.0, '0.00999', True)]
+)
+def test_a_scale_far_from_the_factor_group_is_a_warning(
+    scale: float, rad: str, is_far: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A joint is not ten times as fast as its motor; the column is explained."""
+    keys = ', '.join(f'scale_{kind}_to_dev: {scale}' for kind in ('pos', 'vel'))
+    keys += ''.join(f', scale_{kind}_from_dev: {1 / scale}' for kind in ('pos', 'vel'))
+    block = keys.replace(', ', '\n    ')
+    text = BUS.replace('    node_id: 2\n', f'    node_id: 2\n    {block}\n')
+    main(['check', str(write_bus(tmp_path, text, eds=eds_text((*DRIVE_ROWS, *FACTOR_ROWS))))])
+    lines = capsys.readouterr().out.splitlines()
+    row = next(line for line in lines if line.startswith('joint1'))
+    assert row.split()[2] == rad
+    assert any(line.startswith('rad: how far 1.0 is by the factor group') for line in lines)
+    warning = f'and by the factor group of the EDS only {rad} rad'
+    assert any(warning in line for line in lines) is is_far
 
 
 def test_the_speed_of_moves_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

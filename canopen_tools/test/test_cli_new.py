@@ -359,6 +359,20 @@ def test_nothing_is_overwritten(
     assert not (tmp_path / 'third').exists()
 
 
+@pytest.mark.parametrize(
+    ('turn', 'is_doubted'), [('628318.5', False), ('3000000', False), ('62831850', True)]
+)
+def test_a_turn_far_above_the_factor_group_is_doubted(
+    turn: str, is_doubted: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On the terminal, and beside the scale; a gear that the drive does not know is none."""
+    eds, bus = written(tmp_path, 'drive.eds', SAMPLE), tmp_path / 'bus.yml'
+    assert main(['new', f'arm={eds}@2', '--turn', f'arm={turn}', '--output', str(bus)]) == 0
+    words = 'its factor group has 100000 per rad: try which it is, canopen first-motion'
+    assert (words in capsys.readouterr().out) is is_doubted
+    assert (words in bus.read_text()) is is_doubted
+
+
 def test_a_person_is_asked_for_units(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -366,12 +380,14 @@ def test_a_person_is_asked_for_units(
     monkeypatch.chdir(tmp_path)
     written(tmp_path, 'drive.eds', without(0x608F, 0x6092))
     monkeypatch.setattr('sys.stdin.isatty', lambda: True, raising=False)
-    answers = ['a', '', '0', ' 62831.853 ']
+    answers = ['a', '', '0', ' 62831.853*2 ']
     monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
     assert main(['new', 'arm=drive.eds@2']) == 0
-    assert capsys.readouterr().out.count('a number of increments is needed') == 3
+    out = capsys.readouterr().out
+    wanted = 'give a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
+    assert [f'{wanted}, not {answer!r}' in out for answer in ('a', '', '0')] == [True] * 3
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
-    assert node.axes[0].scale_pos_to_dev == pytest.approx(10_000.0)
+    assert node.axes[0].scale_pos_to_dev == pytest.approx(20_000.0)
 
 
 def test_a_person_is_asked_what_turns(
@@ -384,7 +400,9 @@ def test_a_person_is_asked_what_turns(
     answers = ['-1', 'fast', '26']
     monkeypatch.setattr('builtins.input', lambda asked: answers.pop(0) if 'arm' in asked else '')
     assert main(['new', 'arm=drive.eds@2', '--turn', 'arm=83200']) == 0
-    assert capsys.readouterr().out.count('a number of turns is needed') == 2
+    out = capsys.readouterr().out
+    assert "give a number above 0, such as 100, not '-1'" in out
+    assert "give a number above 0, such as 100, not 'fast'" in out
     (node,) = load_bus(tmp_path / 'bus.yml').nodes
     assert node.axes[0].scale_vel_to_dev == pytest.approx(26 * 60 / TURN)
 

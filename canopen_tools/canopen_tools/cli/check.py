@@ -10,7 +10,7 @@ from itertools import groupby
 from pathlib import Path
 
 from arm_canopen.config import check_file
-from arm_canopen.config.model.checks.drive_units import AxisUnits, MOTION_OBJECTS
+from arm_canopen.config.model.checks.drive_units import AxisUnits, MOTION_OBJECTS, UnitRule
 from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
 from arm_canopen.standard.objects import Index
 
@@ -88,16 +88,28 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
             f'{axis.increments:g}',
             '?' if axis.radians is None else f'{axis.radians:.4g}',
             f'{axis.velocity:g}',
-            axis.rule.value,
+            _rule(axis),
         )
         for axis in units
     ]
     head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
     print_table(head, rows, right='increments,rad,velocity units')
+    if any(axis.radians is not None and f'{axis.radians:.4g}' != '1' for axis in units):
+        print_line(
+            'rad: how far 1.0 is by the factor group of the EDS: 1 where 1.0 is a radian, '
+            'more where the EDS lacks the gear, or the joint slides'
+        )
     if any(axis.radians is None for axis in units):
         print_line(
             '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad it is'
         )
+
+
+def _rule(axis: AxisUnits) -> str:
+    """Return where a scale comes from, with the objects that the EDS really has."""
+    if axis.rule is not UnitRule.FACTOR_GROUP or not axis.factors:
+        return axis.rule.value
+    return f'{axis.rule.value} ({", ".join(f"0x{index:04X}" for index in axis.factors)})'
 
 
 def _print_motion(units: Sequence[AxisUnits]) -> None:
@@ -138,7 +150,12 @@ def _print_groups(load: LoadEstimate) -> None:
     groups = [list(group) for _, group in groupby(sorted(load.traffic, key=likeness), likeness)]
     groups.sort(key=lambda group: group[0].cob_id)
     rows = [
-        (group[0].service, str(len(group)), *_figures(group, load.bitrate)) for group in groups
+        (
+            group[0].service,
+            str(len({item.device for item in group})),
+            *_figures(group, load.bitrate),
+        )
+        for group in groups
     ]
     head = ('frame', 'devices', 'bytes', 'frames/s', 'load', 'when')
     print_table(head, rows, right='devices,bytes,frames/s,load')

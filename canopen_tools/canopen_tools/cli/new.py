@@ -17,7 +17,7 @@ from typing import TypeVar
 from arm_canopen.standard.drive import OperationMode
 
 from ..new_bus import bus_text, POSITION_MODES
-from ..new_device import NewDevice, TURN, Units
+from ..new_device import contradiction, NewDevice, said_units, TURN, Units
 from .arguments import add_bus_argument, node_id, seconds, SubParsers, UsageError
 from .check import show_check
 from .new_scan import given_devices, scanned_devices
@@ -27,6 +27,8 @@ from .scan import LISTEN
 T = TypeVar('T')
 PERIOD_MS = 10
 """Time between two SYNC in [ms]."""
+INCREMENTS = 'a number of increments other than 0, such as 360000, -36000.5 or 2000*50'
+"""What a person writes for a turn or a metre."""
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -126,6 +128,10 @@ def run(options: argparse.Namespace) -> int:
         devices = [_asked_turns(_asked(each)) for each in devices]
         _write(devices, bus_text(devices, options.period), output)
     print_line(f'{output} is written; what it says and why is in it')
+    for device in devices:
+        units = said_units(device) if device.is_drive else None
+        if units is not None and (doubt := contradiction(device, units)):
+            print_line(f'{device.name}: {units.scale:g} per rad, {doubt}')
     return show_check(output)
 
 
@@ -201,13 +207,13 @@ def _turns(name: str, text: str) -> float:
 def _increments(option: str, name: str, text: str) -> float:
     number = _number(text)
     if not math.isfinite(number) or number == 0.0:
-        raise UsageError(f'--{option} {name}={text}: give a number of increments, not 0')
+        raise UsageError(f'--{option} {name}={text}: give {INCREMENTS}, not {text!r}')
     return number
 
 
 def _number(text: str) -> float:
     try:
-        return float(text)
+        return math.prod(float(factor) for factor in text.split('*'))
     except ValueError:
         return math.nan
 
@@ -229,8 +235,7 @@ def _asked(device: NewDevice) -> NewDevice:
         ' (negative where it turns the other way; Ctrl-D where it slides: --metre): '
     )
     options = f'--turn or --metre {device.name}=INCREMENTS'
-    while (units := _answered(_turn, device.name, question, options)) is None:
-        print_line('a number of increments is needed, such as 360000 or -36000.5, and not 0')
+    units = _answered(_turn, device.name, question, options, INCREMENTS)
     return replace(device, units=units)
 
 
@@ -244,19 +249,23 @@ def _asked_turns(device: NewDevice) -> NewDevice:
         ' turn (or 1 m) of the joint, 1 where the drive knows the gear: '
     )
     option = f'--rpm {device.name}=TURNS'
-    while (turns := _answered(_turns, device.name, question, option)) is None:
-        print_line('a number of turns is needed, such as 100, and above 0')
+    turns = _answered(_turns, device.name, question, option, 'a number above 0, such as 100')
     return replace(device, rpm=turns)
 
 
-def _answered(read: Callable[[str, str], T], name: str, question: str, option: str) -> T | None:
-    """Ask once; None where the answer is none."""
-    try:
-        return read(name, input(question).strip())
-    except EOFError as error:
-        raise UsageError(f'give {option}') from error
-    except UsageError:
-        return None
+def _answered(
+    read: Callable[[str, str], T], name: str, question: str, option: str, wanted: str
+) -> T:
+    """Ask until the answer is one; else say what is wanted."""
+    while True:
+        try:
+            answer = input(question).strip()
+        except EOFError as error:
+            raise UsageError(f'give {option}') from error
+        try:
+            return read(name, answer)
+        except UsageError:
+            print_line(f'give {wanted}, not {answer!r}')
 
 
 def _period(text: str) -> int:

@@ -50,6 +50,12 @@ class FactorGroup:
         return self.position_scale * (self.velocity_factor or 1.0)
 
     @property
+    def position_objects(self) -> tuple[Index, ...]:
+        """Objects of those that it has which say what a position unit is."""
+        names = [name for name in FACTOR_OBJECTS if name != 'velocity_factor']
+        return tuple(FACTOR_OBJECTS[name] for name in names if getattr(self, name) is not None)
+
+    @property
     def _gear(self) -> float:
         return self.gear or 1.0
 

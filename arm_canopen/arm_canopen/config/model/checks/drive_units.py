@@ -35,6 +35,9 @@ MOTION_OBJECTS = (
 )
 """What the moves of a drive's own are made with, in its units of velocity (per second)."""
 SECONDS_PER_MINUTE = 60.0
+MIN_RADIANS = 0.1
+"""Turn of the shaft in [rad] for 1 rad or 1 m of the joint, below which the scale is doubted: it
+takes a gear that makes the joint faster than its motor."""
 SAME_SCALE = 1e-3  # share by which two scales may differ and still be the same
 
 
@@ -43,7 +46,7 @@ class UnitRule(Enum):
 
     BUS_YML = f'{POSITION_KEY} of bus.yml'
     UPSTREAM = f'default of ros2_canopen (no {POSITION_KEY})'
-    FACTOR_GROUP = 'factor group of the EDS (0x608F, 0x6091, 0x6092)'
+    FACTOR_GROUP = 'factor group of the EDS'
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +60,7 @@ class AxisUnits:
         velocity: Device velocity units of 1.0 per second.
         radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
             does not have it.
+        factors: Objects of the factor group that say it.
         motion: Speeds and accelerations that the drive has after boot, by object, in user units
             per second and second squared.
     """
@@ -66,6 +70,7 @@ class AxisUnits:
     increments: float
     velocity: float
     radians: float | None
+    factors: tuple[Index, ...] = ()
     motion: Mapping[Index, float] = field(default_factory=dict)
 
 
@@ -83,7 +88,8 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
     per_radian = factors.position_scale
     radians = increments / per_radian if per_radian else None
     motion = _motion(subject, axis, velocity)
-    return AxisUnits(axis.name or subject.node.name, rule, increments, velocity, radians, motion)
+    name = axis.name or subject.node.name
+    return AxisUnits(name, rule, increments, velocity, radians, factors.position_objects, motion)
 
 
 def _motion(subject: Subject, axis: DriveConfig, scale: float) -> dict[Index, float]:
@@ -205,6 +211,21 @@ def _check_against_factors(subject: Subject, units: AxisUnits) -> None:
             f'with ros2_canopen; by the factor group of the EDS they are {units.radians:.4g} rad',
             f"write {POSITION_KEY} and the other scales, or '{FACTOR_KEY}: true' for radians",
         )
+    elif units.rule is UnitRule.BUS_YML and _is_far_off(units):
+        subject.findings.warning(
+            subject.place(POSITION_KEY),
+            f'{units.name}: 1.0 is {units.increments:g} increments, and by the factor group of '
+            f'the EDS only {abs(units.radians or 0.0):.4g} rad: one of them is wrong',
+            f"try which it is: canopen first-motion, or leave the scales out for '{FACTOR_KEY}: "
+            "true' (canopen new: without --turn)",
+        )
+
+
+def _is_far_off(units: AxisUnits) -> bool:
+    """Whether a joint would turn so much faster than its motor that a scale must be wrong."""
+    if units.radians is None or is_coarse(units.increments):
+        return False  # what is coarse is reported itself
+    return abs(units.radians) < MIN_RADIANS
 
 
 def _check_profile_velocity(subject: Subject, axis: DriveConfig) -> None:

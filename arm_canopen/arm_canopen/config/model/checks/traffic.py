@@ -10,11 +10,16 @@ from dataclasses import dataclass
 from ....can.frame import PAYLOAD_MAX
 from ....can.load import frame_bits, stuff_bits_mean, stuff_bits_worst
 from ....standard.cob_id import CAN_ID_MASK, CobId
+from ....standard.dictionary import object_address
+from ....standard.objects import AXIS_OFFSET, Index
 from ....standard.pdo import SYNCHRONOUS_MAX
 from ...findings import Findings
 from ..bus import BusConfig, NodeConfig, PdoConfig
 from ..pdo_direction import Direction, TPDO
 from .subject import Subject
+
+POLLED = (Index.STATUSWORD, Index.MODE_OF_OPERATION_DISPLAY, Index.POSITION_ACTUAL)
+"""State of an axis that the master reads by SDO where no TPDO carries it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +57,8 @@ class Traffic:
 class LoadEstimate:
     """What a bus will carry when every device is operational.
 
-    SDO, EMCY and NMT come on top; they are rare, and let everything cyclic pass.
+    SDO that polls nothing, EMCY and NMT come on top; they are rare, and let everything cyclic
+    pass.
 
     Attributes:
         bitrate: Bit rate in [bit/s].
@@ -95,6 +101,7 @@ def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate
             traffic.append(Traffic(node.name, 'heartbeat', cob_id, 1, 1 / period, reason))
         traffic += [_pdo_traffic(subject, direction, pdo) for direction, pdo in subject.pdos()]
         traffic += _guarding(node)
+        traffic += _polling(subject)
     return LoadEstimate(bitrate or config.master.bitrate, tuple(traffic))
 
 
@@ -121,6 +128,21 @@ def _guarding(node: NodeConfig) -> Iterator[Traffic]:
         cob_id, reason = CobId.HEARTBEAT + node.node_id, f'every {node.guard_time * 1e3:g} ms'
         yield Traffic(node.name, 'guarding', cob_id, 0, 1 / node.guard_time, reason)
         yield Traffic(node.name, 'guarding', cob_id, 1, 1 / node.guard_time, reason)
+
+
+def _polling(subject: Subject) -> Iterator[Traffic]:
+    """Yield request and response of the objects of a drive that no TPDO carries."""
+    node, cycle = subject.node, subject.bus.master.cycle_period
+    axes = node.axes if node.is_drive else ()
+    indices = [index + AXIS_OFFSET * axis.channel for axis in axes for index in POLLED]
+    for index in indices:
+        if subject.carriers(TPDO, index) or node.dictionary.get(index, 0) is None:
+            continue
+        # the answers are there in the next cycle, and the time to the next reading begins
+        rate = 1 / (node.poll_period + cycle)
+        service, reason = f'SDO {object_address(index)}', 'polled, as no TPDO carries it'
+        for cob_id in (CobId.SDO_REQUEST, CobId.SDO_RESPONSE):
+            yield Traffic(node.name, service, cob_id + node.node_id, PAYLOAD_MAX, rate, reason)
 
 
 def _pdo_traffic(subject: Subject, direction: Direction, pdo: PdoConfig) -> Traffic:
