@@ -10,7 +10,6 @@ from typing import Any
 
 from std_srvs.srv import Trigger
 
-from node_runner import ServerMatch
 from process_supervisor import CallError
 from process_supervisor.graph_client import GraphClient
 
@@ -80,6 +79,5 @@ class ServiceClient(GraphClient):
         if self._known.issuperset(services):
             return
         there = {name for name, client in self._clients.items() if client.service_is_ready()}
-        matched = ServerMatch(self.node, there - self._known)
-        self.wait_until(matched.advance, timeout, f'the nodes of {", ".join(services)}')
+        self.wait_until_known(there - self._known, timeout)
         self._known |= there

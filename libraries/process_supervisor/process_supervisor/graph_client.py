@@ -7,14 +7,14 @@ This module is not imported by the package: it loads rclpy, which a mere bring-u
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 import time
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from node_runner import init_ros
+from node_runner import init_ros, ServerMatch
 
 from .exceptions import GivenUpError, no_answer
 
@@ -81,3 +81,17 @@ class GraphClient:
             if self._given_up():
                 raise GivenUpError(what)
             self._executor.spin_once(timeout_sec=SPIN)
+
+    def wait_until_known(self, services: Collection[str], timeout: float) -> None:
+        """Wait until the nodes of services know the clients of this one, or answers are lost.
+
+        Args:
+            services: Names of which clients were made.
+            timeout: Longest time in [s].
+
+        Raises:
+            CallError: They did not in time.
+            GivenUpError: It is no longer wanted.
+        """
+        match = ServerMatch(self.node, services)
+        self.wait_until(match.advance, timeout, f'the nodes of {", ".join(sorted(services))}')
