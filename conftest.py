@@ -47,12 +47,16 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let two workers have the scenarios with whole robots: more would share two cores too often.
 
-    Large groups begin first, so that the others run beside them, and not all scenarios at the end.
+    One of them has all pages, as browsers that draw without a graphics card take much of a core;
+    every third file of the others makes both take about as long. Large groups begin first, so that
+    the others run beside them, and not all scenarios at the end.
     """
     robots = [item for item in items if item.path.parent == SCENARIOS]
-    files = sorted({item.path for item in robots})
+    pages = {item.path for item in robots if hasattr(getattr(item, 'module', None), 'chromium')}
+    others = sorted({item.path for item in robots} - pages)
+    first = pages | set(others[::3])
     for item in robots:
-        item.add_marker(pytest.mark.xdist_group(f'robots-{files.index(item.path) % 2}'))
+        item.add_marker(pytest.mark.xdist_group(f'robots-{int(item.path not in first)}'))
 
 
 @pytest.fixture
