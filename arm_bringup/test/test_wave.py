@@ -206,8 +206,8 @@ def test_a_drive_that_moves_or_has_no_mode_yet_is_waited_for_a_little(*, moves: 
     arm = panda()
     arm.wave.start()
 
-    def keep(active: int) -> None:
-        for _ in range(active):
+    def keep(duration: float) -> None:
+        for _ in range(round(duration / (OBSERVED * PERIOD))):
             if moves:
                 arm.move('joint1', arm.drives['joint1'].setpoint + 0.1)
             else:
@@ -217,11 +217,11 @@ def test_a_drive_that_moves_or_has_no_mode_yet_is_waited_for_a_little(*, moves: 
         arm.drives['joint1'] = replace(arm.drives['joint1'], mode=ENABLED.mode)
         arm.run(3 * OBSERVED * PERIOD)
 
-    keep(READY_WITHIN - 2)
+    keep(READY_WITHIN - 1.0)
     assert 'joint1' in arm.wave.active
     arm.wave.stop()
     arm.wave.start()
-    keep(READY_WITHIN)
+    keep(READY_WITHIN + 1.0)
     assert 'joint1' not in arm.wave.active
 
 

@@ -146,7 +146,8 @@ def keys_of_imports(modules: Iterable[str]) -> set[str]:
 
 def helpers() -> set[str]:
     """Return the modules beside all tests, which tests import by their name."""
-    folders = [folder for each in PACKAGES.values() for folder in each.folder.glob('t*')]
+    beside = ('test', 'bench', 'training')
+    folders = [each.folder / name for each in PACKAGES.values() for name in beside]
     folders += [LAYOUT.root / 'tests']
     return {path.stem for folder in folders for path in folder.rglob('*.py')}
 

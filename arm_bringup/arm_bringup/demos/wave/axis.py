@@ -10,8 +10,8 @@ import math
 from ..figures import AxisFigures, DriveFigures
 from .plan import Swing, WaveStyle
 
-READY_WITHIN = 5
-"""Observations within which a drive that was asked for has to be ready; later it stays out."""
+READY_WITHIN = 5.0
+"""Time in [s] within which a drive that was asked for has to be ready; later it stays out."""
 STANDING = 3
 """Observations in which a set-point stands beside the wave before it is somebody else's."""
 BESIDE = 0.1
@@ -77,7 +77,8 @@ class WaveAxis:
     swing: Swing
     left: str = ''
     _entry: Entry | None = None
-    _asked: int = 0
+    _asked: bool = False
+    _asked_since: float = math.nan  # when it was first observed after that
     _target: float = math.nan
     _setpoint: float = math.nan
     _standing: int = 0
@@ -90,7 +91,7 @@ class WaveAxis:
 
     def ask(self) -> None:
         """Let it take part as soon as it stands and can follow."""
-        self._asked = READY_WITHIN
+        self._asked, self._asked_since = True, math.nan
 
     def target(self, now: float, omega: float) -> float | None:
         """Return where it is to be; None when it takes no part.
@@ -123,13 +124,16 @@ class WaveAxis:
             else:
                 self._tracking.measure(drive)
         elif self._asked:
-            self._asked -= 1
+            if math.isnan(self._asked_since):
+                self._asked_since = now
             if stands and drive.follows_targets:
                 self._enter(drive.setpoint, now, style)
+            elif now - self._asked_since > READY_WITHIN:
+                self._asked = False
 
     def leave(self, reason: str) -> None:
         """Take no part any more, and say why."""
-        self._entry, self._asked, self.left = None, 0, reason
+        self._entry, self._asked, self.left = None, False, reason
 
     def figures(self) -> AxisFigures:
         """Sum up what was measured."""
@@ -141,7 +145,7 @@ class WaveAxis:
 
     def _enter(self, setpoint: float, now: float, style: WaveStyle) -> None:
         self._entry = Entry(setpoint, now, self.swing.entry_duration(setpoint, style))
-        self._asked = self._standing = 0
+        self._asked, self._standing = False, 0
         self._target, self.left = setpoint, ''
 
     def _lost(self, drive: DriveFigures, *, stands: bool) -> str:
