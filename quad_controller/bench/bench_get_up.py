@@ -101,7 +101,8 @@ def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
     """
     backend = fallen(seed, side)
     state = backend.observe()
-    assert state.imu is not None
+    if state.imu is None:
+        raise ValueError('a robot in physics measures its attitude')
     lay = lying_on(state.imu.down)
     if only and lay is not side:
         return Outcome(lay, False, 0.0, '')

@@ -67,8 +67,4 @@ class GetUpTeacher:
         return on_side if abs(y) > ON_SIDE else leaning
 
     def _placed(self, robot: Quadruped, legs: Legs) -> Targets:
-        targets = list(self.stand)
-        for indices, angles in zip(robot.leg_indices, legs, strict=True):
-            for index, angle in zip(indices, angles, strict=True):
-                targets[index] = angle
-        return robot.clamp(targets)
+        return robot.clamp(robot.with_legs(legs, self.stand))

@@ -20,6 +20,7 @@ from quad_controller.gait.velocity import REST
 from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.policy_check.trial import Candidate
+from quad_controller.states.get_up import LEVEL
 from quad_controller.states.limiter import StepLimiter
 from quad_controller.states.lying import Lying, lying_on
 from quad_description import quadruped, robot_urdf, Targets
@@ -30,7 +31,6 @@ from quad_sim.physics import Meter
 
 DURATION = 8.0  # [s] in which it has to get up
 STILL_TIME = 1.0  # [s] at the end of it, in which it has to stand
-MAX_TILT = 0.35  # [rad] of a robot that stands
 MAX_HEIGHT_ERROR = 0.02  # [m]
 MAX_SPEED, MAX_TURN_RATE = 0.1, 1.0  # [m/s], [rad/s]
 MAX_SATURATION = 0.1  # share of the time at the limits of torque or speed, mean of all servos
@@ -222,7 +222,7 @@ def _answer(env: GetUpEnv, policy: PolicyRunner) -> Targets | None:
 def _stands(env: GetUpEnv) -> bool:
     pose, velocity = env.robot.base_pose, env.robot.base_velocity
     return (
-        pose.tilt <= MAX_TILT
+        pose.tilt < LEVEL
         and abs(pose.position[2] - env.nominal_height) <= MAX_HEIGHT_ERROR
         and math.hypot(*velocity.linear) <= MAX_SPEED
         and math.hypot(*velocity.angular) <= MAX_TURN_RATE

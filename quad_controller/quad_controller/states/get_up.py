@@ -43,7 +43,7 @@ STAND_SPEED = 1.5  # [rad/s]
 POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
 EASE_TIME = 0.3  # [s] over which a policy takes over
 
-MIN_REACH = 0.01  # [rad] that a joint may be short of a pose
+REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
 ON_ITS_BACK = (
@@ -226,12 +226,9 @@ class GetUp(Motion):
         """Try one of the recoveries from a side, the next one when that was tried before."""
         recoveries = RECOVERIES[lying]
         for stage in recoveries[(self._tries[lying] - 1) % len(recoveries)]:
-            targets = list(self._last)
-            for indices, angles in zip(self._robot.leg_indices, stage.legs, strict=True):
-                for index, angle in zip(indices, angles, strict=True):
-                    targets[index] = angle
+            targets = self._robot.with_legs(stage.legs, self._last)
             reached = self._robot.clamp(targets)
-            if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > MIN_REACH:
+            if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > REACH_TOLERANCE:
                 self._failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
                 return
             self._start_stage(reached, stage.speed)

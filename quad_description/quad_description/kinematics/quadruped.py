@@ -113,9 +113,18 @@ class Quadruped:
             solutions: One for each leg.
             others: Positions of all joints; those of the legs in it are replaced.
         """
+        return self.with_legs([solution.angles for solution in solutions], others)
+
+    def with_legs(self, angles: Sequence[Vector], others: Sequence[float]) -> Targets:
+        """Put positions of hip, thigh and calf of each leg among those of all joints.
+
+        Args:
+            angles: Of each leg in [rad].
+            others: Positions of all joints; those of the legs in it are replaced.
+        """
         targets = list(others)
-        for (hip, thigh, calf), solution in zip(self.leg_indices, solutions, strict=True):
-            targets[hip], targets[thigh], targets[calf] = solution.angles
+        for (hip, thigh, calf), leg in zip(self.leg_indices, angles, strict=True):
+            targets[hip], targets[thigh], targets[calf] = leg
         return tuple(targets)
 
     def clamp(self, positions: Sequence[float]) -> Targets:

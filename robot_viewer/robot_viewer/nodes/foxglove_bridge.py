@@ -7,9 +7,10 @@ from __future__ import annotations
 import os
 import threading
 
-from node_runner import log_as, notify_ready, run_program, spin
+from node_runner import run_program
 
 from ..exceptions import BridgeError
+from .serving import serve
 
 NAME = 'foxglove_bridge'
 NICENESS = 10
@@ -39,10 +40,4 @@ def _serve(stop: threading.Event) -> None:
         raise BridgeError(MISSING) from None
     os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
     node = FoxgloveBridge(NAME)
-    log_as(node)
-    notify_ready(node.seen_at)
-    try:
-        spin([node], stop)
-    finally:
-        node.close()
-        node.destroy_node()
+    serve(node, node.seen_at, node.close, stop)

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import threading
 
-from node_runner import log_as, notify_ready, run_program, spin
+from node_runner import run_program
 
 from ..exceptions import SinkError
+from .serving import serve
 
 NAME = 'rerun_sink'
 MISSING = (
@@ -35,10 +36,4 @@ def _serve(stop: threading.Event) -> None:
             raise
         raise SinkError(MISSING) from None
     node = RerunSink(NAME)
-    log_as(node)
-    notify_ready(node.seen_at)
-    try:
-        spin([node], stop)
-    finally:
-        node.close()
-        node.destroy_node()
+    serve(node, node.seen_at, node.close, stop)

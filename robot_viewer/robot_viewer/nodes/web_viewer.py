@@ -30,13 +30,10 @@ from urdf_reader import DescriptionError, read_urdf, Transform
 from node_runner import (
     destroyed_when_refused,
     LATCHED,
-    log_as,
-    notify_ready,
     ParameterError,
     ParameterReader,
     refuse_misspelt,
     run_program,
-    spin,
 )
 
 from ..loopback import binding_problem
@@ -48,6 +45,7 @@ from .controllers import Controllers
 from .first_motion import FirstMotion
 from .listening import Listening
 from .motion_planning import MotionPlanning
+from .serving import serve
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -426,10 +424,4 @@ def main() -> int:
 
 def _serve(stop: threading.Event) -> None:
     node = WebViewer()
-    log_as(node)
-    notify_ready(node.seen_at)
-    try:
-        spin([node], stop)
-    finally:
-        node.page.close()
-        node.destroy_node()
+    serve(node, node.seen_at, node.page.close, stop)
