@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Generator
 
 import browser
+import processes
 import pytest
 
 
@@ -14,8 +15,11 @@ import pytest
 def pytest_runtest_makereport(
     call: pytest.CallInfo[None],
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Have what the pages said at that moment."""
+    """Have what the pages and the processes said at that moment."""
     report = yield
-    if call.when == 'call' and report.failed:
+    if report.failed:
         report.sections += [('page', text) for text in browser.texts()]
+        report.sections += processes.outputs()
+    if call.when == 'teardown':
+        processes.forget_ended()
     return report

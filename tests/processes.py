@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 import os
 import re
@@ -23,20 +23,40 @@ from ament_index_python.packages import get_package_prefix
 
 from process_supervisor.readiness import ReadinessSocket, VARIABLE
 
+LAST_LINES = 60
+"""How much of what a process said a failure is reported with."""
+
 
 def executable(package: str, name: str) -> str:
     """Return the path of an installed executable."""
     return f'{get_package_prefix(package)}/lib/{package}/{name}'
 
 
+_started: list[RunningProcess] = []
+
+
+def outputs() -> Iterator[tuple[str, str]]:
+    """Yield command and last output of the processes of a test, to find the cause of a failure."""
+    for process in _started:
+        state = 'running' if process.is_running() else 'ended'
+        yield f'{process.command} ({state})', '\n'.join(process.lines[-LAST_LINES:])
+
+
+def forget_ended() -> None:
+    """Leave out of :func:`outputs` what has ended; those of a fixture of several tests go on."""
+    _started[:] = [process for process in _started if process.is_running()]
+
+
 class RunningProcess:
     """A child process in a session of its own.
 
     Attributes:
+        command: Program and arguments as one text.
         lines: What it has printed so far, standard output and error together.
     """
 
     def __init__(self, arguments: Sequence[str], env: Mapping[str, str]) -> None:
+        self.command = ' '.join(arguments)
         self.lines: list[str] = []
         self._changed = threading.Condition()
         self._readiness = ReadinessSocket()
@@ -52,6 +72,7 @@ class RunningProcess:
         )
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+        _started.append(self)
 
     @property
     def pid(self) -> int:

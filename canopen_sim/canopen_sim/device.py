@@ -213,6 +213,11 @@ class Device:
                 part.advance(now)
         self._tpdos.poll(now)
 
+    def stood_still(self, now: float) -> None:
+        """Take nobody for silent of whom nothing could be heard: the computer stood still."""
+        self._error_control.restart(now)
+        self._rpdos.restart(now)
+
     def switch_off(self, now: float) -> None:
         """Cut the power: the device falls silent, and the motor runs out."""
         if not self.powered:

@@ -123,6 +123,11 @@ class DeviceHost:
                     self._defect(device, error, now)
         self._finish(now)
 
+    def stood_still(self, now: float) -> None:
+        """Have no device take others for silent while this computer stood still."""
+        for device in self.devices:
+            device.stood_still(now)
+
     def device(self, node_id: int) -> Device:
         """Return the device with a node id, also if LSS has given it another one since.
 

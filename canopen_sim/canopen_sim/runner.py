@@ -23,7 +23,7 @@ from .host import DeviceHost
 Result = TypeVar('Result')
 
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
-STALL = 0.1  # [s] that a frame has waited when devices count as having stood still
+STALL = 0.1  # [s] that a frame or deadline has waited when devices count as having stood still
 
 logger = logging.getLogger(__name__)
 
@@ -80,7 +80,10 @@ class DeviceRunner:
     def _serve(self) -> None:
         host = self.host
         while not self._thread.stopping:
-            host.advance(time.monotonic())
+            now = time.monotonic()
+            if now - host.deadline > STALL:
+                host.stood_still(now)
+            host.advance(now)
             self._thread.do_work()
             wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
             for frame in self._receive(max(0.0, wait)):

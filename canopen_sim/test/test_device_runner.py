@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import threading
+import time
 
 from can_addresses import free_virtual
 from device_rig import drive_dictionary, NODE_ID, with_defaults
@@ -17,6 +18,9 @@ from canopen_sim import runner
 from canopen_sim.runner import DeviceRunner, newest_process_data
 
 TIMEOUT = 10.0  # [s]
+MASTER_ID = 1
+WATCHED = 0.3  # [s]
+EMERGENCY = CobId.EMCY + NODE_ID
 
 
 def test_of_process_data_the_newest_is_kept_and_of_services_all() -> None:
@@ -57,3 +61,26 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
         answers = [f for f in master.receive(0.0) if f.can_id == tpdo_default(1, NODE_ID)]
     assert len(answers) == 1
     assert any(isinstance(record.args, tuple) and 19 in record.args for record in caplog.records)
+
+
+def test_a_device_that_stood_still_takes_nobody_for_silent() -> None:
+    """It could not hear the master meanwhile; one that goes on to be silent is noticed."""
+    name = free_virtual()
+    with open_bus(name) as bus, open_bus(name) as master:
+        devices = DeviceRunner(bus)
+        watch = {(0x1016, 1): MASTER_ID << 16 | round(WATCHED * 1000)}
+        devices.host.add(NODE_ID, with_defaults(drive_dictionary(), watch))
+        devices.start()
+        try:
+            devices.call(lambda: None).result(TIMEOUT)
+            master.send(Frame(CobId.HEARTBEAT + MASTER_ID, b'\5'))
+            devices.call(lambda: None).result(TIMEOUT)
+            stall = WATCHED + 2.0 * runner.STALL
+            devices.call(lambda: threading.Event().wait(stall)).result(TIMEOUT)
+            devices.call(lambda: None).result(TIMEOUT)
+            woken = time.monotonic()
+            while not (lost := [f for f in master.receive(TIMEOUT) if f.can_id == EMERGENCY]):
+                assert time.monotonic() - woken < TIMEOUT
+            assert lost[0].timestamp > woken + WATCHED / 2.0
+        finally:
+            devices.stop()

@@ -11,10 +11,12 @@ import pytest
 from workspace.wheels import (
     BOOTSTRAP_FILE,
     BOOTSTRAP_LINE,
+    DDS_LIBRARIES,
     library_folders,
     patch_bootstrapper,
     patch_cmake_files,
     patch_cmake_text,
+    patch_dds,
 )
 
 BUILDER = '/opt/python/cp311-cp311'
@@ -56,6 +58,36 @@ def test_libraries_are_those_beside_the_ros_packages(tmp_path: Path) -> None:
     for name in ('ros_rclpy.libs', 'numpy.libs'):
         (site / name).mkdir(parents=True)
     assert library_folders(tmp_path, site) == [tmp_path / 'lib', site / 'ros_rclpy.libs']
+
+
+def test_waiting_for_callbacks_of_dds_has_an_end_that_a_clock_can_reach(tmp_path: Path) -> None:
+    """Both functions are changed and nothing else; twice is once; the cache keeps its file."""
+    forever, hour = b'\xff' * 7 + b'\x7f', (3600).to_bytes(8, 'little')
+
+    def code(wait: bytes) -> bytes:
+        first, second = b'\x48\xba' + wait, b'\x48\xb9' + wait
+        jumps = [b'\xe9' + bytes((index, 10, 0, 0)) + b'\x90' for index in range(2)]
+        return b'\x48\xba' + forever + b'\xc3' + first + jumps[0] + second + jumps[1] + forever
+
+    cached = tmp_path / 'cached'
+    cached.write_bytes(code(forever))
+    library = tmp_path / DDS_LIBRARIES.replace('*', '.2.14')
+    library.hardlink_to(cached)
+    assert [patch_dds(tmp_path) for _ in range(2)] == [1, 0]
+    assert library.read_bytes() == code(hour)
+    assert cached.read_bytes() == code(forever)
+
+
+def test_the_libraries_of_this_environment_are_patched() -> None:
+    """Its wheels still have the functions that the patch knows, or have learnt to wait."""
+    libraries = [*(Path(sys.prefix) / 'lib').glob(DDS_LIBRARIES)]
+    if not libraries:
+        pytest.skip('ROS does not come from wheels here')
+    for library in libraries:
+        code = library.read_bytes()
+        hour = (3600).to_bytes(8, 'little')
+        patched = b'\x48\xba' + hour + b'\xe9' in code
+        assert patched or b'pthread_cond_clockwait' in code, library
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ def fingerprint_files(paths: Iterable[Path]) -> str:
     return fingerprint(*parts)
 
 
-def write_atomically(path: Path, text: str, *, mode: int = 0o644) -> None:
+def write_atomically(path: Path, content: str | bytes, *, mode: int = 0o644) -> None:
     """Write a file so that a reader sees the old one or the new one and nothing between.
 
     The old file is replaced and not changed in place: installed files may be hard links into a
@@ -38,8 +38,9 @@ def write_atomically(path: Path, text: str, *, mode: int = 0o644) -> None:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f'{path.name}.{os.getpid()}.part')
-    with part.open('w', encoding='utf-8', errors='surrogateescape') as stream:
-        stream.write(text)
+    data = content if isinstance(content, bytes) else content.encode('utf-8', 'surrogateescape')
+    with part.open('wb') as stream:
+        stream.write(data)
         stream.flush()
         os.fsync(stream.fileno())
     part.chmod(mode)

@@ -26,6 +26,18 @@ BOOTSTRAP_LINE = (
     "__import__('ros_wheels_bootstrapper'))\n"
 )
 
+DDS_LIBRARIES = 'libfastrtps.so*'
+# DomainParticipant::set_listener(listener), and the one with a mask beside it: they wait for the
+# callbacks that run, for seconds::max(). The wheels are built for a C library that has no wait on
+# the steady clock; the compiler's stand-in for it turns that into a time before 1970, the wait fails
+# at once, again and again, and never gives up the lock that the callback waits for: a process that
+# leaves the graph while it discovers another one hangs for good.
+_FOREVER = (2**63 - 1).to_bytes(8, 'little')
+_LONG_ENOUGH = (3600).to_bytes(8, 'little')  # [s]
+_WAIT_FOREVER = re.compile(
+    rb'(\x48\xba)%b(\xe9.{4}\x90\x48\xb9)%b(?=\xe9.{4}\x90)' % (_FOREVER, _FOREVER), re.DOTALL
+)
+
 
 def patch_cmake_text(text: str, include: str, numpy_include: str) -> str:
     """Replace the builder's include folders by those of this machine.
@@ -68,6 +80,25 @@ def patch_bootstrapper(site_packages: Path) -> None:
         write_atomically(path, BOOTSTRAP_LINE)
 
 
+def patch_dds(libraries: Path) -> int:
+    """Let a process leave the graph while it discovers another one.
+
+    Args:
+        libraries: The folder of the libraries.
+
+    Returns:
+        How many files had to be changed.
+    """
+    changed = 0
+    for path in sorted(libraries.glob(DDS_LIBRARIES)):
+        code = path.read_bytes()
+        patched = _WAIT_FOREVER.sub(rb'\1%b\2%b' % (_LONG_ENOUGH, _LONG_ENOUGH), code)
+        if patched != code:
+            write_atomically(path, patched, mode=path.stat().st_mode)
+            changed += 1
+    return changed
+
+
 def library_folders(prefix: Path, site_packages: Path) -> list[Path]:
     """List the folders whose shared libraries the ROS extensions load."""
     return [prefix / 'lib', *sorted(site_packages.glob('ros_*.libs'))]
@@ -93,4 +124,5 @@ def patch(runner: Runner, prefix: Path, python: Path) -> list[Path]:
     site_packages, include, numpy_include = json.loads(answer.read_text(encoding='utf-8'))
     patch_cmake_files(prefix, include, numpy_include)
     patch_bootstrapper(Path(site_packages))
+    patch_dds(prefix / 'lib')
     return library_folders(prefix, Path(site_packages))

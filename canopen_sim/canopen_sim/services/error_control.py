@@ -77,6 +77,11 @@ class ErrorControl:
         self.consumer.reset()
         self.guarding.reset()
 
+    def restart(self, now: float) -> None:
+        """Give those that are watched their whole time again."""
+        self.consumer.restart(now)
+        self.guarding.restart(now)
+
     def _heartbeat_lost(self, node_id: int, now: float) -> None:
         self._lose(now, node_id)
 

@@ -107,6 +107,11 @@ class Rpdo(PdoChannel):
         for listener in self._listeners:
             listener(now)
 
+    def restart(self, now: float) -> None:
+        """Give it its whole time again."""
+        if self.deadline != NEVER:
+            self.deadline = now + self.event_time
+
     def advance(self, now: float) -> None:
         """Report that the PDO stayed away."""
         if now >= self.deadline:
@@ -227,6 +232,11 @@ class RpdoEngine:
         """
         for rpdo in [rpdo for rpdo in self.active if rpdo.store_held()]:
             rpdo.notify_listeners(now)
+
+    def restart(self, now: float) -> None:
+        """Give those that are awaited their whole time again."""
+        for rpdo in self.active:
+            rpdo.restart(now)
 
     def advance(self, now: float) -> None:
         """Report those that are overdue."""

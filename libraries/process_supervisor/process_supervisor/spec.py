@@ -24,12 +24,13 @@ class StopStep:
 
 STOP_STEPS = (
     StopStep(Signals.SIGTERM, 20.0),
-    StopStep(Signals.SIGINT, 2.0),
+    StopStep(Signals.SIGABRT, 2.0),
     StopStep(Signals.SIGKILL, 2.0),
 )
 """The usual ladder; 20 s because a master may take 18 s to bring its drives to rest.
 
-SIGTERM comes first: by a SIGINT, a Python process that is still importing ends with a traceback.
+No SIGINT: by it, a Python process that is still importing ends with a traceback. By SIGABRT, a
+program of node_runner that hangs says where each of its threads does.
 """
 
 

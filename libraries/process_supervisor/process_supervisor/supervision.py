@@ -22,6 +22,9 @@ ECHO_TIME = 0.5
 """An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
 
+KILLED = (-Signals.SIGABRT, -Signals.SIGKILL)
+"""Return codes of a process that did not end when it was asked to."""
+
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
 """Return codes of a process that ended as it should when it was stopped."""
 
@@ -215,7 +218,7 @@ class Supervision:
         if self.phase is Phase.STOPPING:
             self._stopping.exited(name)
             self._say(f'{name} {how}', _severity(returncode))
-            killed = returncode == -Signals.SIGKILL and child.spec.required
+            killed = returncode in KILLED and child.spec.required
             if killed and self.outcome and not self.outcome.exit_code:
                 self.outcome = Outcome(1, f'{name} had to be killed', name, tuple(child.lines))
             self._advance_stop(now)

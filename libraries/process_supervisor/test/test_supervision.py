@@ -198,7 +198,7 @@ def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:
         bench.supervision.advance(deadline)
     assert [signal for _, signal in bench.sent] == [
         Signals.SIGTERM,
-        Signals.SIGINT,
+        Signals.SIGABRT,
         Signals.SIGKILL,
     ]
     assert 'not even SIGKILL ended master' in bench.notices[-1].text
