@@ -8,6 +8,7 @@ name of the Python package inside it, which would then be hidden; so the real on
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 import importlib
 import os
 from pathlib import Path
@@ -20,6 +21,8 @@ import pytest
 from dds_network import restrict_dds
 
 SCENARIOS = Path(__file__).parent / 'tests'
+NICENESS = os.getpriority(os.PRIO_PROCESS, 0)
+OF_ROBOTS = -5  # beside it
 
 _ROOT = Path(__file__).parent
 for _marker in [*_ROOT.glob('*/resource/*'), *_ROOT.glob('libraries/*/resource/*')]:
@@ -57,6 +60,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     first = pages | set(others[::3])
     for item in robots:
         item.add_marker(pytest.mark.xdist_group(f'robots-{int(item.path not in first)}'))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Let robots and what they start come before tests that compute, where this user may do so."""
+    first = OF_ROBOTS if item.get_closest_marker('scenario') else 0
+    with suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS + first)
 
 
 @pytest.fixture

@@ -32,6 +32,8 @@ OPTIONS = [
     '--enable-unsafe-swiftshader',
     '--ignore-gpu-blocklist',
 ]
+POLITE = ('nice', '-n', '10')
+"""It draws without a graphics card; the robots that it shows come first."""
 SIZE = {'width': 760, 'height': 520}  # [px] a software renderer draws it
 PAGE_TIMEOUT = 60_000  # [ms] on a busy machine
 TEXT_TIMEOUT = 5_000  # [ms] of a page that may hang
@@ -85,7 +87,8 @@ def browser(prefix: Sequence[str] = ()) -> Iterator[Browser]:
 
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
         script = Path(folder, NAMES[0])
-        script.write_text(f'#!/bin/sh\nexec {shlex.join([*prefix, _program()])} "$@"\n')
+        command = shlex.join([*prefix, *POLITE, _program()])
+        script.write_text(f'#!/bin/sh\nexec {command} "$@"\n')
         script.chmod(0o700)
         started = launch(playwright.chromium, str(script))
         _started.append(started)
