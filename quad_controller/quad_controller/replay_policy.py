@@ -119,8 +119,13 @@ def _model_of(recorded: PolicyRun, recording: Path) -> str:
     """Return the policy that a recording was begun with.
 
     Raises:
-        PolicyError: There was none.
+        PolicyError: There was none, or nobody knows.
     """
+    if not recorded.known:
+        raise PolicyError(
+            f'recording {recording} does not say yet which policy ran: it goes on, or its recorder '
+            'was killed; name the model'
+        )
     if not recorded.policy:
         raise PolicyError(f'recording {recording} was begun without a policy; name the model')
     return recorded.policy

@@ -38,7 +38,7 @@ from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT
 from quad_msgs.msg import ControllerStep
 from quad_sim import Terrain
 from quad_sim.physics import PhysicsBackend, Robot
-from rosbag_files import BagReader
+from rosbag_files import BagReader, METADATA_FILE
 
 FORWARD = Velocity(0.15)
 TIMING = StepTiming(1_700_000_000_123_456_789, 0.0201, 0.0007, None)
@@ -169,6 +169,13 @@ def test_a_recorded_walk_is_answered_the_same(
     answers = list(feed(shipped(), wrong))
     off = np.abs(answers[-1].action - answers[-1].step.values['action']).max()
     assert off == pytest.approx(0.01, abs=1e-3)
+    (file,) = folder.glob('*.mcap')
+    assert replay_policy.run([str(file)]) == 0  # the file of a folder that says which policy ran
+    (folder / METADATA_FILE).unlink()
+    for recording in (folder, file):
+        capsys.readouterr()
+        assert replay_policy.run([str(recording)]) == 1
+        assert 'it goes on, or its recorder was killed' in capsys.readouterr().out
 
 
 @pytest.mark.slow

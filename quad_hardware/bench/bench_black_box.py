@@ -9,14 +9,11 @@ All figures are printed, none is judged. CPU time, so that others on this comput
 from __future__ import annotations
 
 from collections.abc import Callable
-import gc
-from pathlib import Path
 import sys
-from tempfile import TemporaryDirectory
 import time
 import tracemalloc
 
-from black_box import BlackBox, BlackBoxSettings
+from black_box_cost import show_cycle_beside
 from quad_description import ImuSample, RobotState
 from quad_hardware.link import LinkState
 from quad_hardware.protocol import Feedback, V2
@@ -28,7 +25,6 @@ WINDOW = 60.0  # [s]
 REPORT_RATE, COMMAND_RATE = 50, 50  # [1/s]
 READS_PER_REPORT = 3  # in which a report of 260 bytes comes from an FTDI adapter
 COMMAND_SIZE = 70  # [B] of a frame for twelve servos
-PERIOD = 0.01  # [s] of the loop
 CALLS = 200_000
 
 
@@ -77,24 +73,6 @@ def filled(window: float) -> SerialMemory:
     return memory
 
 
-def lateness(until: Callable[[], bool]) -> list[float]:
-    """Run a loop until something holds; return how late each turn was in [ms], in order."""
-    late: list[float] = []
-    deadline = time.monotonic() + PERIOD
-    while not until():
-        time.sleep(max(0.0, deadline - time.monotonic()))
-        late.append((time.monotonic() - deadline) * 1e3)
-        deadline += PERIOD * (1 + late[-1] // (PERIOD * 1e3))
-    return sorted(late)
-
-
-def show_lateness(title: str, late: list[float]) -> None:
-    """Print percentiles."""
-    last = len(late) - 1
-    middle, high = late[last // 2], late[last * 99 // 100]
-    print(f'{title:33} late by {middle:.2f} / {high:.2f} ms (p50 / p99), {len(late)} turns')
-
-
 def show_cost() -> None:
     """Print the CPU time of what is done in the thread of the driver."""
     port = ReadyPort()
@@ -122,19 +100,7 @@ def main() -> None:
     tracemalloc.stop()
     of_line = memory.size / 1e6
     print(f'memory                {taken / 1e6:6.1f} MB for {of_line:.1f} MB of the line')
-    gc.freeze()
-    end = time.monotonic() + 3.0
-    show_lateness('loop, nothing is written', lateness(lambda: time.monotonic() > end))
-    with TemporaryDirectory() as folder:
-        box = BlackBox('bench', memory, BlackBoxSettings(Path(folder), WINDOW, after=0.0))
-        box.start()
-        box.fault('', 'a fault of the benchmark')
-        begin = time.monotonic()
-        show_lateness('loop, the black box is written', lateness(lambda: box.last is not None))
-        took = time.monotonic() - begin
-        size = sum(path.stat().st_size for path in Path(folder).rglob('*.log'))
-        print(f'written in            {took:6.1f} s, {size / 1e6:.1f} MB')
-        box.close()
+    show_cycle_beside(memory, WINDOW)
 
 
 if __name__ == '__main__':

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import shutil
 
-from rosbag_files import BagError, BagReader
+from rosbag_files import BagError, BagReader, METADATA_FILE
 
 from ..exceptions import ParameterError, PolicyError
 from ..policy.options import PolicyOptions
@@ -26,11 +26,13 @@ class PolicyRun:
         policy: As it was named; empty for the gait.
         options: How it was run.
         period: Of the control loop in [s].
+        known: A recording says so; one that goes on, or whose recorder was killed, does not yet.
     """
 
     policy: str
     options: PolicyOptions
     period: float
+    known: bool = True
 
     @property
     def about(self) -> Mapping[str, str]:
@@ -64,11 +66,13 @@ class PolicyRun:
         Raises:
             PolicyError: It cannot be read.
         """
+        folder = recording if recording.is_dir() else recording.parent
+        known = (folder / METADATA_FILE).is_file()
         try:
-            about = BagReader(recording).metadata.custom or {}
+            about = BagReader(folder if known else recording).metadata.custom or {}
         except BagError as error:
             raise PolicyError(f'recording {recording}: {error}') from error
-        contract = (recording if recording.is_dir() else recording.parent) / CONTRACT_FILE
+        contract = folder / CONTRACT_FILE
         kept = contract if contract.is_file() else None
         try:
             options = (
@@ -79,4 +83,4 @@ class PolicyRun:
             period = float(about.get('period', StateParameters().period))
         except (ParameterError, ValueError) as error:
             raise PolicyError(f'recording {recording}: {error}') from error
-        return cls(about.get('policy', ''), options, period)
+        return cls(about.get('policy', ''), options, period, known)
