@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import gc
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,8 +16,8 @@ PERIOD = 0.01  # [s] of the cycle
 QUIET = 3.0  # [s] that it is looked at before
 
 
-def show_cycle_beside(contents: Contents, window: float) -> None:
-    """Print how late a cycle is without and beside the writing of a black box.
+def cycle_beside(contents: Contents, window: float) -> Iterator[str]:
+    """Yield in words how late a cycle is without and beside the writing of a black box.
 
     Args:
         contents: Full of what happened.
@@ -25,16 +25,16 @@ def show_cycle_beside(contents: Contents, window: float) -> None:
     """
     gc.freeze()
     end = time.monotonic() + QUIET
-    _show('cycle, nothing is written', _lateness(lambda: time.monotonic() > end))
+    yield _in_words('cycle, nothing is written', _lateness(lambda: time.monotonic() > end))
     with TemporaryDirectory() as folder:
         box = BlackBox('bench', contents, BlackBoxSettings(Path(folder), window, after=0.0))
         box.start()
         box.fault('', 'a fault of the benchmark')
         begin = time.monotonic()
-        _show('cycle, the black box is written', _lateness(lambda: box.last is not None))
+        yield _in_words('cycle, it is written', _lateness(lambda: box.last is not None))
         took = time.monotonic() - begin
         size = sum(path.stat().st_size for path in Path(folder).rglob('*.log'))
-        print(f'written in {took:.1f} s, {size / 1e6:.1f} MB')
+        yield f'written in {took:.1f} s, {size / 1e6:.1f} MB'
         box.close()
 
 
@@ -49,7 +49,7 @@ def _lateness(until: Callable[[], bool]) -> list[float]:
     return sorted(late)
 
 
-def _show(title: str, late: list[float]) -> None:
+def _in_words(title: str, late: list[float]) -> str:
     last = len(late) - 1
     middle, high = late[last // 2], late[last * 99 // 100]
-    print(f'{title:33} late by {middle:.2f} / {high:.2f} ms (p50 / p99), {len(late)} cycles')
+    return f'{title:25} late by {middle:.2f} / {high:.2f} ms (p50 / p99), {len(late)} cycles'

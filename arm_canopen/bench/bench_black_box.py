@@ -13,12 +13,13 @@ from pathlib import Path
 import sys
 import time
 
+from black_box_cost import cycle_beside
+
 from arm_canopen import load_bus
 from arm_canopen.can import Frame
 from arm_canopen.can.frame_ring import RECORD_SIZE
 from arm_canopen.can.load import BusLoad
 from arm_canopen.library.bus_recording import BusRecording
-from black_box_cost import show_cycle_beside
 
 BUS = Path(__file__).parents[2] / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 WINDOW = 60.0  # [s]
@@ -52,7 +53,8 @@ def main() -> None:
     for number in range(int(WINDOW * FRAME_RATE)):
         frame = Frame(0x181, bytes(8))
         recording.ring.record(frame, now - WINDOW + number / FRAME_RATE)
-    show_cycle_beside(recording, WINDOW)
+    for line in cycle_beside(recording, WINDOW):
+        print(line)
 
 
 if __name__ == '__main__':

@@ -214,7 +214,7 @@ class Device:
         self._tpdos.poll(now)
 
     def stood_still(self, now: float) -> None:
-        """Take nobody for silent of whom nothing could be heard: the computer stood still."""
+        """Take nobody for silent while nothing was received: the computer stood still."""
         self._error_control.restart(now)
         self._rpdos.restart(now)
 

@@ -64,7 +64,7 @@ def test_a_device_that_stood_still_does_not_live_through_what_it_missed(
 
 
 def test_a_device_that_stood_still_takes_nobody_for_silent() -> None:
-    """It could not hear the master meanwhile; one that goes on to be silent is noticed."""
+    """It received nothing meanwhile; a master that goes on to be silent is noticed."""
     name = free_virtual()
     with open_bus(name) as bus, open_bus(name) as master:
         devices = DeviceRunner(bus)

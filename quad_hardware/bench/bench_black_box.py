@@ -13,7 +13,8 @@ import sys
 import time
 import tracemalloc
 
-from black_box_cost import show_cycle_beside
+from black_box_cost import cycle_beside
+
 from quad_description import ImuSample, RobotState
 from quad_hardware.link import LinkState
 from quad_hardware.protocol import Feedback, V2
@@ -100,7 +101,8 @@ def main() -> None:
     tracemalloc.stop()
     of_line = memory.size / 1e6
     print(f'memory                {taken / 1e6:6.1f} MB for {of_line:.1f} MB of the line')
-    show_cycle_beside(memory, WINDOW)
+    for line in cycle_beside(memory, WINDOW):
+        print(line)
 
 
 if __name__ == '__main__':

@@ -27,10 +27,10 @@ BOOTSTRAP_LINE = (
 )
 
 DDS_LIBRARIES = 'libfastrtps.so*'
-# DomainParticipant::set_listener(listener), and the one with a mask beside it: they wait for the
-# callbacks that run, for seconds::max(). The wheels are built for a C library that has no wait on
-# the steady clock; the compiler's stand-in for it turns that into a time before 1970, the wait fails
-# at once, again and again, and never gives up the lock that the callback waits for: a process that
+# DomainParticipant::set_listener(listener), and the one with a mask beside it, wait seconds::max()
+# for the callbacks that run. The wheels are built for a C library without a wait on the steady
+# clock; what the compiler has in its place turns that into a time before 1970. The wait fails at
+# once, again and again, and never gives up the lock that the callback waits for: a process that
 # leaves the graph while it discovers another one hangs for good.
 _FOREVER = (2**63 - 1).to_bytes(8, 'little')
 _LONG_ENOUGH = (3600).to_bytes(8, 'little')  # [s]
