@@ -27,7 +27,6 @@ class ServiceClient(GraphClient):
         """
         super().__init__(name, given_up, namespace)
         self._clients: dict[str, Any] = {}
-        self._known: set[str] = set()
 
     def prepare(self, services: Iterable[str]) -> None:
         """Look for services that will be called, so that they are known when they are needed.
@@ -61,7 +60,8 @@ class ServiceClient(GraphClient):
             timeout,
             f'the services {", ".join(services)}',
         )
-        self._be_known(services, max(0.0, end - time.monotonic()))
+        there = {name for name, client in self._clients.items() if client.service_is_ready()}
+        self.wait_until_known(there, max(0.0, end - time.monotonic()))
         futures = {name: client.call_async(Trigger.Request()) for name, client in clients.items()}
         self.wait_until(
             lambda: all(future.done() for future in futures.values()),
@@ -73,11 +73,3 @@ class ServiceClient(GraphClient):
         if refused:
             raise CallError('; '.join(refused))
         return {name: each.message for name, each in answers.items()}
-
-    def _be_known(self, services: list[str], timeout: float) -> None:
-        """Wait until the nodes of services know this client, and all that is prepared."""
-        if self._known.issuperset(services):
-            return
-        there = {name for name, client in self._clients.items() if client.service_is_ready()}
-        self.wait_until_known(there - self._known, timeout)
-        self._known |= there

@@ -93,6 +93,7 @@ class Bench:
         self.clients = {each.action(name): Controller() for name, each in known.items()}
         self.controller = next(iter(self.clients.values()))
         self.ends: list[tuple[PlanningCode, str]] = []
+        self.place = 0.0
         self.watch: Callable[[], None] = lambda: None
         monkeypatch.setattr(execution, 'ActionClient', lambda *parts: self.clients[parts[2]])
         self.execution = TrajectoryExecution(
@@ -106,9 +107,13 @@ class Bench:
         """Stand in for the node."""
         self.watch = callback
 
+    def resolve_topic_name(self, name: str) -> str:
+        """Stand in for the node."""
+        return f'/{name}'
+
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are."""
-        return dict.fromkeys(joints, 0.0)
+        return dict.fromkeys(joints, self.place)
 
     def start(self, trajectory: Any = None) -> execution.Execution:
         """Start a trajectory."""
@@ -344,3 +349,59 @@ def test_old_joint_states_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
         assert 'start state' not in str(caught.value)
     with pytest.raises(PlanningError, match=f"no joint 'foo'; joints: {joint}"):
         monitor.received(['foo'])
+
+
+def test_a_controller_that_is_not_found_yet_is_waited_for(bench: Bench) -> None:
+    """Whoever has just started knows nobody; its time counts from when it was asked."""
+    bench.controller.is_ready = False
+    running = bench.start()
+    first = running.begin
+    bench.watch()
+    assert (bench.controller.goal, bench.ends) == (None, [])
+    bench.controller.is_ready = True
+    bench.watch()
+    assert bench.controller.goal is not None
+    assert running.begin > first
+    bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
+    assert bench.ends == [(PlanningCode.SUCCESS, '')]
+
+
+def test_a_controller_that_does_not_come_is_named(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is sent any more when it comes later."""
+    monkeypatch.setattr(execution, 'FINDING_TIMEOUT', 0.0)
+    bench.controller.is_ready = False
+    bench.start()
+    bench.watch()
+    reason = 'no action /arm/follow_joint_trajectory; start the controller arm'
+    assert bench.ends == [(PlanningCode.CONTROL_FAILED, reason)]
+    bench.controller.is_ready = True
+    bench.watch()
+    assert bench.controller.goal is None
+
+
+def test_what_waits_for_its_controller_can_be_stopped(bench: Bench) -> None:
+    """It ends at once, and its joints are free."""
+    bench.controller.is_ready = False
+    bench.execution.stop(bench.start())
+    assert bench.ends == [(PlanningCode.PREEMPTED, 'stopped on request')]
+    bench.controller.is_ready = True
+    bench.watch()
+    assert bench.controller.goal is None
+    bench.start()
+    assert bench.controller.goal is not None
+
+
+def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(
+    bench: Bench,
+) -> None:
+    """The trajectory does not begin where it is any more."""
+    bench.controller.is_ready = False
+    bench.start()
+    bench.place, bench.controller.is_ready = 0.2, True
+    bench.watch()
+    ((code, reason),) = bench.ends
+    assert code is PlanningCode.CONTROL_FAILED
+    assert 'it is at 0.2000, the trajectory begins at 0.0000; plan anew' in reason
+    assert bench.controller.goal is None

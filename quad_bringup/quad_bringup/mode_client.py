@@ -71,6 +71,7 @@ class ModeClient(GraphClient):
     def _request(self, mode: str, timeout: float) -> SetMode.Response:
         end = time.monotonic() + timeout
         self.wait_until(self._modes.service_is_ready, timeout, 'the service /set_mode')
+        self.wait_until_known(['set_mode'], max(0.0, end - time.monotonic()))
         future = self._modes.call_async(SetMode.Request(mode=mode))
         left = max(0.0, end - time.monotonic())
         self.wait_until(future.done, left, f'an answer of /set_mode to {mode!r}')

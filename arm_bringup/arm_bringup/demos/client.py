@@ -62,7 +62,7 @@ class ActionRun:
             client: Who sends it.
             action: The action.
             goal: The goal.
-            name: Name of the action, for messages.
+            name: Name of the action.
 
         Raises:
             CallError: It was not accepted, or nobody answers.
@@ -71,6 +71,7 @@ class ActionRun:
         self.feedback: list[Any] = []
         self._client, self._name = client, name
         client.wait_until(action.server_is_ready, ANSWER_TIMEOUT, name)
+        client.wait_until_known([f'{name}/_action/send_goal'], ANSWER_TIMEOUT)
         sent = action.send_goal_async(goal, lambda each: self.feedback.append(each.feedback))
         client.wait_until(sent.done, ANSWER_TIMEOUT, f'the answer of {name}')
         if not sent.result().accepted:

@@ -32,6 +32,9 @@ WATCH_PERIOD = 0.05
 STOP_TIMEOUT = 5.0
 """Time in which controllers must have stopped in [s]; then they are asked again."""
 
+FINDING_TIMEOUT = 5.0
+"""Time in [s] in which actions of controllers must be found: who has just started knows none."""
+
 FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
 """Answers to a cancel of controllers that do not follow the goal any more."""
 
@@ -66,10 +69,11 @@ class Execution:
     Attributes:
         trajectory: The trajectory_msgs/JointTrajectory.
         done: Called once, with how it ended.
-        begin: Steady time of its start in [s].
+        begin: Steady time in [s] at which its controllers were asked.
         is_over: Whether ``done`` was called; a controller may still be on its way then.
         is_complete: Whether all controllers that have ended reached the end of the trajectory.
         in_doubt: Whether it is still to be found out why a controller gave up.
+        held: Goals of its controllers that wait until the actions of all are found, by controller.
         way: The trajectory with the way to its first point.
     """
 
@@ -83,6 +87,7 @@ class Execution:
     is_over: bool = False
     is_complete: bool = True
     in_doubt: bool = False
+    held: dict[str, Any] = field(default_factory=dict)
     way: Any = None
 
     @property
@@ -168,16 +173,16 @@ class TrajectoryExecution:
         done: Done,
         names: Sequence[str] = (),
     ) -> Execution:
-        """Have a trajectory followed.
+        """Have a trajectory followed, once the actions of its controllers are found.
 
         Args:
             trajectory: A trajectory_msgs/JointTrajectory.
-            done: Called once, when it has ended.
+            done: Called once, when it has ended, or its controllers are not there.
             names: Controllers that may follow it; empty for all.
 
         Raises:
             PlanningError: It is no trajectory, does not begin where the robot is, no controller
-                follows it, or one of its joints is on its way already.
+                moves a joint, or one of its joints is on its way already.
         """
         if not self._limits.is_allowed:
             raise PlanningError(
@@ -197,27 +202,56 @@ class TrajectoryExecution:
                     if other.is_over
                     else f'{min(shared)} is moved by another execution; stop it first, or wait',
                 )
-        places = self._check_start(trajectory)
-        execution.way = from_start(trajectory, [places[each] for each in trajectory.joint_names])
+        self._check_start(execution)
         parts = self._parts(trajectory, names)
-        lasts = seconds(trajectory.points[-1].time_from_start)
+        execution.held = {name: self._controllers[name].goal(each) for name, each in parts.items()}
+        execution.waits_for = set(parts)
+        execution.deadline = execution.begin + FINDING_TIMEOUT
+        self._running.append(execution)
+        if not self._missing(execution):
+            self._send(execution)
+        return execution
+
+    def _missing(self, execution: Execution) -> str:
+        """Return the first of its controllers whose action is not found; empty for none."""
+        absent = (name for name in execution.held if not self._clients[name].server_is_ready())
+        return next(absent, '')
+
+    def _send(self, execution: Execution) -> None:
+        goals, execution.held = execution.held, {}
+        lasts = seconds(execution.trajectory.points[-1].time_from_start)
         limits = self._limits
+        execution.begin = time.monotonic()
         execution.deadline = (
             execution.begin + limits.duration_scaling * lasts + limits.duration_margin
             if limits.is_monitored
             else math.inf
         )
-        self._running.append(execution)
-        execution.waits_for = set(parts)
-        for name, part in parts.items():
-            goal = self._controllers[name].goal(part)
+        for name, goal in goals.items():
             sent = self._clients[name].send_goal_async(goal)
             sent.add_done_callback(
                 lambda answer, name=name: self._accepted(execution, name, answer)
             )
         if self._begun is not None:
             self._begun()
-        return execution
+
+    def _look_again(self, execution: Execution) -> None:
+        """Send what was held when its controllers are found by now, or refuse it at last."""
+        missing = self._missing(execution)
+        if missing and time.monotonic() <= execution.deadline:
+            return
+        try:
+            if missing:
+                action = self._node.resolve_topic_name(self._controllers[missing].action(missing))
+                raise PlanningError(
+                    PlanningCode.CONTROL_FAILED,
+                    f'no action {action}; start the controller {missing}',
+                )
+            self._check_start(execution)  # it may have moved meanwhile
+        except PlanningError as error:
+            self.stop(execution, error.code, str(error))
+        else:
+            self._send(execution)
 
     def stop(
         self,
@@ -240,6 +274,11 @@ class TrajectoryExecution:
                 self._conclude(execution)
             return
         execution.ending = code, reason
+        if execution.held:  # nobody was asked
+            execution.held.clear()
+            execution.waits_for.clear()
+            self._conclude(execution)
+            return
         execution.deadline = time.monotonic() + STOP_TIMEOUT
         for handle in execution.handles.values():
             handle.cancel_goal_async()
@@ -254,9 +293,9 @@ class TrajectoryExecution:
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
 
-    def _check_start(self, trajectory: Any) -> Mapping[str, float]:  # noqa: ANN401
-        """Return where its joints are in [rad]; refuse to begin far from there."""
-        tolerance = self._limits.start_tolerance
+    def _check_start(self, execution: Execution) -> None:
+        """Refuse to begin far from where its joints are; take the way from there."""
+        trajectory, tolerance = execution.trajectory, self._limits.start_tolerance
         places = self._received(trajectory.joint_names)
         start = trajectory.points[0].positions
         for name, wanted in zip(trajectory.joint_names, start, strict=True):
@@ -267,7 +306,7 @@ class TrajectoryExecution:
                     f' {tolerance:g} at joint {name!r}: it is at {places[name]:.4f}, the'
                     f' trajectory begins at {wanted:.4f}; plan anew',
                 )
-        return places
+        execution.way = from_start(trajectory, [places[each] for each in trajectory.joint_names])
 
     def _parts(self, trajectory: Any, names: Sequence[str]) -> dict[str, JointTrajectory]:  # noqa: ANN401
         """Return what each controller is to follow."""
@@ -283,11 +322,6 @@ class TrajectoryExecution:
             joints = [joint for joint in left if joint in controller.joints]
             if not joints:
                 continue
-            if not self._clients[name].server_is_ready():
-                action = self._node.resolve_topic_name(controller.action(name))
-                raise PlanningError(
-                    PlanningCode.CONTROL_FAILED, f'no action {action}; start the controller {name}'
-                )
             left = [joint for joint in left if joint not in joints]
             parts[name] = part_of(trajectory, joints)
         if left:
@@ -346,6 +380,9 @@ class TrajectoryExecution:
     def _watch(self) -> None:
         now = time.monotonic()
         for execution in list(self._running):
+            if execution.held:
+                self._look_again(execution)
+                continue
             if now <= execution.deadline:
                 continue
             if execution.ending is None:

@@ -38,6 +38,7 @@ class GraphClient:
             namespace: Its namespace; relative names are meant in it.
         """
         self._given_up = given_up
+        self._known = set[str]()  # services of which the nodes know this one's clients
         self._context = Context()
         init_ros(context=self._context)
         self.node = Node(
@@ -93,5 +94,7 @@ class GraphClient:
             CallError: They did not in time.
             GivenUpError: It is no longer wanted.
         """
-        match = ServerMatch(self.node, services)
-        self.wait_until(match.advance, timeout, f'the nodes of {", ".join(sorted(services))}')
+        if unknown := set(services) - self._known:
+            match = ServerMatch(self.node, unknown)
+            self.wait_until(match.advance, timeout, f'the nodes of {", ".join(sorted(unknown))}')
+            self._known |= unknown

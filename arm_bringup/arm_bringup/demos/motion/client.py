@@ -63,9 +63,8 @@ class MotionClient(ArmClient):
         self._speed = node.create_publisher(
             SpeedScalingFactor, f'{controller}/speed_scaling_input', LATCHED
         )
-        self._action = ActionClient(
-            node, FollowJointTrajectory, f'{controller}/follow_joint_trajectory'
-        )
+        self._action_name = f'{controller}/follow_joint_trajectory'
+        self._action = ActionClient(node, FollowJointTrajectory, self._action_name)
         node.create_subscription(
             JointTrajectoryControllerState, f'{controller}/controller_state', self._state, 50
         )
@@ -130,7 +129,7 @@ class MotionClient(ArmClient):
         goal = FollowJointTrajectory.Goal(
             trajectory=JointTrajectory(joint_names=names, points=[point])
         )
-        return ActionRun(self, self._action, goal, 'the trajectory controller')
+        return ActionRun(self, self._action, goal, self._action_name)
 
     def _state(self, message: JointTrajectoryControllerState) -> None:
         position, velocity, acceleration = (
