@@ -64,7 +64,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let robots and what they start come before tests that compute, where this user may do so."""
+    """Let robots and what they start come before tests that compute.
+
+    Where this user may say so, and the kernel does not share the processor among sessions first.
+    """
     first = OF_ROBOTS if item.get_closest_marker('scenario') else 0
     with suppress(PermissionError):
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS + first)

@@ -49,6 +49,7 @@ class Isolation:
         own = {
             'ROS_DOMAIN_ID': str(self.domain_id),
             'PYTHONUNBUFFERED': '1',
+            'PYTHONFAULTHANDLER': '1',  # by SIGABRT it says what its threads are doing
             'NO_VIEW': '1',
             'ROS_LOG_DIR': _logs.name,
         }

@@ -20,9 +20,14 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 from ament_index_python.packages import get_package_prefix
+import psutil
 
 from process_supervisor.readiness import ReadinessSocket, VARIABLE
 
+ENDING_TIMEOUT = 25.0
+"""Time in [s] for its end; a master may take 18 s to bring its drives to rest."""
+ABORTING_TIMEOUT = 2.0
+"""Time in [s] in which one that hangs can say where."""
 LAST_LINES = 60
 """How much of what a process said a failure is reported with."""
 
@@ -169,15 +174,23 @@ class RunningProcess:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Leave nothing of its session behind."""
+        """Leave nothing of its session behind; one that hangs says where, and is a failure."""
+        hangs = False
         if self.is_running():
-            with suppress(subprocess.TimeoutExpired):
-                self.stop()
+            try:
+                self.stop(ENDING_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                hangs = psutil.Process(self.pid).status() != psutil.STATUS_STOPPED
+                self.signal(signal.SIGABRT)
+                with suppress(subprocess.TimeoutExpired):
+                    self.wait(ABORTING_TIMEOUT)
         with suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()
         self._reader.join()
         self._readiness.close()
+        if hangs and exc is None:
+            raise AssertionError(f'{self.command} did not end in:\n{self.output}')
 
     def _read(self) -> None:
         for line in self._process.stdout or ():

@@ -11,7 +11,7 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
-from process_supervisor import CallError, GivenUpError
+from process_supervisor import CallError, GivenUpError, join_in_time
 
 if TYPE_CHECKING:
     from .service_client import ServiceClient
@@ -46,14 +46,18 @@ def enabling(
     """
     ended = threading.Event()
     thread = threading.Thread(
-        target=_enable, args=[drives, mode_service, say, ended, namespace], name='enabling'
+        target=_enable,
+        args=[drives, mode_service, say, ended, namespace],
+        name='enabling',
+        daemon=True,
     )
     thread.start()
     try:
         yield
     finally:
         ended.set()
-        thread.join()
+        if late := join_in_time(thread):
+            say(f'error: {late}')
 
 
 def _enable(

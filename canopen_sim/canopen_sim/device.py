@@ -213,10 +213,10 @@ class Device:
                 part.advance(now)
         self._tpdos.poll(now)
 
-    def stood_still(self, now: float) -> None:
-        """Take nobody for silent while nothing was received: the computer stood still."""
-        self._error_control.restart(now)
-        self._rpdos.restart(now)
+    def postpone_watches(self, stalled: float) -> None:
+        """Leave out a time in [s] in which this computer stood still: others were not silent."""
+        self._error_control.postpone(stalled)
+        self._rpdos.postpone(stalled)
 
     def switch_off(self, now: float) -> None:
         """Cut the power: the device falls silent, and the motor runs out."""

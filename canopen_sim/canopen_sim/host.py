@@ -123,10 +123,10 @@ class DeviceHost:
                     self._defect(device, error, now)
         self._finish(now)
 
-    def stood_still(self, now: float) -> None:
-        """Have no device take others for silent while this computer stood still."""
+    def postpone_watches(self, stalled: float) -> None:
+        """Have all devices leave out a time in [s] in which this computer stood still."""
         for device in self.devices:
-            device.stood_still(now)
+            device.postpone_watches(stalled)
 
     def device(self, node_id: int) -> Device:
         """Return the device with a node id, also if LSS has given it another one since.

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 import logging
-import math
 import time
 from typing import TypeVar
 
@@ -23,7 +22,7 @@ from .host import DeviceHost
 Result = TypeVar('Result')
 
 IDLE_WAIT = 1.0  # [s] longest wait when no device has a deadline
-STALL = 0.1  # [s] that a frame or deadline has waited when devices count as having stood still
+STALL = 0.1  # [s] without a processor from which on devices count as having stood still
 
 logger = logging.getLogger(__name__)
 
@@ -78,38 +77,42 @@ class DeviceRunner:
         return self._thread.call(function)
 
     def _serve(self) -> None:
-        host = self.host
+        host, woken = self.host, time.monotonic()
         while not self._thread.stopping:
-            now = time.monotonic()
-            if now - host.deadline > STALL:
-                host.stood_still(now)
-            host.advance(now)
+            host.advance(time.monotonic())
             self._thread.do_work()
-            wait = min(host.deadline - time.monotonic(), IDLE_WAIT)
-            for frame in self._receive(max(0.0, wait)):
-                host.receive(frame, frame.timestamp or time.monotonic())
-
-    def _receive(self, timeout: float) -> list[Frame]:
-        frames = self._thread.receive(timeout)
-        stall = time.monotonic() - (frames[0].timestamp or math.inf) if frames else 0.0
-        if stall <= STALL:
-            return frames
-        kept = newest_process_data(frames)
-        syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
-        logger.warning(
-            'the simulated devices got no processor for %.2f s: %d SYNC and %d other frames of '
-            'process data are passed over, as by the mailboxes of a CAN controller',
-            stall,
-            max(0, syncs - 1),
-            len(frames) - len(kept) - max(0, syncs - 1),
-        )
-        return kept
+            rest = time.monotonic()
+            due = min(host.deadline, rest + IDLE_WAIT)
+            frames = self._thread.receive(max(0.0, due - rest))
+            now = time.monotonic()
+            first = frames[0].timestamp or now if frames else due
+            stalled = (rest - woken) + (now - max(rest, min(due, first)))
+            woken = now
+            if stalled > STALL:
+                host.postpone_watches(stalled)
+                frames = _pass_over(frames, stalled)
+            for frame in frames:
+                host.receive(frame, frame.timestamp or now)
 
     def _send(self, frame: Frame) -> None:
         try:
             self._bus.send(frame)
         except BusError as error:
             self._thread.note_failure(error)
+
+
+def _pass_over(frames: list[Frame], stalled: float) -> list[Frame]:
+    """Return what devices see of the frames that came while they got no processor for a time."""
+    kept = newest_process_data(frames)
+    syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
+    logger.warning(
+        'the simulated devices got no processor for %.2f s: %d SYNC and %d other frames of '
+        'process data are passed over, as by the mailboxes of a CAN controller',
+        stalled,
+        max(0, syncs - 1),
+        len(frames) - len(kept) - max(0, syncs - 1),
+    )
+    return kept
 
 
 def newest_process_data(frames: Sequence[Frame]) -> list[Frame]:

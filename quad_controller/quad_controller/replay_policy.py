@@ -121,7 +121,7 @@ def _model_of(recorded: PolicyRun, recording: Path) -> str:
     Raises:
         PolicyError: There was none, or nobody knows.
     """
-    if not recorded.known:
+    if recorded.policy is None:
         raise PolicyError(
             f'recording {recording} does not say yet which policy ran: it goes on, or its '
             'recorder was killed; name the model'

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from workspace.errors import WorkspaceError
 from workspace.wheels import (
     BOOTSTRAP_FILE,
     BOOTSTRAP_LINE,
@@ -60,34 +61,58 @@ def test_libraries_are_those_beside_the_ros_packages(tmp_path: Path) -> None:
     assert library_folders(tmp_path, site) == [tmp_path / 'lib', site / 'ros_rclpy.libs']
 
 
-def test_waiting_for_callbacks_of_dds_has_an_end_that_a_clock_can_reach(tmp_path: Path) -> None:
+FOREVER, HOUR = b'\xff' * 7 + b'\x7f', (3600).to_bytes(8, 'little')
+
+
+def waiting_code(wait: bytes) -> bytes:
+    """Return code of Fast DDS: two functions that wait, among others."""
+    first, second = b'\x48\xba' + wait, b'\x48\xb9' + wait
+    jumps = [b'\xe9' + bytes((index, 10, 0, 0)) + b'\x90' for index in range(2)]
+    return b'\x48\xba' + FOREVER + b'\xc3' + first + jumps[0] + second + jumps[1] + FOREVER
+
+
+@pytest.fixture
+def dds_library(tmp_path: Path) -> Path:
+    """Return where the library is."""
+    return tmp_path / DDS_LIBRARIES.replace('*', '.2.14')
+
+
+def test_waiting_for_callbacks_of_dds_has_an_end_that_a_clock_can_reach(
+    tmp_path: Path, dds_library: Path
+) -> None:
     """Both functions are changed and nothing else; twice is once; the cache keeps its file."""
-    forever, hour = b'\xff' * 7 + b'\x7f', (3600).to_bytes(8, 'little')
-
-    def code(wait: bytes) -> bytes:
-        first, second = b'\x48\xba' + wait, b'\x48\xb9' + wait
-        jumps = [b'\xe9' + bytes((index, 10, 0, 0)) + b'\x90' for index in range(2)]
-        return b'\x48\xba' + forever + b'\xc3' + first + jumps[0] + second + jumps[1] + forever
-
     cached = tmp_path / 'cached'
-    cached.write_bytes(code(forever))
-    library = tmp_path / DDS_LIBRARIES.replace('*', '.2.14')
-    library.hardlink_to(cached)
+    cached.write_bytes(waiting_code(FOREVER))
+    dds_library.hardlink_to(cached)
     assert [patch_dds(tmp_path) for _ in range(2)] == [1, 0]
-    assert library.read_bytes() == code(hour)
-    assert cached.read_bytes() == code(forever)
+    assert dds_library.read_bytes() == waiting_code(HOUR)
+    assert cached.read_bytes() == waiting_code(FOREVER)
+
+
+def test_a_dds_that_waits_rightly_is_left_alone(tmp_path: Path, dds_library: Path) -> None:
+    """It imports the wait on the steady clock."""
+    code = b'\0pthread_cond_clockwait\0' + waiting_code(FOREVER)
+    dds_library.write_bytes(code)
+    assert patch_dds(tmp_path) == 0
+    assert dds_library.read_bytes() == code
+
+
+@pytest.mark.parametrize('code', [b'', waiting_code(FOREVER) * 2], ids=['none', 'two'])
+def test_a_dds_that_the_patch_does_not_know_is_refused(
+    tmp_path: Path, dds_library: Path, code: bytes
+) -> None:
+    """Whoever changes the pins learns it before anything hangs."""
+    dds_library.write_bytes(code)
+    with pytest.raises(WorkspaceError, match='is not the Fast DDS that has to be patched'):
+        patch_dds(tmp_path)
 
 
 def test_the_libraries_of_this_environment_are_patched() -> None:
-    """Its wheels still have the functions that the patch knows, or have learnt to wait."""
-    libraries = [*(Path(sys.prefix) / 'lib').glob(DDS_LIBRARIES)]
-    if not libraries:
+    """Those that were loaded here."""
+    libraries = Path(sys.prefix) / 'lib'
+    if not [*libraries.glob(DDS_LIBRARIES)]:
         pytest.skip('ROS does not come from wheels here')
-    for library in libraries:
-        code = library.read_bytes()
-        hour = (3600).to_bytes(8, 'little')
-        patched = b'\x48\xba' + hour + b'\xe9' in code
-        assert patched or b'pthread_cond_clockwait' in code, library
+    assert patch_dds(libraries) == 0
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 import re
 
+from .errors import WorkspaceError
 from .process import Runner
 from .state import write_atomically
 
@@ -34,9 +35,11 @@ DDS_LIBRARIES = 'libfastrtps.so*'
 # leaves the graph while it discovers another one hangs for good.
 _FOREVER = (2**63 - 1).to_bytes(8, 'little')
 _LONG_ENOUGH = (3600).to_bytes(8, 'little')  # [s]
-_WAIT_FOREVER = re.compile(
-    rb'(\x48\xba)%b(\xe9.{4}\x90\x48\xb9)%b(?=\xe9.{4}\x90)' % (_FOREVER, _FOREVER), re.DOTALL
+_WAITS = re.compile(
+    rb'(\x48\xba)(%b|%b)(\xe9.{4}\x90\x48\xb9)\2(\xe9.{4}\x90)' % (_FOREVER, _LONG_ENOUGH),
+    re.DOTALL,
 )
+_STEADY_WAIT = b'\0pthread_cond_clockwait\0'  # what a library built for a newer one imports
 
 
 def patch_cmake_text(text: str, include: str, numpy_include: str) -> str:
@@ -88,11 +91,22 @@ def patch_dds(libraries: Path) -> int:
 
     Returns:
         How many files had to be changed.
+
+    Raises:
+        WorkspaceError: A library is another one than those that this patch was made for.
     """
     changed = 0
     for path in sorted(libraries.glob(DDS_LIBRARIES)):
         code = path.read_bytes()
-        patched = _WAIT_FOREVER.sub(rb'\1%b\2%b' % (_LONG_ENOUGH, _LONG_ENOUGH), code)
+        if _STEADY_WAIT in code:
+            continue
+        patched, count = _WAITS.subn(rb'\1%b\3%b\4' % (_LONG_ENOUGH, _LONG_ENOUGH), code)
+        if count != 1:
+            raise WorkspaceError(
+                f'{path} is not the Fast DDS that has to be patched',
+                'Take the wheels that tools/requirements pins. If those are new, look whether '
+                'set_listener of\nDomainParticipant still waits forever (workspace/wheels.py).',
+            )
         if patched != code:
             write_atomically(path, patched, mode=path.stat().st_mode)
             changed += 1

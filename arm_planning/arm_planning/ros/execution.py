@@ -237,16 +237,13 @@ class TrajectoryExecution:
 
     def _look_again(self, execution: Execution) -> None:
         """Send what was held when its controllers are found by now, or refuse it at last."""
-        missing = self._missing(execution)
-        if missing and time.monotonic() <= execution.deadline:
+        if missing := self._missing(execution):
+            if time.monotonic() > execution.deadline:
+                action = self._node.resolve_topic_name(self._controllers[missing].action(missing))
+                reason = f'no action {action}; start the controller {missing}'
+                self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
             return
         try:
-            if missing:
-                action = self._node.resolve_topic_name(self._controllers[missing].action(missing))
-                raise PlanningError(
-                    PlanningCode.CONTROL_FAILED,
-                    f'no action {action}; start the controller {missing}',
-                )
             self._check_start(execution)  # it may have moved meanwhile
         except PlanningError as error:
             self.stop(execution, error.code, str(error))

@@ -77,10 +77,10 @@ class ErrorControl:
         self.consumer.reset()
         self.guarding.reset()
 
-    def restart(self, now: float) -> None:
-        """Give those that are watched their whole time again."""
-        self.consumer.restart(now)
-        self.guarding.restart(now)
+    def postpone(self, stalled: float) -> None:
+        """Leave out a time in [s] in which nothing was received."""
+        self.consumer.postpone(stalled)
+        self.guarding.postpone(stalled)
 
     def _heartbeat_lost(self, node_id: int, now: float) -> None:
         self._lose(now, node_id)

@@ -141,10 +141,11 @@ class HeartbeatConsumer:
             self.missing.discard(node_id)
             self._returned(node_id, now)
 
-    def restart(self, now: float) -> None:
-        """Give those that are watched a whole period again."""
-        self._deadlines = {node_id: now + self._periods[node_id] for node_id in self._deadlines}
-        self.deadline = min(self._deadlines.values(), default=NEVER)
+    def postpone(self, stalled: float) -> None:
+        """Leave out a time in [s] in which nothing was received."""
+        for node_id in self._deadlines:
+            self._deadlines[node_id] += stalled
+        self.deadline += stalled
 
     def advance(self, now: float) -> None:
         """Report the heartbeats that stayed away."""

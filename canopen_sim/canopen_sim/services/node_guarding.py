@@ -54,7 +54,7 @@ class GuardedNode:
         self._guard_time = store.integer(Index.GUARD_TIME)  # [ms]
         self._factor = store.integer(Index.LIFE_TIME_FACTOR)
         self._heartbeat = store.integer(Index.PRODUCER_HEARTBEAT)  # [ms]
-        self._guard_time.listener = self._factor.listener = self.restart
+        self._guard_time.listener = self._factor.listener = self._reconfigure
         self._state = state
         self._send = send
         self._changed = changed
@@ -91,7 +91,10 @@ class GuardedNode:
             self.lost = True
             self._changed(True, now)
 
-    def restart(self, now: float) -> None:
-        """Give who guards it a whole life time again."""
+    def postpone(self, stalled: float) -> None:
+        """Leave out a time in [s] in which nothing was received."""
+        self.deadline += stalled
+
+    def _reconfigure(self, now: float) -> None:
         if self.deadline != NEVER:  # it is being guarded
             self.deadline = now + self.life_time if self.life_time else NEVER

@@ -107,11 +107,6 @@ class Rpdo(PdoChannel):
         for listener in self._listeners:
             listener(now)
 
-    def restart(self, now: float) -> None:
-        """Give it its whole time again."""
-        if self.deadline != NEVER:
-            self.deadline = now + self.event_time
-
     def advance(self, now: float) -> None:
         """Report that the PDO stayed away."""
         if now >= self.deadline:
@@ -233,10 +228,10 @@ class RpdoEngine:
         for rpdo in [rpdo for rpdo in self.active if rpdo.store_held()]:
             rpdo.notify_listeners(now)
 
-    def restart(self, now: float) -> None:
-        """Give those that are awaited their whole time again."""
+    def postpone(self, stalled: float) -> None:
+        """Leave out a time in [s] in which nothing was received."""
         for rpdo in self.active:
-            rpdo.restart(now)
+            rpdo.deadline += stalled
 
     def advance(self, now: float) -> None:
         """Report those that are overdue."""

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from process_supervisor import (
     explain,
+    join_in_time,
     LineWriter,
     Outcome,
     Painter,
@@ -71,11 +72,12 @@ def run_demo(
             processes, display.line, display.notice, on_interrupt=scenario.leave
         ) as runner:
             thread = threading.Thread(
-                target=scenario.run, args=[runner, make_client], name='scenario'
+                target=scenario.run, args=[runner, make_client], name='scenario', daemon=True
             )
             thread.start()
             outcome = runner.run()
-            thread.join()
+            if (late := join_in_time(thread)) and not outcome.exit_code:
+                outcome = Outcome(1, late)
     finally:
         display.close()
     with_summary = not (endless and isinstance(display, TableDisplay))

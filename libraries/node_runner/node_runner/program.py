@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import faulthandler
 import sys
 import threading
 
@@ -51,8 +50,7 @@ def run_program(
 
     Parameters that are refused, arguments that ROS does not understand and the errors named here
     are one line of the log. Everything else is a defect, and has its traceback. Records of
-    Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`. By SIGABRT, and when
-    it crashes, the process says what each of its threads is doing.
+    Python's ``logging`` appear in the log of ROS, see :class:`.RosLogBridge`.
 
     Args:
         name: Name for the log.
@@ -69,7 +67,6 @@ def run_program(
     if HELP_OPTIONS.intersection(sys.argv[1:] if args is None else args):
         sys.stdout.write(help_text or PLAIN_HELP.format(name=name))
         return 0
-    faulthandler.enable()
     stop = stop_on_signals(patient=patient)
     try:
         init_ros(args)

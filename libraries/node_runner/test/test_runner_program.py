@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-import re
 import select
 import signal
 import subprocess
@@ -102,19 +101,6 @@ def test_a_second_ctrl_c_ends_it_at_once(isolation: Isolation) -> None:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(0.1)
         assert process.returncode == -signal.SIGINT
-
-
-@pytest.mark.scenario
-def test_a_program_that_hangs_says_where(isolation: Isolation) -> None:
-    """A supervisor asks it by SIGABRT before it kills it."""
-    with running(isolation) as process:
-        assert said(process) == 'ready'
-        process.send_signal(signal.SIGTERM)
-        assert said(process) == 'stopping'
-        process.send_signal(signal.SIGABRT)
-        _, errors = process.communicate(timeout=TIMEOUT)
-        assert process.returncode == -signal.SIGABRT
-        assert re.search(rf'File "{re.escape(str(PROGRAM))}", line \d+ in body', errors), errors
 
 
 @pytest.mark.scenario

@@ -11,6 +11,7 @@ packages, :mod:`.exclusive` keeps a second bring-up away, :mod:`.terminal` and :
 what the processes write.
 """
 
+from .beside import join_in_time
 from .console import explain, Shutdown, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
@@ -67,6 +68,7 @@ __all__ = [
     'explain',
     'find_executable',
     'is_smart',
+    'join_in_time',
     'namespaced_parameters',
     'node_argv',
     'parameters_by_node',

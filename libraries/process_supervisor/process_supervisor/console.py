@@ -10,6 +10,7 @@ import sys
 import threading
 from typing import Protocol
 
+from .beside import join_in_time
 from .readiness import ServiceManager
 from .runner import Runner
 from .spec import ProcessSpec
@@ -78,7 +79,9 @@ def supervise(
     ) as runner:
         thread.runner = runner
         outcome = runner.run()
-        thread.join()
+        late = thread.join()
+    if late and not outcome.exit_code:
+        outcome = Outcome(1, late)
     if outcome.exit_code:
         notify(Notice(Severity.ERROR, explain(outcome)))
     return outcome
@@ -101,14 +104,19 @@ class _ShutdownThread:
         """Begin it at Ctrl-C; false when there is none, or not all are ready yet."""
         if self._shutdown is None or self.runner.phase is not Phase.RUNNING:
             return False
-        self._thread = threading.Thread(target=self._run, args=[self._shutdown], name='shutdown')
+        self._thread = threading.Thread(
+            target=self._run, args=[self._shutdown], name='shutdown', daemon=True
+        )
         self._thread.start()
         return True
 
-    def join(self) -> None:
-        """Wait until it has ended; ``given_up`` shows it when it is no longer wanted."""
-        if self._thread is not None:
-            self._thread.join()
+    def join(self) -> str:
+        """Wait until it has ended; ``given_up`` shows it when it is no longer wanted.
+
+        Returns:
+            Why it is given up; empty when it has ended.
+        """
+        return '' if self._thread is None else join_in_time(self._thread)
 
     def _run(self, shutdown: Shutdown) -> None:
         outcome = Outcome(0, 'stopped by the user')

@@ -31,6 +31,9 @@ CHUNK = 65536
 LAST_CHUNKS = 64
 """How often a pipe is read after its process has ended; what it left behind may go on."""
 
+TRACES = 'PYTHONFAULTHANDLER'
+"""Variable by which Python prints what its threads are doing when it crashes, or gets SIGABRT."""
+
 LEAVE_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end the supervisor."""
 
@@ -40,7 +43,7 @@ class _Child:
 
     def __init__(self, spec: ProcessSpec) -> None:
         self.readiness = ReadinessSocket() if spec.notifies_ready else None
-        environment = {**os.environ, **spec.environment}
+        environment = {**os.environ, TRACES: '1', **spec.environment}
         environment.pop(VARIABLE, None)  # this process may have a supervisor itself
         if self.readiness is not None:
             environment[VARIABLE] = self.readiness.address
@@ -173,13 +176,13 @@ class Runner:
         return self._supervision.outcome or Outcome(0, 'nothing was to be run')
 
     def stop(self, outcome: Outcome) -> None:
-        """Request an orderly end, from any thread.
+        """Request an orderly end, from any thread; after it, nothing happens.
 
         Args:
             outcome: Why, unless something else has already ended it.
         """
         self._requests.put(outcome)
-        with contextlib.suppress(BlockingIOError):  # full of wake-ups: it will wake up
+        with contextlib.suppress(OSError):  # full of wake-ups: it will wake up; or it has ended
             self._wake_write.send(b'\0')
 
     def _loop(self) -> None:

@@ -29,8 +29,8 @@ STOP_STEPS = (
 )
 """The usual ladder; 20 s because a master may take 18 s to bring its drives to rest.
 
-No SIGINT: by it, a Python process that is still importing ends with a traceback. By SIGABRT, a
-program of node_runner that hangs says where each of its threads does.
+No SIGINT: by it, a Python process that is still importing ends with a traceback. By SIGABRT, one
+that hangs prints what each of its threads is doing.
 """
 
 

@@ -27,7 +27,8 @@ class StopSequence:
     signals through the callable it was given.
 
     Attributes:
-        abandoned: Names of processes that did not even end by their last signal.
+        forced: Names of processes that did not end by their first signal.
+        abandoned: Names of those that did not even end by their last one.
     """
 
     def __init__(self, send: Callable[[str, Signals], None]) -> None:
@@ -38,6 +39,7 @@ class StopSequence:
         """
         self._send = send
         self._members: dict[str, _Member] = {}
+        self.forced: set[str] = set()
         self.abandoned: list[str] = []
 
     def add(self, name: str, order: int, steps: Iterable[tuple[Signals, float]]) -> None:
@@ -86,6 +88,8 @@ class StopSequence:
             self.abandoned.append(name)
             del self._members[name]
             return
+        if member.step:
+            self.forced.add(name)
         signal, timeout = member.steps[member.step]
         member.deadline = now + timeout
         self._send(name, signal)
@@ -106,4 +110,5 @@ class StopSequence:
             member.steps = ((Signals.SIGKILL, 2.0),)
             member.step = 0
             member.deadline = now + 2.0
+            self.forced.add(name)
             self._send(name, Signals.SIGKILL)

@@ -22,9 +22,6 @@ ECHO_TIME = 0.5
 """An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
 
-KILLED = (-Signals.SIGABRT, -Signals.SIGKILL)
-"""Return codes of a process that did not end when it was asked to."""
-
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
 """Return codes of a process that ended as it should when it was stopped."""
 
@@ -218,9 +215,11 @@ class Supervision:
         if self.phase is Phase.STOPPING:
             self._stopping.exited(name)
             self._say(f'{name} {how}', _severity(returncode))
-            killed = returncode in KILLED and child.spec.required
-            if killed and self.outcome and not self.outcome.exit_code:
-                self.outcome = Outcome(1, f'{name} had to be killed', name, tuple(child.lines))
+            crashed = returncode < 0 and returncode not in GOOD_ENDS and child.spec.required
+            if crashed and self.outcome and not self.outcome.exit_code:
+                forced = name in self._stopping.forced
+                reason = f'{name} {"had to be killed" if forced else how}'
+                self.outcome = Outcome(1, reason, name, tuple(child.lines))
             self._advance_stop(now)
         elif child.spec.required:
             early = '' if child.ready else ' before it was ready'

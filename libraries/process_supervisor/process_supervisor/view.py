@@ -20,7 +20,11 @@ WITHOUT_SHARED_MEMORY = {'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
 """A page that hangs may hold a lock in the memory that all nodes share: the others would wait."""
 POLITE = ('nice', '-n', '5')
 """Whatever moves the robot comes first, from the start of the program on."""
-STOP_STEPS = (StopStep(Signals.SIGTERM, 3.0), StopStep(Signals.SIGKILL, 2.0))
+STOP_STEPS = (
+    StopStep(Signals.SIGTERM, 3.0),
+    StopStep(Signals.SIGABRT, 1.0),
+    StopStep(Signals.SIGKILL, 1.0),
+)
 """It holds nothing that would have to be put down."""
 
 

@@ -204,6 +204,20 @@ def test_a_process_that_does_not_stop_is_killed_in_the_end() -> None:
     assert 'not even SIGKILL ended master' in bench.notices[-1].text
 
 
+@pytest.mark.parametrize(
+    ('seconds', 'reason'),
+    [(1.0, 'master was killed by SIGABRT'), (30.0, 'master had to be killed')],
+    ids=['crashed', 'hung'],
+)
+def test_a_crash_in_the_end_is_no_success(seconds: float, reason: str) -> None:
+    """Its reason is another one than that of a process that was asked twice."""
+    bench = Bench(MASTER)
+    bench.supervision.interrupt(0.0)
+    bench.supervision.advance(seconds)
+    bench.supervision.exited('master', -Signals.SIGABRT, seconds)
+    assert (bench.outcome.exit_code, bench.outcome.reason) == (1, reason)
+
+
 def test_the_first_reason_stays() -> None:
     """What ends while everything is being stopped does not hide why."""
     bench = Bench(MASTER, SLAVES)

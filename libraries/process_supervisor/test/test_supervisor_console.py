@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import re
 import signal
 import threading
 
 import pytest
 from small_processes import program, service_manager, TIMEOUT
 
-from process_supervisor import LineWriter, Outcome, Shutdown, supervise
+from process_supervisor import beside, LineWriter, Outcome, Shutdown, supervise
 
 Say = Callable[[str], None]
 GivenUp = Callable[[], bool]
@@ -127,6 +128,31 @@ def test_a_shutdown_that_fails_stops_everything_all_the_same(
     outcome, lines = run_until(capsys, 'good', shutdown=shutdown)
     assert outcome == Outcome(1, 'ZeroDivisionError: in the shutdown')
     assert any(line.endswith('| bye') for line in lines)
+
+
+def test_a_shutdown_that_hangs_keeps_nobody_from_the_end(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It says what all threads are doing; the processes were stopped before."""
+    monkeypatch.setattr(beside, 'ENDING_TIMEOUT', 0.1)
+    test_over = threading.Event()
+    threads: list[threading.Thread] = []
+
+    def shutdown(say: Say, given_up: GivenUp) -> None:
+        threads.append(threading.current_thread())
+        while not given_up():
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+            test_over.wait(0.1)
+        test_over.wait(TIMEOUT)
+
+    CtrlC(monkeypatch, 'all is ready')
+    outcome = supervise([program('good', notifies_ready=True)], shutdown=shutdown)
+    test_over.set()
+    threads[0].join(TIMEOUT)
+    assert outcome == Outcome(1, "the thread 'shutdown' did not end within 0.1 s")
+    captured = capfd.readouterr()
+    assert '| bye' in captured.out
+    assert re.search(r'line \d+ in shutdown', captured.err), captured.err
 
 
 def test_without_readiness_there_is_no_shutdown(

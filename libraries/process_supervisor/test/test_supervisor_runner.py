@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import contextlib
+from dataclasses import replace
 import os
 from pathlib import Path
 import select
@@ -18,7 +19,7 @@ import threading
 import pytest
 from small_processes import program, TIMEOUT, wait_for_end
 
-from process_supervisor import Notice, Outcome, ProcessSpec, Runner
+from process_supervisor import Notice, Outcome, ProcessSpec, Runner, StopStep
 from process_supervisor.runner import LEAVE_SIGNALS
 
 pytestmark = pytest.mark.slow
@@ -99,6 +100,17 @@ def test_a_deaf_process_is_killed_and_that_is_no_success() -> None:
     outcome = Watch(program('deaf', notifies_ready=True), when_ready=ctrl_c).run()
     assert outcome.exit_code == 1
     assert outcome.reason == 'deaf had to be killed'
+
+
+def test_a_python_program_that_hangs_says_what_it_does() -> None:
+    """Before it is killed, by SIGABRT."""
+    deaf = program('deaf', notifies_ready=True)
+    unisolated = tuple(word for word in deaf.argv if word != '-I')  # it reads no variables
+    steps = tuple(StopStep(number, TIMEOUT) for number in (signal.SIGABRT, signal.SIGKILL))
+    watch = Watch(replace(deaf, argv=unisolated, stop_steps=steps), when_ready=ctrl_c)
+    watch.run()
+    assert 'Fatal Python error: Aborted' in watch.said('deaf')
+    assert any('in <module>' in line for line in watch.said('deaf'))
 
 
 def test_not_ready_in_time_ends_all() -> None:

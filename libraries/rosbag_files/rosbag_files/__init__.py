@@ -6,7 +6,7 @@ Messages are bytes here (CDR), and times nanoseconds since 1970. ROS is not need
 """
 
 from .exceptions import BagError
-from .metadata import BagFile, BagMetadata, METADATA_FILE, Topic, TopicCount
+from .metadata import BagFile, BagMetadata, load_metadata, METADATA_FILE, Topic, TopicCount
 from .qos import OfferedQos, read_qos, UNLIMITED
 from .reader import BagMessage, BagReader
 from .recovery import repair
@@ -27,6 +27,7 @@ __all__ = [
     'Topic',
     'TopicCount',
     'WriterOptions',
+    'load_metadata',
     'read_qos',
     'repair',
 ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 import shutil
 
-from rosbag_files import BagError, BagReader, METADATA_FILE
+from rosbag_files import BagError, load_metadata, METADATA_FILE
 
 from ..exceptions import ParameterError, PolicyError
 from ..policy.options import PolicyOptions
@@ -23,22 +23,21 @@ class PolicyRun:
     """What the steps do not say, and the answers depend on.
 
     Attributes:
-        policy: As it was named; empty for the gait.
+        policy: As it was named; empty for the gait, None where a recording does not say: it goes
+            on, or its recorder was killed.
         options: How it was run.
         period: Of the control loop in [s].
-        known: A recording says so; one that goes on, or whose recorder was killed, does not yet.
     """
 
-    policy: str
+    policy: str | None
     options: PolicyOptions
     period: float
-    known: bool = True
 
     @property
     def about(self) -> Mapping[str, str]:
         """What is written down with the recording."""
         return {
-            'policy': self.policy,
+            'policy': self.policy or '',
             'policy_options': self.options.to_json(),
             'period': repr(self.period),
         }
@@ -67,9 +66,12 @@ class PolicyRun:
             PolicyError: It cannot be read.
         """
         folder = recording if recording.is_dir() else recording.parent
-        known = (folder / METADATA_FILE).is_file()
+        about: Mapping[str, str] = {}
         try:
-            about = BagReader(folder if known else recording).metadata.custom or {}
+            if (folder / METADATA_FILE).is_file():
+                metadata = load_metadata(folder / METADATA_FILE)
+                if recording in {folder, *(folder / file.path for file in metadata.files)}:
+                    about = metadata.custom or {}
         except BagError as error:
             raise PolicyError(f'recording {recording}: {error}') from error
         contract = folder / CONTRACT_FILE
@@ -83,4 +85,4 @@ class PolicyRun:
             period = float(about.get('period', StateParameters().period))
         except (ParameterError, ValueError) as error:
             raise PolicyError(f'recording {recording}: {error}') from error
-        return cls(about.get('policy', ''), options, period, known)
+        return cls(about.get('policy'), options, period)
