@@ -25,8 +25,11 @@ SETTLE_TIMEOUT = 5.0
 """Longest time from the end of a motion until the joints are seen at its goal in [s]."""
 DISPLAYED = 4
 """How many of the last paths on display_planned_path may be the one that is looked for."""
-AT_REST, REST_TIME = 5e-4, 0.15
-"""An arm whose joints move less than so far in so long rests, in [rad] or [m], and [s]."""
+AT_REST, REST_STATES = 5e-4, 4
+"""An arm rests whose joints move less than so far, in [rad] or [m], in so many joint states.
+
+States and no time: a motion that is planned anew follows the stop within a tenth of a second.
+"""
 
 
 @dataclass(slots=True, eq=False)
@@ -133,14 +136,15 @@ class Motions:
 
     def rest(self, run: MotionRun | None = None) -> float:
         """Wait until no joint moves, or a motion has ended; return when one moved last in [s]."""
-        last, moved = self.positions, self.clock()
+        observer = self.client.observer
+        last, moved, states = self.positions, self.clock(), observer.states
 
         def rests() -> bool:
-            nonlocal last, moved
-            here, now = self.positions, self.clock()
+            nonlocal last, moved, states
+            here = self.positions
             if float(np.abs(here - last).max()) > AT_REST:
-                last, moved = here, now
-            return now - moved > REST_TIME or (run is not None and run.done)
+                last, moved, states = here, self.clock(), observer.states
+            return observer.states - states >= REST_STATES or (run is not None and run.done)
 
         self.wait(rests, MOTION_TIMEOUT, 'rest')
         return moved

@@ -49,6 +49,7 @@ class Observer:
         joints: Names of the joints of the robot that are independent.
         scene: What the demo has put around the robot, and what that holds.
         positions: Where the joints were seen last in [rad] or [m]; None before.
+        states: How often they were seen.
         room: Distance of the robot, and what it holds, to the nearest obstacle then in [m].
         nearest: The two of them.
     """
@@ -66,6 +67,7 @@ class Observer:
         self.joints: Sequence[str] = kinematics.joints
         self.scene = PlanningScene(kinematics, model.scene.link_shapes, model.scene.allowed)
         self.positions: Array | None = None
+        self.states = 0
         self.room, self.nearest = math.nan, ('', '')
         self._places: dict[str, float] = {}
         self._watches: list[Watch] = []
@@ -110,7 +112,7 @@ class Observer:
         self._places.update(places)
         positions = frozen([self._places.get(name, 0.0) for name in self.joints])
         before = positions if self.positions is None else self.positions
-        self.positions = positions
+        self.positions, self.states = positions, self.states + 1
         moved = float(np.abs(positions - before).max())
         for watch in self._watches:
             watch.gap = max(watch.gap, moved)
