@@ -176,11 +176,11 @@ class RunningProcess:
     ) -> None:
         """Leave nothing of its session behind; one that hangs says where, and is a failure."""
         hangs = False
-        if self.is_running():
+        if self.is_running() and psutil.Process(self.pid).status() != psutil.STATUS_STOPPED:
             try:
                 self.stop(ENDING_TIMEOUT)
             except subprocess.TimeoutExpired:
-                hangs = psutil.Process(self.pid).status() != psutil.STATUS_STOPPED
+                hangs = True
                 self.signal(signal.SIGABRT)
                 with suppress(subprocess.TimeoutExpired):
                     self.wait(ABORTING_TIMEOUT)
