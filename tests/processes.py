@@ -24,8 +24,8 @@ import psutil
 
 from process_supervisor.readiness import ReadinessSocket, VARIABLE
 
-ENDING_TIMEOUT = 25.0
-"""Time in [s] for its end; a master may take 18 s to bring its drives to rest."""
+ENDING_TIMEOUT = 45.0
+"""Time in [s] for its end; a bring-up gives its master 24 s, and its own threads 10 s."""
 ABORTING_TIMEOUT = 2.0
 """Time in [s] in which one that hangs can say where."""
 LAST_LINES = 60

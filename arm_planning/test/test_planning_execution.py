@@ -96,6 +96,9 @@ class Bench:
         self.place = 0.0
         self.watch: Callable[[], None] = lambda: None
         monkeypatch.setattr(execution, 'ActionClient', lambda *parts: self.clients[parts[2]])
+        self.is_known = True
+        match = SimpleNamespace(advance=lambda: self.is_known)
+        monkeypatch.setattr(execution, 'ServerMatch', lambda *_: match)
         self.execution = TrajectoryExecution(
             self,  # type: ignore[arg-type]
             known,
@@ -364,6 +367,25 @@ def test_a_controller_that_is_not_found_yet_is_waited_for(bench: Bench) -> None:
     assert running.begin > first
     bench.controller.end(GoalStatus.STATUS_SUCCEEDED)
     assert bench.ends == [(PlanningCode.SUCCESS, '')]
+
+
+def test_a_controller_that_does_not_know_its_client_yet_is_waited_for(bench: Bench) -> None:
+    """Its answers would be lost, and nobody could cancel what it does."""
+    bench.is_known = False
+    bench.start()
+    bench.watch()
+    assert bench.controller.goal is None
+    bench.is_known = True
+    bench.watch()
+    assert bench.controller.goal is not None
+
+
+def test_what_waits_for_its_controller_may_be_invalidated(bench: Bench) -> None:
+    """Nothing has moved: that is no success."""
+    bench.controller.is_ready = False
+    code = PlanningCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
+    bench.execution.stop(bench.start(), code, 'a box is in the way')
+    assert bench.ends == [(code, 'a box is in the way')]
 
 
 def test_a_controller_that_does_not_come_is_named(

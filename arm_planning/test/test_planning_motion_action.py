@@ -67,13 +67,13 @@ class Bench:
 
         return plan
 
-    def _start(self, _trajectory: Any, done: Done) -> Done:
+    def _start(self, _trajectory: Any, done: Done) -> Any:
         self.executions.append(done)
-        return done
+        return SimpleNamespace(done=done, is_sent=True)
 
-    def _stop(self, done: Done, *, reason: str) -> None:
+    def _stop(self, execution: Any, *, reason: str) -> None:
         if self.stops:
-            done(PlanningCode.PREEMPTED, reason)
+            execution.done(PlanningCode.PREEMPTED, reason)
 
     def move(self, *, delay: float) -> Any:
         """Send a goal that is planned anew after a delay in [s]; return its handle."""

@@ -86,13 +86,12 @@ class DeviceRunner:
             frames = self._thread.receive(max(0.0, due - rest))
             now = time.monotonic()
             first = frames[0].timestamp or now if frames else due
-            stalled = (rest - woken) + (now - max(rest, min(due, first)))
+            stalled = (rest - woken) + max(0.0, now - max(rest, min(due, first)))
             woken = now
+            for frame in _pass_over(frames, now) if now - first > STALL else frames:
+                host.receive(frame, frame.timestamp or now)
             if stalled > STALL:
                 host.postpone_watches(stalled)
-                frames = _pass_over(frames, stalled)
-            for frame in frames:
-                host.receive(frame, frame.timestamp or now)
 
     def _send(self, frame: Frame) -> None:
         try:
@@ -101,14 +100,16 @@ class DeviceRunner:
             self._thread.note_failure(error)
 
 
-def _pass_over(frames: list[Frame], stalled: float) -> list[Frame]:
-    """Return what devices see of the frames that came while they got no processor for a time."""
+def _pass_over(frames: list[Frame], now: float) -> list[Frame]:
+    """Return what devices see of frames that waited because they got no processor."""
     kept = newest_process_data(frames)
     syncs = sum(frame.can_id == CobId.SYNC for frame in frames)
+    if len(kept) == len(frames):
+        return frames
     logger.warning(
         'the simulated devices got no processor for %.2f s: %d SYNC and %d other frames of '
         'process data are passed over, as by the mailboxes of a CAN controller',
-        stalled,
+        now - (frames[0].timestamp or now),
         max(0, syncs - 1),
         len(frames) - len(kept) - max(0, syncs - 1),
     )

@@ -123,8 +123,8 @@ def _model_of(recorded: PolicyRun, recording: Path) -> str:
     """
     if recorded.policy is None:
         raise PolicyError(
-            f'recording {recording} does not say yet which policy ran: it goes on, or its '
-            'recorder was killed; name the model'
+            f'recording {recording} does not say which policy ran (it goes on, its recorder was '
+            'killed, or another program wrote it); name the model'
         )
     if not recorded.policy:
         raise PolicyError(f'recording {recording} was begun without a policy; name the model')

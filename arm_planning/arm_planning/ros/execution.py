@@ -21,6 +21,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from arm_model.ros import seconds
 from arm_trajectory import GoalCode
+from node_runner import ServerMatch
 
 from ..exceptions import PlanningCode, PlanningError
 from .controllers import Controller
@@ -74,6 +75,7 @@ class Execution:
         is_complete: Whether all controllers that have ended reached the end of the trajectory.
         in_doubt: Whether it is still to be found out why a controller gave up.
         held: Goals of its controllers that wait until the actions of all are found, by controller.
+        is_sent: Whether they were sent.
         way: The trajectory with the way to its first point.
     """
 
@@ -88,6 +90,7 @@ class Execution:
     is_complete: bool = True
     in_doubt: bool = False
     held: dict[str, Any] = field(default_factory=dict)
+    is_sent: bool = False
     way: Any = None
 
     @property
@@ -124,6 +127,7 @@ class TrajectoryExecution:
             name: ActionClient(node, each.kind.action, each.action(name))
             for name, each in controllers.items()
         }
+        self._matches: dict[str, ServerMatch] = {}
         self.stops = 0
         self._running: list[Execution] = []
         self._find_out: Callable[[Execution], None] | None = None
@@ -214,11 +218,21 @@ class TrajectoryExecution:
 
     def _missing(self, execution: Execution) -> str:
         """Return the first of its controllers whose action is not found; empty for none."""
-        absent = (name for name in execution.held if not self._clients[name].server_is_ready())
-        return next(absent, '')
+        return next((name for name in execution.held if not self._is_found(name)), '')
+
+    def _is_found(self, name: str) -> bool:
+        """Whether the action of a controller is there, and its answers reach its client."""
+        if not self._clients[name].server_is_ready():
+            self._matches.pop(name, None)
+            return False
+        match = self._matches.get(name)
+        if match is None:
+            action = self._controllers[name].action(name)
+            match = self._matches[name] = ServerMatch(self._node, [f'{action}/_action/send_goal'])
+        return match.advance()
 
     def _send(self, execution: Execution) -> None:
-        goals, execution.held = execution.held, {}
+        goals, execution.held, execution.is_sent = execution.held, {}, True
         lasts = seconds(execution.trajectory.points[-1].time_from_start)
         limits = self._limits
         execution.begin = time.monotonic()
@@ -272,6 +286,7 @@ class TrajectoryExecution:
             return
         execution.ending = code, reason
         if execution.held:  # nobody was asked
+            execution.is_complete = False
             execution.held.clear()
             execution.waits_for.clear()
             self._conclude(execution)
@@ -376,6 +391,8 @@ class TrajectoryExecution:
 
     def _watch(self) -> None:
         now = time.monotonic()
+        for name in self._clients:
+            self._is_found(name)
         for execution in list(self._running):
             if execution.held:
                 self._look_again(execution)

@@ -263,7 +263,9 @@ class MotionAction:
         if code is not PlanningCode.SUCCESS:
             self._node.get_logger().warning(f'{self._kind.name}: {code.name}: {reason}')
         conclude(handle, code)
-        return self._kind.answer(error_code(code, reason), goal.planned, goal.begun > 0)
+        execution = goal.execution
+        is_begun = goal.begun > 1 or (execution is not None and execution.is_sent)
+        return self._kind.answer(error_code(code, reason), goal.planned, is_begun)
 
     def _publish(self, goal: _Goal, state: str) -> None:
         goal.handle.publish_feedback(self._kind.action.Feedback(state=state))

@@ -76,12 +76,14 @@ def run_demo(
             )
             thread.start()
             outcome = runner.run()
-            if (late := join_in_time(thread)) and not outcome.exit_code:
-                outcome = Outcome(1, late)
+            late = join_in_time(thread)
     finally:
         display.close()
     with_summary = not (endless and isinstance(display, TableDisplay))
-    return conclude(write, scenario, outcome, with_summary=with_summary)
+    code = conclude(write, scenario, outcome, with_summary=with_summary)
+    if late:
+        write(f'error: {late}')
+    return 1 if late else code
 
 
 def conclude(

@@ -80,10 +80,11 @@ def supervise(
         thread.runner = runner
         outcome = runner.run()
         late = thread.join()
-    if late and not outcome.exit_code:
-        outcome = Outcome(1, late)
     if outcome.exit_code:
         notify(Notice(Severity.ERROR, explain(outcome)))
+    if late:
+        notify(Notice(Severity.ERROR, late))
+        outcome = Outcome(1, late) if not outcome.exit_code else outcome
     return outcome
 
 

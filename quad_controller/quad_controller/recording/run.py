@@ -23,8 +23,8 @@ class PolicyRun:
     """What the steps do not say, and the answers depend on.
 
     Attributes:
-        policy: As it was named; empty for the gait, None where a recording does not say: it goes
-            on, or its recorder was killed.
+        policy: As it was named; empty for the gait, None where a recording does not say, as one
+            that goes on.
         options: How it was run.
         period: Of the control loop in [s].
     """

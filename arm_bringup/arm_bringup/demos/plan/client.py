@@ -202,6 +202,7 @@ class PlanClient(ArmClient):
 
     def _answer(self, client: Any, request: Any, name: str) -> Any:  # noqa: ANN401
         self.wait_until(client.service_is_ready, ANSWER_TIMEOUT, f'the service {name}')
+        self.wait_until_known([name], ANSWER_TIMEOUT)
         future = client.call_async(request)
         self.wait_until(future.done, ANSWER_TIMEOUT, f'the answer of {name}')
         return future.result()

@@ -25,11 +25,10 @@ SETTLE_TIMEOUT = 5.0
 """Longest time from the end of a motion until the joints are seen at its goal in [s]."""
 DISPLAYED = 4
 """How many of the last paths on display_planned_path may be the one that is looked for."""
-AT_REST, REST_STATES = 5e-4, 4
-"""An arm rests whose joints move less than so far, in [rad] or [m], in so many joint states.
-
-States and no time: a motion that is planned anew follows the stop within a tenth of a second.
-"""
+AT_REST = 5e-4
+"""An arm whose joints move less than so far rests, in [rad] or [m], in so many joint states:"""
+REST_STATES, SHORT_REST_STATES = 16, 4
+"""What is planned anew while a motion goes on may follow the rest within a tenth of a second."""
 
 
 @dataclass(slots=True, eq=False)
@@ -136,7 +135,7 @@ class Motions:
 
     def rest(self, run: MotionRun | None = None) -> float:
         """Wait until no joint moves, or a motion has ended; return when one moved last in [s]."""
-        observer = self.client.observer
+        observer, enough = self.client.observer, SHORT_REST_STATES if run else REST_STATES
         last, moved, states = self.positions, self.clock(), observer.states
 
         def rests() -> bool:
@@ -144,7 +143,7 @@ class Motions:
             here = self.positions
             if float(np.abs(here - last).max()) > AT_REST:
                 last, moved, states = here, self.clock(), observer.states
-            return observer.states - states >= REST_STATES or (run is not None and run.done)
+            return observer.states - states >= enough or (run is not None and run.done)
 
         self.wait(rests, MOTION_TIMEOUT, 'rest')
         return moved
