@@ -165,8 +165,7 @@ def main() -> None:
             report(side.value, [outcome for outcome in outcomes if outcome.lay is side])
         print('dropped with that side below, those that stayed on it')
         for side in Lying:
-            if side is not Lying.BACK:
-                report(side.value, list(dropped_on(pool, side, options.each)))
+            report(side.value, list(dropped_on(pool, side, options.each)))
 
 
 if __name__ == '__main__':

@@ -1,21 +1,25 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Searches poses that turn a fallen robot onto its belly, by random search in physics.
+"""Searches poses that turn a fallen robot onto its belly, by the cross-entropy method in physics.
 
-A way is some poses in a row. On a side, legs of one side do the same; on nose and tail, legs of
-one end: a pose has six numbers. Robots that were dropped and came to rest there go through it and
-fold their legs; a way is as good as they are upright then, on average. Poses in which legs touch
-each other or the trunk, which physics lets pass, are left out. What is found is printed as Python,
-for `quad_controller/states/get_up_poses.py`.
+A way is some poses in a row, and swings behind the first ones: poses that joints go to as fast as
+they can, each for a time, without rest between. On a side, legs of one side do the same; else,
+legs of one end: a pose has six numbers, a swing seven. Robots that were dropped and came to rest
+there go through it; a way is as good as they are upright in the end and were at best, on average,
+less what links come too near to each other, which physics lets pass. What is found is printed as
+Python, for `quad_controller/states/get_up_poses.py`.
 
-    python search_get_up.py left --speeds 3 6 --seed 1
+    python search_get_up.py left --speeds 3 3 --rounds 20
+    python search_get_up.py back --speeds 3 --swings 4 --rounds 60
+    python search_get_up.py back --speeds 3 --swings 4 --refine      # the first one of the module
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 import math
 import os
@@ -27,19 +31,21 @@ from mujoco import rollout
 import numpy as np
 import numpy.typing as npt
 
-from quad_controller.states.get_up import FOLD_SPEED
+from quad_controller.states.get_up_poses import RECOVERIES, Recovery
 from quad_controller.states.lying import Lying, lying_on
-from quad_controller.states.machine import Poses
-from quad_controller.states.parameters import StateParameters
 from quad_description import LEGS
 
 Array = npt.NDArray[np.float64]
 
-POPULATION = 16  # near the best one, and as many anywhere
-MANY = 200  # of which those are left that touch nothing
-ROBOTS, FEW, ELITE = 10, 2, 4  # a few robots choose those that are tried on all
-SPREAD = 0.12  # of the range of a joint, near the best one
+POPULATION, ELITE = 120, 14  # ways in a round, and those that the next one is drawn around
+ROBOTS, FEW = 10, 3  # a few robots choose, all judge
+KEEP = 0.3  # share of mean and spread that stays in a round
+SPREAD, NEAR_SPREAD, LEAST_SPREAD = 0.4, 0.06, 0.015  # of the range of a joint
 HOLD_TIME = 0.6  # [s] after each pose, in which the body comes to rest
+SWING_SPEED = 10.0  # [rad/s]
+SWING_TIMES = (0.02, 0.42)  # [s]
+PERIOD = 0.02  # [s] between two targets
+CLEARANCE, NEARNESS_COST = 0.004, 100.0  # [m], per [m] below it
 SIDES = {'left': Lying.LEFT, 'nose': Lying.NOSE, 'tail': Lying.TAIL, 'back': Lying.BACK}
 LEG = MODEL.leg_indices[0]
 LOWER = np.array([MODEL.limits[index].lower for index in LEG] * 2)
@@ -67,20 +73,105 @@ def clearance(model: mujoco.MjModel, pose: Array) -> float:
     return min(float(mujoco.mj_geomDistance(model, data, *pair, FAR, points)) for pair in pairs)
 
 
+@dataclass(frozen=True, slots=True)
+class Form:
+    """What ways are searched.
+
+    Attributes:
+        side: On which side the robot lies.
+        speeds: Of the poses at the beginning [rad/s]; the body comes to rest after each.
+        swings: How many swings follow.
+    """
+
+    side: Lying
+    speeds: Sequence[float]
+    swings: int
+
+    @property
+    def size(self) -> int:
+        """How many numbers a way has."""
+        return 6 * (len(self.speeds) + self.swings) + self.swings
+
+    def numbers(self, recovery: Recovery) -> Array:
+        """Return the numbers of a way that is known."""
+        least, most = SWING_TIMES
+        swings = recovery[len(self.speeds) :]
+        times = [stage.duration or most for stage in swings]
+        one, other = (0, 1) if self.is_on_side else (0, 2)
+        legs = np.array([[*stage.legs[one], *stage.legs[other]] for stage in recovery])
+        return np.concatenate(
+            [
+                (np.array(times) - least) / (most - least),
+                ((legs - LOWER) / (UPPER - LOWER)).ravel(),
+            ]
+        ).clip(0.0, 1.0)
+
+    @property
+    def is_on_side(self) -> bool:
+        """Whether legs of one side do the same, and not those of one end."""
+        return self.side in {Lying.LEFT, Lying.RIGHT}
+
+    def poses(self, numbers: Array) -> Array:
+        """Return targets of all joints for each pose; the numbers are 0 to 1 of ranges."""
+        parts = numbers[self.swings :].reshape(-1, 6)
+        poses = np.round(LOWER + parts * (UPPER - LOWER), 2)
+        one, other = poses[:, :3], poses[:, 3:]
+        legs = (one, other) * 2 if self.is_on_side else (one, one, other, other)
+        return np.concatenate(legs, axis=1)
+
+    def durations(self, numbers: Array) -> Array:
+        """Return how long each swing takes [s], in whole periods."""
+        least, most = SWING_TIMES
+        times: Array = least + numbers[: self.swings] * (most - least)
+        return np.round(times / PERIOD) * PERIOD
+
+    def targets(self, start: Array, numbers: Array) -> Array:
+        """Return what a robot is sent, period after period, from its targets at the start."""
+        rows, poses = [start], self.poses(numbers)
+        for pose, speed in zip(poses, self.speeds, strict=False):  # as a Blend
+            begin = rows[-1]
+            duration = max(float(np.abs(pose - begin).max()) * math.pi / 2 / speed, PERIOD)
+            for step in range(1, round((MAX_WAY * math.pi / 2 / speed + HOLD_TIME) / PERIOD)):
+                share = 0.5 * (1.0 - math.cos(math.pi * min(step * PERIOD / duration, 1.0)))
+                rows.append(begin + share * (pose - begin))
+        most = SWING_SPEED * PERIOD
+        swings = poses[len(self.speeds) :]
+        for pose, duration in zip(swings, self.durations(numbers), strict=True):  # as a Swing
+            for _ in range(round(duration / PERIOD)):
+                rows.append(rows[-1] + np.clip(pose - rows[-1], -most, most))
+        for _ in range(round((self.swings * SWING_TIMES[1] + 2 * HOLD_TIME) / PERIOD)):
+            rows.append(rows[-1] + np.clip(poses[-1] - rows[-1], -most, most))
+        return np.array(rows)
+
+    def python_of(self, numbers: Array) -> str:
+        """Return a way as it stands in the module of the poses."""
+        swing = f'{SWING_SPEED}, '
+        ends = [
+            *map(str, self.speeds),
+            *(f'{swing}{duration:.2f}' for duration in self.durations(numbers)[:-1]),
+            *([f'{SWING_SPEED}'] if self.swings else []),  # comes to rest
+        ]
+        return '\n'.join(
+            f'    Stage(({", ".join(str(tuple(leg)) for leg in legs)}), {end}),'
+            for legs, end in zip(self.poses(numbers).reshape(-1, 4, 3).tolist(), ends, strict=True)
+        )
+
+
 class Fallen:
     """Robots that lie on a side, each with its ground, to go on from again and again."""
 
-    def __init__(self, side: Lying, count: int) -> None:
+    def __init__(self, form: Form, count: int) -> None:
         """Drop robots until enough of them came to rest there."""
+        self._form = form
         self.models: list[mujoco.MjModel] = []
         self.states: list[Array] = []
         self.targets: list[Array] = []
         seed = 10_000
         while len(self.models) < count:
-            backend = fallen(seed, side)
+            backend = fallen(seed, form.side)
             imu, robot = backend.observe().imu, backend.robot
             seed += 1
-            if imu is None or lying_on(imu.down) is not side:
+            if imu is None or lying_on(imu.down) is not form.side:
                 continue
             model, data = robot._model, robot._data  # noqa: SLF001  # to go back to it, quickly
             state = np.zeros(mujoco.mj_stateSize(model, STATE))
@@ -91,90 +182,70 @@ class Fallen:
         self._workers = [
             mujoco.MjData(self.models[0]) for _ in range(len(os.sched_getaffinity(0)))
         ]
-        folded = Poses(MODEL, StateParameters().lie_height, ()).lying((0.0,) * len(MODEL.names))
-        self._folded = np.array(folded)
 
-    def are_clear(self, poses: Array) -> bool:
-        """Return whether legs touch neither each other nor the trunk in some poses."""
-        return all(clearance(self.models[0], pose) > 0.0 for pose in poses)
-
-    def upright(self, ways: Array, speeds: Sequence[float], robots: Sequence[int]) -> Array:
-        """Return how upright each robot is after each way and folding, -1 to 1.
-
-        Args:
-            ways: Targets of all joints for each stage of each way.
-            speeds: Of the stages [rad/s].
-            robots: Which ones.
-        """
+    def trajectories(self, ways: Array, robots: Sequence[int]) -> Array:
+        """Return the state of each robot on each way, time step after time step."""
         pairs = [(way, robot) for way in ways for robot in robots]
-        ends = [[*way, self._folded] for way, _ in pairs]
-        starts = np.array([self.targets[robot] for _, robot in pairs])
-        timestep = float(self.models[0].opt.timestep)
-        control = _controls(starts, np.array(ends), [*speeds, FOLD_SPEED], timestep)
+        rows = [self._form.targets(self.targets[robot], way) for way, robot in pairs]
+        longest = max(map(len, rows))
+        sent = np.array([np.pad(row, ((0, longest - len(row)), (0, 0)), 'edge') for row in rows])
+        steps = round(PERIOD / float(self.models[0].opt.timestep))
+        share = (np.arange(1, steps + 1) / steps)[:, None]
+        control = sent[:, :-1, None] + share * np.diff(sent, axis=1)[:, :, None]
         states, _ = rollout.rollout(
             [self.models[robot] for _, robot in pairs],
             self._workers,
             initial_state=np.array([self.states[robot] for _, robot in pairs]),
-            control=control,
+            control=control.reshape(len(pairs), -1, sent.shape[2]),
         )
-        x, y = states[:, -100:, 5], states[:, -100:, 6]  # behind time, position and w
-        up: Array = (1.0 - 2.0 * (x * x + y * y)).mean(axis=1)
-        return up.reshape(len(ways), len(robots))
+        return np.asarray(states).reshape(len(ways), len(robots), *states.shape[1:])
+
+    def nearest(self, states: Array) -> float:
+        """Return the least clearance on a trajectory [m], behind the way to the first pose."""
+        first = round(MAX_WAY * math.pi / 2 / self._form.speeds[0] / PERIOD)
+        joints = slice(8, 8 + len(MODEL.names))  # behind time, position and orientation
+        return min(clearance(self.models[0], state[joints]) for state in states[10 * first :: 20])
 
 
-def _controls(starts: Array, ends: Array, speeds: Sequence[float], timestep: float) -> Array:
-    """Return the targets of each time step: cosines as those of a Blend, and rests."""
-    parts, before = [], starts
-    for stage, speed in enumerate(speeds):
-        after = ends[:, stage]
-        ways = np.abs(after - before).max(axis=1)
-        count = round((MAX_WAY * math.pi / 2 / speed + HOLD_TIME) / timestep)
-        times = timestep * np.arange(1, count + 1)
-        lasts = np.maximum(ways * math.pi / 2 / speed, timestep)
-        share = np.minimum(times[None, :] / lasts[:, None], 1.0)
-        share = 0.5 * (1.0 - np.cos(math.pi * share))[:, :, None]
-        parts.append(before[:, None] + share * (after - before)[:, None])
-        before = after
-    return np.concatenate(parts, axis=1)
+def upright(states: Array) -> Array:
+    """Return how upright a robot is, from -1 on its back to 1, in each state."""
+    x, y = states[..., 5], states[..., 6]  # behind time, position and w
+    return np.asarray(1.0 - 2.0 * (x * x + y * y))
 
 
-def poses_of(numbers: Array, side: Lying) -> Array:
-    """Return targets of all joints for the stages of a way; the numbers are 0 to 1 of ranges."""
-    poses = np.round(LOWER + numbers.reshape(-1, 6) * (UPPER - LOWER), 2)
-    one, other = poses[:, :3], poses[:, 3:]
-    legs = (one, one, other, other) if side in {Lying.NOSE, Lying.TAIL} else (one, other) * 2
-    return np.concatenate(legs, axis=1)
+def search(form: Form, rounds: int, seed: int, near: Recovery | None = None) -> None:
+    """Print the mean of the ways that were drawn last, again and again.
 
-
-def search(side: Lying, speeds: Sequence[float], rounds: int, seed: int) -> Array:
-    """Return the best way that was found."""
-    random, robots = np.random.default_rng(seed), Fallen(side, ROBOTS)
-    best, best_score, begun = np.full(6 * len(speeds), 0.5), -math.inf, time.monotonic()
-    for _ in range(rounds):
-        near = random.normal(best, SPREAD, (MANY, best.size)).clip(0.0, 1.0)
-        clear = [each for each in near if robots.are_clear(poses_of(each, side))][:POPULATION]
-        far = random.random((MANY, best.size))
-        clear += [each for each in far if robots.are_clear(poses_of(each, side))][:POPULATION]
-        drawn = np.array(clear)
-        ways = np.array([poses_of(each, side) for each in drawn])
+    Args:
+        form: Of the ways.
+        rounds: How many.
+        seed: Of everything random.
+        near: A way to begin at; None for anywhere.
+    """
+    random, robots = np.random.default_rng(seed), Fallen(form, ROBOTS)
+    mean = np.full(form.size, 0.5) if near is None else form.numbers(near)
+    spread = np.full(form.size, SPREAD if near is None else NEAR_SPREAD)
+    begun = time.monotonic()
+    for number in range(rounds):
+        ways = random.normal(mean, spread, (POPULATION, form.size)).clip(0.0, 1.0)
         few = random.choice(ROBOTS, FEW, replace=False).tolist()
-        elite = np.argsort(robots.upright(ways, speeds, few).mean(axis=1))[-ELITE:]
-        scores = robots.upright(ways[elite], speeds, range(ROBOTS))
-        first = int(np.argmax(scores.mean(axis=1)))
-        if scores[first].mean() > best_score:
-            best, best_score = drawn[elite[first]], float(scores[first].mean())
-            print(f'{time.monotonic() - begun:4.0f} s: {np.round(scores[first], 2).tolist()}')
-            print(python_of(poses_of(best, side), speeds), flush=True)
-    return poses_of(best, side)
-
-
-def python_of(way: Array, speeds: Sequence[float]) -> str:
-    """Return a way as it stands in the module of the poses."""
-    lines = []
-    for pose, speed in zip(way, speeds, strict=True):
-        legs = ', '.join(str(tuple(leg)) for leg in pose.reshape(-1, 3).tolist())
-        lines.append(f'    Stage(({legs}), {speed}),')
-    return '\n'.join(lines)
+        trajectories = robots.trajectories(ways, few)
+        up = upright(trajectories)
+        scores = up[..., -100:].mean(axis=(1, 2)) + 1.5 * up[..., 300:].max(axis=2).mean(axis=1)
+        best = np.argsort(scores)[: -3 * ELITE - 1 : -1]
+        for way in best:
+            least = robots.nearest(trajectories[way, 0])
+            scores[way] -= NEARNESS_COST * max(CLEARANCE - least, 0.0)
+        elite = ways[best[np.argsort(scores[best])[: -ELITE - 1 : -1]]]
+        mean = KEEP * mean + (1.0 - KEEP) * elite.mean(axis=0)
+        spread = KEEP * spread + (1.0 - KEEP) * elite.std(axis=0)
+        spread = np.maximum(spread, LEAST_SPREAD)
+        if number % 5 == 4 or number == rounds - 1:
+            ends = upright(robots.trajectories(mean[None], range(ROBOTS)))[0]
+            print(f'{time.monotonic() - begun:4.0f} s, {(number + 1) * POPULATION * FEW} tries:')
+            print(f'  at the end {np.round(ends[:, -100:].mean(axis=1), 2).tolist()}')
+            print(f'  at best    {np.round(ends[:, 300:].max(axis=1), 2).tolist()}')
+            print(form.python_of(mean), flush=True)
 
 
 def main() -> None:
@@ -182,11 +253,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('side', choices=SIDES)
     parser.add_argument('--speeds', type=float, nargs='+', default=[3.0, 6.0], help='[rad/s]')
-    parser.add_argument('--rounds', type=int, default=12)
+    parser.add_argument('--swings', type=int, default=0, help='that follow')
+    parser.add_argument('--refine', action='store_true', help='begin at what is known')
+    parser.add_argument('--rounds', type=int, default=30)
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args()
-    way = search(SIDES[options.side], options.speeds, options.rounds, options.seed)
-    print(f'the best one:\n{python_of(way, options.speeds)}')
+    form = Form(SIDES[options.side], options.speeds, options.swings)
+    near = RECOVERIES[form.side][0] if options.refine else None
+    search(form, options.rounds, options.seed, near)
 
 
 if __name__ == '__main__':

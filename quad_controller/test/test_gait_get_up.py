@@ -16,14 +16,14 @@ from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
 from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES, POLICY_DEADLINE
-from quad_controller.states.get_up_poses import RECOVERIES
+from quad_controller.states.get_up_poses import RECOVERIES, Stage
 from quad_controller.states.lying import Lying, lying_on
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
 from quad_description.rotations import about, from_roll_pitch_yaw, Quaternion, rotate
 from quad_gait_policies import STAND
-from quad_gait_rig import FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 
 QUARTER = math.pi / 2
 ATTITUDES: dict[Lying, Quaternion] = {
@@ -51,6 +51,11 @@ def fallen(side: Lying, controller: Controller | None = None) -> Rig:
     rig.imu = lying(side)
     rig.until(State.FAULT)
     return rig
+
+
+def joints_of(stage: Stage) -> list[float]:
+    """Return the targets of all joints of a stage."""
+    return [angle for leg in stage.legs for angle in leg]
 
 
 def gives_up(rig: Rig) -> str:
@@ -141,27 +146,16 @@ def test_it_may_be_asked_for_in_any_mode(mode: str) -> None:
     assert rig.controller.status.title == (mode if on_its_feet else 'stand')
 
 
-def test_on_its_back_it_says_so_and_moves_nothing() -> None:
-    """At once, with what a person has to do; the fall stays latched."""
-    rig = fallen(Lying.BACK)
-    held = rig.positions
-    answer = rig.controller.set_mode('get_up')
-    assert not answer.accepted
-    assert 'stays in fault: it lies on its back' in answer.message
-    assert 'put it on its feet' in answer.message
-    rig.run(2.0)
-    assert rig.is_in(State.FAULT)
-    assert rig.positions == held
-
-
-def test_a_robot_that_comes_to_rest_on_its_back_stops() -> None:
-    """Where the legs are then, with a fault in words; on its feet again, it is cleared."""
-    rig = fallen(Lying.LEFT)
-    rig.ask('get_up')
-    rig.run(1.0)
+def test_with_an_arm_on_its_back_it_says_so_and_moves_nothing() -> None:
+    """With what a person has to do; on its feet again, the fall is cleared."""
+    controller = Controller(ARM_ROBOT, GaitParameters(), StateParameters())
+    rig = Rig(controller, FOLDED + (0.0,) * (len(ARM_ROBOT.names) - len(FOLDED)))
     rig.imu = lying(Lying.BACK)
-    assert 'lies on its back' in gives_up(rig)
+    rig.step()
     held = rig.positions
+    rig.ask('get_up')
+    assert 'it lies on its back and its arm' in gives_up(rig)
+    assert 'put it on its feet' in rig.controller.status.faults[0]
     rig.run(2.0)
     assert rig.positions == held
     rig.imu = UPRIGHT
@@ -169,13 +163,30 @@ def test_a_robot_that_comes_to_rest_on_its_back_stops() -> None:
     assert rig.controller.clear_fault().message == 'cleared; the mode is relax'
 
 
-@pytest.mark.parametrize('side', [Lying.LEFT, Lying.RIGHT, Lying.NOSE, Lying.TAIL])
+def test_swings_go_on_wherever_the_body_is_and_end_in_rest() -> None:
+    """Off the back: what it does next is asked only when the body is at rest behind them."""
+    first, *_, last = RECOVERIES[Lying.BACK][0]
+    rig = fallen(Lying.BACK)
+    rig.ask('get_up')
+    while rig.positions != pytest.approx(joints_of(first)):
+        rig.step()
+    while rig.positions == pytest.approx(joints_of(first)):
+        rig.step()
+    rig.imu = lying(Lying.TAIL)
+    while rig.positions != pytest.approx(joints_of(last)):
+        rig.step()
+    assert not any(f'lies {Lying.TAIL.value}' in line for line in rig.log)
+    rig.run(1.0)
+    assert any(f'lies {Lying.TAIL.value}' in line for line in rig.log)
+
+
+@pytest.mark.parametrize('side', [side for side in Lying if side is not Lying.BELLY])
 def test_it_gives_up_after_some_tries(side: Lying) -> None:
     """It says where it lies, what was tried, and what a person has to do; then it may be asked."""
     rig = fallen(side)
     rig.ask('get_up')
-    words = gives_up(rig)
-    assert f'it lies {side.value}, tilted by 90 deg, after {MAX_TRIES} tries' in words
+    words, tilt = gives_up(rig), 180 if side is Lying.BACK else 90
+    assert f'it lies {side.value}, tilted by {tilt} deg, after {MAX_TRIES} tries' in words
     assert f'({side.value} {MAX_TRIES})' in words
     assert 'by hand' in words
     held = rig.positions
@@ -343,11 +354,11 @@ def test_a_policy_may_bring_it_to_its_feet() -> None:
 
 
 def test_a_policy_that_does_not_succeed_is_followed_by_poses() -> None:
-    """After its deadline, or when it fails; both are said. On the back there are none."""
+    """After its deadline, or when it fails; both are said."""
     policy = StillPolicy(FOLDED)
     rig = policy_rig(policy)
     rig.ask('get_up')
-    assert 'it lies on its back, and no movement' in gives_up(rig)
+    assert f'({Lying.BACK.value} {MAX_TRIES})' in gives_up(rig)
     given_up = f'the policy still is given up: it lies on its back after {POLICY_DEADLINE:g} s'
     assert any(given_up in line for line in rig.log)
     policy.targets = None

@@ -4,13 +4,16 @@
 
 from __future__ import annotations
 
-from bench_get_up import get_up, Outcome, URDF
+from bench_get_up import fallen, get_up, MODEL, Outcome, URDF
 import numpy as np
 import pytest
 from search_get_up import clearance
 
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.states.controller import Controller
 from quad_controller.states.get_up_poses import RECOVERIES, Stage
 from quad_controller.states.lying import Lying
+from quad_controller.states.parameters import StateParameters
 from quad_sim.physics import Robot
 
 pytestmark = pytest.mark.slow
@@ -30,26 +33,45 @@ def outcomes(side: Lying) -> list[Outcome]:
     return found
 
 
-STAGES = [stage for tried in RECOVERIES.values() for recovery in tried for stage in recovery]
+RESTS = [
+    stage
+    for tried in RECOVERIES.values()
+    for recovery in tried
+    for stage in recovery
+    if stage.duration is None
+]
 
 
-@pytest.mark.parametrize('stage', STAGES)
+@pytest.mark.parametrize('stage', RESTS)
 def test_no_pose_presses_a_leg_into_another_one(stage: Stage) -> None:
     """Nor a shank into the trunk; physics would let it pass."""
     assert clearance(Robot(URDF)._model, np.array(stage.legs).ravel()) > 0.005  # [m]
 
 
-@pytest.mark.parametrize('side', [side for side in Lying if side is not Lying.BACK])
+def test_no_swing_presses_a_leg_into_another_one() -> None:
+    """From the first pose off the back, on the way that the joints really take."""
+    backend = fallen(1000, Lying.BACK)
+    controller = Controller(MODEL, GaitParameters(), StateParameters())
+    state = backend.step(controller.step(backend.observe(), backend.period).targets)
+    assert controller.set_mode('get_up').accepted
+    first, *_, last = (np.array(stage.legs).ravel() for stage in RECOVERIES[Lying.BACK][0])
+    least, swings = 1.0, False
+    for _ in range(round(10.0 / backend.period)):
+        targets = controller.step(state, backend.period).targets
+        assert targets is not None
+        state = backend.step(targets)
+        swings = swings or np.allclose(targets, first)
+        if swings:
+            least = min(least, clearance(backend.robot._model, backend.robot.joint_positions))
+        if np.allclose(targets, last):
+            break
+    assert swings
+    assert 0.0 < least < 1.0  # [m]
+
+
+@pytest.mark.parametrize('side', Lying)
 def test_most_robots_get_up(side: Lying) -> None:
     """Whatever their joints and the friction; those that do not say where they lie."""
     found = outcomes(side)
     assert sum(outcome.stood for outcome in found) >= MIN_STOOD * DROPS, found
     assert all('it lies' in outcome.words for outcome in found if not outcome.stood)
-
-
-def test_on_the_back_nothing_is_tried() -> None:
-    """It is refused at once, with what a person has to do."""
-    for outcome in outcomes(Lying.BACK):
-        assert not outcome.stood
-        assert outcome.time == 0.0
-        assert 'by hand' in outcome.words

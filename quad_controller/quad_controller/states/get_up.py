@@ -4,13 +4,14 @@
 
 ::
 
-    REST -> (side, nose or tail: stages of a try) -> REST -> ... until it lies on its belly
+    REST -> (back, side, nose or tail: stages of a try) -> REST -> ... until it lies on its belly
     REST -> (belly: FOLD -> STAND) -> finished
-    REST -> (back, or too many tries) -> failure
+    REST -> (too many tries) -> failure
     REST -> (a policy, where there is one) -> finished, or REST and the poses
 
 Where it lies is measured whenever the body has come to rest, so that a stage that did something
-else than it was made for leads to the tries of where it lies now.
+else than it was made for leads to the tries of where it lies now. Swings follow each other without
+rest: the legs throw the body over.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from .faults import Fault, FaultLatch
 from .get_up_poses import RECOVERIES
 from .health import Health
 from .lying import Lying, lying_on
-from .motion import Blend, Hold, Motion, Situation
+from .motion import Blend, Hold, Motion, Situation, Swing
 from .policy_motion import PolicyMotion
 
 STILL_ANGLE = 0.05  # [rad] by which the body of a robot at rest may turn
@@ -43,14 +44,14 @@ STAND_SPEED = 1.5  # [rad/s]
 POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
 EASE_TIME = 0.3  # [s] over which a policy takes over
 
+LEG_JOINTS = 12  # of a robot without an arm
 REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
-ON_ITS_BACK = (
-    'it lies on its back, and no movement of its legs is known that turns it over; put it on its '
+WITH_AN_ARM = (
+    'it lies on its back and its arm, and how it turns over there is not known; put it on its '
     'feet or on a side by hand, then request get_up again'
 )
-"""Why nothing moves on the back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> 
     Args:
         health: What is measured.
         latch: The latched faults; a fall is what getting up is for.
-        policy: What brings it to its feet, which may do so from its back; None for the poses.
+        policy: What brings it to its feet; None for the poses.
     """
     if others := latch.texts_without(Fault.FALLEN):
         return f'{"; ".join(others)}; call ~/clear_fault when that is corrected'
@@ -111,8 +112,6 @@ def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> 
         return health.uncertainty
     if health.spins:
         return 'it turns faster than max_turn_rate: wait until it is at rest, or look at the gyro'
-    if policy is None and lying_on(imu.down) is Lying.BACK:
-        return ON_ITS_BACK
     return health.unmeasured(policy)
 
 
@@ -190,6 +189,8 @@ class GetUp(Motion):
         """Whether a stage has come to its end, or takes too long."""
         if self._motion.failure or self._time >= self._deadline:
             return True
+        if isinstance(self._motion, Swing):
+            return self._motion.finished
         is_still = self._still.time >= STILL_TIME
         if isinstance(self._motion, PolicyMotion):
             return is_still and imu.tilt < LEVEL
@@ -204,9 +205,6 @@ class GetUp(Motion):
                 return
         while self._tries.total() < MAX_TRIES:
             lying = self._lying
-            if lying is Lying.BACK:
-                self._failure = ON_ITS_BACK
-                return
             self._tries[lying] += 1
             if lying is not Lying.BELLY:
                 yield from self._turn_over(lying)
@@ -224,6 +222,9 @@ class GetUp(Motion):
 
     def _turn_over(self, lying: Lying) -> Iterator[None]:
         """Try one of the recoveries from a side, the next one when that was tried before."""
+        if lying is Lying.BACK and len(self._robot.names) > LEG_JOINTS:
+            self._failure = WITH_AN_ARM
+            return
         recoveries = RECOVERIES[lying]
         for stage in recoveries[(self._tries[lying] - 1) % len(recoveries)]:
             targets = self._robot.with_legs(stage.legs, self._last)
@@ -231,10 +232,10 @@ class GetUp(Motion):
             if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > REACH_TOLERANCE:
                 self._failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
                 return
-            self._start_stage(reached, stage.speed)
+            self._start_stage(reached, stage.speed, stage.duration)
             self.text = f'lies {lying.value}; turns over, try {self._tries[lying]}'
             yield
-            if self._lying is not lying:
+            if stage.duration is None and self._lying is not lying:
                 return
 
     def _stand_up(self) -> Iterator[None]:
@@ -266,8 +267,14 @@ class GetUp(Motion):
             self._time, self._deadline = 0.0, REST_DEADLINE
             yield
 
-    def _start_stage(self, targets: Targets, speed: float) -> None:
-        """Begin a stage that leads to a pose."""
+    def _start_stage(
+        self, targets: Targets, speed: float, swing_time: float | None = None
+    ) -> None:
+        """Begin a stage that leads to a pose, softly or by a swing that takes a time [s]."""
+        if swing_time is not None:
+            self._motion = Swing(self._last, targets, speed, swing_time)
+            self._time, self._deadline = 0.0, math.inf
+            return
         blend = Blend(self._last, targets, speed, MIN_BLEND_TIME)
         self._motion = blend
         self._time, self._deadline = 0.0, blend.duration + REST_DEADLINE

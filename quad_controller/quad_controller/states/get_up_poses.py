@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Poses of the legs that turn a robot from its side, nose or tail onto its belly.
+"""Poses of the legs that turn a robot from its back, side, nose or tail onto its belly.
 
 They are data, for the XGO of quad_description. ``bench/search_get_up.py`` searches such poses in
 physics, and leaves out those in which legs touch each other or the trunk; those of the sides were
 found by looking at the outline: which points touch the ground, and on what side of them the centre
-of mass is. ``bench/bench_get_up.py`` measures what they are worth. Another robot needs its own.
+of mass is. The swings off the back lift it by 7 cm, over the tail.
+``bench/bench_get_up.py`` measures what they are worth. Another robot needs its own.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from quad_description.rotations import Vector
 from .lying import Lying
 
 _SPEED = 3.0  # [rad/s]
+_SWING_SPEED = 10.0  # [rad/s], all that the URDF lets a joint have
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +30,20 @@ class Stage:
         legs: Hip, thigh and calf of each leg in [rad], in the order of
             :data:`quad_description.LEGS`.
         speed: Of the fastest joint in [rad/s].
+        duration: Of a swing in [s], in which each joint goes as fast as that, and which the next
+            stage follows at once, wherever the body is; None for going softly and coming to rest.
     """
 
     legs: Sequence[Vector]
     speed: float
+    duration: float | None = None
 
     @property
     def mirrored(self) -> Stage:
         """The same for a robot that is this one's mirror image, left for right."""
         front_left, front_right, back_left, back_right = self.legs
-        return Stage((front_right, front_left, back_right, back_left), self.speed)
+        legs = front_right, front_left, back_right, back_left
+        return Stage(legs, self.speed, self.duration)
 
 
 def _on_left(lower: Vector, upper: Vector) -> Stage:
@@ -45,9 +51,14 @@ def _on_left(lower: Vector, upper: Vector) -> Stage:
     return Stage((lower, upper, lower, upper), _SPEED)
 
 
-def _ends(front: Vector, back: Vector) -> Stage:
+def _ends(front: Vector, back: Vector, speed: float = _SPEED) -> Stage:
     """Return a stage in which left and right do the same."""
-    return Stage((front, front, back, back), _SPEED)
+    return Stage((front, front, back, back), speed)
+
+
+def _swing(duration: float, front: Vector, back: Vector) -> Stage:
+    """Return a swing in which left and right do the same."""
+    return Stage((front, front, back, back), _SWING_SPEED, duration)
 
 
 Recovery = tuple[Stage, ...]
@@ -73,14 +84,32 @@ _OFF_THE_TAIL: tuple[Recovery, ...] = (
         _ends(front=_STRAIGHT, back=(-0.2, -1.2, -0.5)),
     ),
 )
+_OFF_THE_BACK: tuple[Recovery, ...] = (
+    (
+        # drawn in, with the feet on the ground
+        _ends(front=(-0.44, -0.97, 0.11), back=(0.43, -0.93, 0.79)),
+        # a kick rears it up, onto tail and hind feet
+        _swing(0.06, front=(-0.48, -0.17, 0.04), back=(0.49, -0.57, 0.31)),
+        _swing(0.26, front=(0.35, 0.94, 0.82), back=(-0.38, -1.22, -1.13)),
+        # front legs thrown to the belly pull it over the tail
+        _swing(0.3, front=(0.11, 0.03, 0.25), back=(0.12, -0.4, -0.76)),
+        # and it comes down on its legs
+        _ends(front=(0.2, -0.29, -0.06), back=(0.03, -0.33, -0.6), speed=_SWING_SPEED),
+    ),
+    (  # for those that the first one leaves on the back
+        _ends(front=(-0.45, -0.99, 0.14), back=(0.46, -0.93, 0.81)),
+        _swing(0.06, front=(-0.5, -0.34, -0.07), back=(0.49, -0.53, 0.35)),
+        _swing(0.3, front=(0.37, 0.94, 0.82), back=(-0.39, -1.22, -1.13)),
+        _swing(0.3, front=(0.12, 0.09, 0.26), back=(0.09, -0.41, -0.69)),
+        _ends(front=(0.21, -0.34, -0.11), back=(0.05, -0.43, -0.55), speed=_SWING_SPEED),
+    ),
+)
 
 RECOVERIES: Mapping[Lying, tuple[Recovery, ...]] = {
     Lying.LEFT: (_ROLL,),
     Lying.RIGHT: (tuple(stage.mirrored for stage in _ROLL),),
     Lying.NOSE: _OFF_THE_NOSE,
     Lying.TAIL: _OFF_THE_TAIL,
+    Lying.BACK: _OFF_THE_BACK,
 }
-"""For each side, in the order in which they are tried.
-
-None leads up from the back: see the README, "Measured in simulation".
-"""
+"""For each side, in the order in which they are tried."""

@@ -13,7 +13,6 @@ from quad_description.rotations import Vector
 from ..gait.velocity import REST
 from ..policy.interface import Policy, PolicyInputs
 from .faults import Fault
-from .lying import Lying, lying_on
 from .parameters import StateParameters
 
 REFUSAL_LIFE = 0.2
@@ -222,8 +221,9 @@ class Health:
         most, fastest = self._parameters.max_tilt, self._parameters.max_turn_rate
         if imu.tilt > most:
             angles = f'{math.degrees(imu.tilt):.0f} deg, more than {math.degrees(most):.0f}'
-            mode = '' if lying_on(imu.down) is Lying.BACK else ', or request the mode get_up'
-            return f'the body is tilted by {angles}; put it on its feet{mode}'
+            return (
+                f'the body is tilted by {angles}; put it on its feet, or request the mode get_up'
+            )
         rates = f'{_turn_rate(imu):.1f} rad/s, faster than {fastest:g}'
         return f'the body turns at {rates}; when it does not, /imu is wrong: look at the cable'
 

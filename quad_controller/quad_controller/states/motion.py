@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can move the joints, one thing at a time: holding, going to a pose, walking."""
+"""What can move the joints, one thing at a time: holding, going to a pose, swinging, walking."""
 
 from __future__ import annotations
 
@@ -140,6 +140,36 @@ class Blend(Motion):
             return self._end
         share = 0.5 * (1.0 - math.cos(math.pi * self._time / self.duration))
         return tuple(a + share * (b - a) for a, b in zip(self._start, self._end, strict=True))
+
+
+class Swing(Motion):
+    """Takes each joint to a pose by itself, as fast as it may: no soft start, no common end."""
+
+    def __init__(self, start: Targets, end: Targets, speed: float, duration: float) -> None:
+        """Plan it.
+
+        Args:
+            start: Where the joints are in [rad].
+            end: Where they shall be in [rad]; those that are not there in time are left short.
+            speed: Speed of each joint in [rad/s].
+            duration: How long it takes in [s].
+        """
+        self._targets, self._end, self._speed = start, end, speed
+        self._left = duration
+
+    @property
+    def finished(self) -> bool:
+        """Whether its time is over."""
+        return self._left < 1e-6
+
+    def step(self, situation: Situation, dt: float) -> Targets:
+        """Return the next targets."""
+        self._left -= dt
+        most = self._speed * dt
+        self._targets = tuple(
+            a + min(max(b - a, -most), most) for a, b in zip(self._targets, self._end, strict=True)
+        )
+        return self._targets
 
 
 class Walk(Motion):
