@@ -166,7 +166,7 @@ def test_a_robot_that_fell_gets_up(robot: Robot) -> None:
     robot.orientation = (1.0, 0.0, 0.0, 0.0)
     robot.until_state('fault')
     assert robot.mode('get_up').message == 'get_up, coming from fault'
-    robot.until_logged('lies on its back; turns over, try 1')
+    robot.until_logged('lies on its back; throws itself over at full speed, stand clear, try 1')
 
 
 def test_a_policy_gets_it_up_where_a_parameter_names_one(

@@ -226,14 +226,17 @@ class GetUp(Motion):
             self._failure = WITH_AN_ARM
             return
         recoveries = RECOVERIES[lying]
-        for stage in recoveries[(self._tries[lying] - 1) % len(recoveries)]:
+        stages = recoveries[(self._tries[lying] - 1) % len(recoveries)]
+        swings = any(stage.duration is not None for stage in stages)
+        how = 'throws itself over at full speed, stand clear' if swings else 'turns over'
+        for stage in stages:
             targets = self._robot.with_legs(stage.legs, self._last)
             reached = self._robot.clamp(targets)
             if max(abs(a - b) for a, b in zip(reached, targets, strict=True)) > REACH_TOLERANCE:
                 self._failure = f'the joints of this robot do not reach the poses; {BY_HAND}'
                 return
             self._start_stage(reached, stage.speed, stage.duration)
-            self.text = f'lies {lying.value}; turns over, try {self._tries[lying]}'
+            self.text = f'lies {lying.value}; {how}, try {self._tries[lying]}'
             yield
             if stage.duration is None and self._lying is not lying:
                 return
