@@ -11,8 +11,8 @@ less what links come too near to each other, which physics lets pass. What is fo
 Python, for `quad_controller/states/get_up_poses.py`.
 
     python search_get_up.py left --speeds 3 3 --rounds 20
-    python search_get_up.py back --speeds 3 --swings 4 --rounds 60
-    python search_get_up.py back --speeds 3 --swings 4 --refine      # the first one of the module
+    python search_get_up.py back --speeds 3 --swings 4 --rounds 60 --cost 0  # touching legs first
+    python search_get_up.py back --speeds 3 --swings 4 --refine  # what the module has
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from quad_description import LEGS
 
 Array = npt.NDArray[np.float64]
 
-POPULATION, ELITE = 120, 14  # ways in a round, and those that the next one is drawn around
-ROBOTS, FEW = 10, 3  # a few robots choose, all judge
+POPULATION, ELITE = 250, 24  # ways in a round, and those that the next one is drawn around
+ROBOTS, FEW = 10, 3  # one robot chooses, a few where a way is refined; all judge
 KEEP = 0.3  # share of mean and spread that stays in a round
 SPREAD, NEAR_SPREAD, LEAST_SPREAD = 0.4, 0.06, 0.015  # of the range of a joint
 HOLD_TIME = 0.6  # [s] after each pose, in which the body comes to rest
 SWING_SPEED = 10.0  # [rad/s]
 SWING_TIMES = (0.02, 0.42)  # [s]
 PERIOD = 0.02  # [s] between two targets
-CLEARANCE, NEARNESS_COST = 0.004, 100.0  # [m], per [m] below it
+CLEARANCE = 0.004  # [m]
 SIDES = {'left': Lying.LEFT, 'nose': Lying.NOSE, 'tail': Lying.TAIL, 'back': Lying.BACK}
 LEG = MODEL.leg_indices[0]
 LOWER = np.array([MODEL.limits[index].lower for index in LEG] * 2)
@@ -213,13 +213,14 @@ def upright(states: Array) -> Array:
     return np.asarray(1.0 - 2.0 * (x * x + y * y))
 
 
-def search(form: Form, rounds: int, seed: int, near: Recovery | None = None) -> None:
+def search(form: Form, rounds: int, seed: int, cost: float, near: Recovery | None = None) -> None:
     """Print the mean of the ways that were drawn last, again and again.
 
     Args:
         form: Of the ways.
         rounds: How many.
         seed: Of everything random.
+        cost: Of links that come nearer to each other than they may, per [m].
         near: A way to begin at; None for anywhere.
     """
     random, robots = np.random.default_rng(seed), Fallen(form, ROBOTS)
@@ -228,21 +229,23 @@ def search(form: Form, rounds: int, seed: int, near: Recovery | None = None) -> 
     begun = time.monotonic()
     for number in range(rounds):
         ways = random.normal(mean, spread, (POPULATION, form.size)).clip(0.0, 1.0)
-        few = random.choice(ROBOTS, FEW, replace=False).tolist()
+        few = random.choice(ROBOTS, FEW if near else 1, replace=False).tolist()
         trajectories = robots.trajectories(ways, few)
         up = upright(trajectories)
         scores = up[..., -100:].mean(axis=(1, 2)) + 1.5 * up[..., 300:].max(axis=2).mean(axis=1)
         best = np.argsort(scores)[: -3 * ELITE - 1 : -1]
         for way in best:
-            least = robots.nearest(trajectories[way, 0])
-            scores[way] -= NEARNESS_COST * max(CLEARANCE - least, 0.0)
+            least = robots.nearest(trajectories[way, 0]) if cost else CLEARANCE
+            scores[way] -= cost * max(CLEARANCE - least, 0.0)
         elite = ways[best[np.argsort(scores[best])[: -ELITE - 1 : -1]]]
         mean = KEEP * mean + (1.0 - KEEP) * elite.mean(axis=0)
         spread = KEEP * spread + (1.0 - KEEP) * elite.std(axis=0)
         spread = np.maximum(spread, LEAST_SPREAD)
         if number % 5 == 4 or number == rounds - 1:
             ends = upright(robots.trajectories(mean[None], range(ROBOTS)))[0]
-            print(f'{time.monotonic() - begun:4.0f} s, {(number + 1) * POPULATION * FEW} tries:')
+            print(
+                f'{time.monotonic() - begun:4.0f} s, {(number + 1) * POPULATION * len(few)} tries:'
+            )
             print(f'  at the end {np.round(ends[:, -100:].mean(axis=1), 2).tolist()}')
             print(f'  at best    {np.round(ends[:, 300:].max(axis=1), 2).tolist()}')
             print(form.python_of(mean), flush=True)
@@ -255,12 +258,13 @@ def main() -> None:
     parser.add_argument('--speeds', type=float, nargs='+', default=[3.0, 6.0], help='[rad/s]')
     parser.add_argument('--swings', type=int, default=0, help='that follow')
     parser.add_argument('--refine', action='store_true', help='begin at what is known')
+    parser.add_argument('--cost', type=float, default=100.0, help='of links too near, per [m]')
     parser.add_argument('--rounds', type=int, default=30)
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args()
     form = Form(SIDES[options.side], options.speeds, options.swings)
     near = RECOVERIES[form.side][0] if options.refine else None
-    search(form, options.rounds, options.seed, near)
+    search(form, options.rounds, options.seed, options.cost, near)
 
 
 if __name__ == '__main__':
