@@ -130,6 +130,8 @@ def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> Process
         values['policy'] = str(stack.policy)
     if stack.record is not None:
         values['record'] = str(stack.record)
+    if stack.simulate:  # nobody is hurt, and nothing breaks
+        values['get_up_swings'] = 'true'
     executable = Executable('quad_controller', 'controller_node')
     return ProcessSpec(
         name='controller',

@@ -106,7 +106,7 @@ def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
     lay = lying_on(state.imu.down)
     if only and lay is not side:
         return Outcome(lay, False, 0.0, '')
-    controller = Controller(MODEL, GaitParameters(), StateParameters())
+    controller = Controller(MODEL, GaitParameters(), StateParameters(get_up_swings=True))
     state = backend.step(controller.step(state, backend.period).targets)
     answer = controller.set_mode('get_up')
     begun = state.time

@@ -35,6 +35,7 @@ ATTITUDES: dict[Lying, Quaternion] = {
     Lying.BACK: about((1.0, 0.0, 0.0), math.pi),
 }
 MAX_DURATION = 200.0  # [s] that all tries together may take
+SWINGING = StateParameters(get_up_swings=True)
 
 
 def lying(side: Lying) -> ImuSample:
@@ -44,7 +45,7 @@ def lying(side: Lying) -> ImuSample:
 
 def fallen(side: Lying, controller: Controller | None = None) -> Rig:
     """Return a robot that fell while it stood, and lies on a side."""
-    rig = Rig(controller)
+    rig = Rig(controller or Controller(ROBOT, GaitParameters(), SWINGING))
     rig.step()
     rig.ask('stand')
     rig.until(State.STAND)
@@ -146,9 +147,26 @@ def test_it_may_be_asked_for_in_any_mode(mode: str) -> None:
     assert rig.controller.status.title == (mode if on_its_feet else 'stand')
 
 
+def test_on_its_back_it_moves_nothing_unless_that_is_allowed() -> None:
+    """Neither at the request, nor when it rolls there while it gets up."""
+    rig = fallen(Lying.BACK, Controller(ROBOT, GaitParameters(), StateParameters()))
+    held = rig.positions
+    answer = rig.controller.set_mode('get_up')
+    assert not answer.accepted
+    assert 'allow that by the parameter get_up_swings' in answer.message
+    rig.run(1.0)
+    assert rig.positions == held
+    rig.imu = lying(Lying.LEFT)
+    rig.step()
+    rig.ask('get_up')
+    rig.run(1.5)
+    rig.imu = lying(Lying.BACK)
+    assert 'allow that by the parameter get_up_swings' in gives_up(rig)
+
+
 def test_with_an_arm_on_its_back_it_says_so_and_moves_nothing() -> None:
     """With what a person has to do; on its feet again, the fall is cleared."""
-    controller = Controller(ARM_ROBOT, GaitParameters(), StateParameters())
+    controller = Controller(ARM_ROBOT, GaitParameters(), SWINGING)
     rig = Rig(controller, FOLDED + (0.0,) * (len(ARM_ROBOT.names) - len(FOLDED)))
     rig.imu = lying(Lying.BACK)
     rig.step()
@@ -332,7 +350,7 @@ def test_there_is_a_way_down(mode: str) -> None:
 
 def policy_rig(policy: StillPolicy) -> Rig:
     """Return a robot whose get_up follows a policy, on its back."""
-    controller = Controller(ROBOT, GaitParameters(), StateParameters(), get_up_policy=policy)
+    controller = Controller(ROBOT, GaitParameters(), SWINGING, get_up_policy=policy)
     return fallen(Lying.BACK, controller)
 
 

@@ -51,7 +51,7 @@ def test_no_pose_presses_a_leg_into_another_one(stage: Stage) -> None:
 def test_no_swing_presses_a_leg_into_another_one() -> None:
     """From the first pose off the back, on the way that the joints really take."""
     backend = fallen(1000, Lying.BACK)
-    controller = Controller(MODEL, GaitParameters(), StateParameters())
+    controller = Controller(MODEL, GaitParameters(), StateParameters(get_up_swings=True))
     state = backend.step(controller.step(backend.observe(), backend.period).targets)
     assert controller.set_mode('get_up').accepted
     first, *_, last = (np.array(stage.legs).ravel() for stage in RECOVERIES[Lying.BACK][0])

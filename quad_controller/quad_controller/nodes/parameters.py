@@ -240,4 +240,9 @@ def _states(read: ParameterReader) -> StateParameters:
             default=False,
             meaning='the gait walks on when a policy fails, instead of standing',
         ),
+        get_up_swings=read.flag(
+            'get_up_swings',
+            default=False,
+            meaning='the mode get_up may throw the robot off its back, at full speed',
+        ),
     )

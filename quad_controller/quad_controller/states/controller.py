@@ -478,7 +478,8 @@ class Controller:
         if request.state is State.GET_UP:
             if self._machine.state in ON_FEET:
                 return 'it is on its legs, and tilted; a fall stops it, then it may get up'
-            return get_up_refusal(self._health, self._latch, self._get_up_policy)
+            swings = self._parameters.get_up_swings
+            return get_up_refusal(self._health, self._latch, self._get_up_policy, swings=swings)
         if self._latch.texts:
             return (
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '

@@ -48,6 +48,11 @@ LEG_JOINTS = 12  # of a robot without an arm
 REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
+ON_ITS_BACK = (
+    'it lies on its back, and only a throw at full speed is known to turn it over, tried in '
+    'simulation alone: put it on its feet or on a side by hand, or allow that by the parameter '
+    'get_up_swings and stand clear; then request get_up again'
+)
 WITH_AN_ARM = (
     'it lies on its back and its arm, and how it turns over there is not known; put it on its '
     'feet or on a side by hand, then request get_up again'
@@ -92,13 +97,16 @@ def stands(imu: ImuSample | None) -> bool:
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
 
 
-def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> str:
+def get_up_refusal(
+    health: Health, latch: FaultLatch, policy: Policy | None, *, swings: bool
+) -> str:
     """Return why a robot cannot get up now, nothing when it may try.
 
     Args:
         health: What is measured.
         latch: The latched faults; a fall is what getting up is for.
         policy: What brings it to its feet; None for the poses.
+        swings: Whether it may throw itself off its back.
     """
     if others := latch.texts_without(Fault.FALLEN):
         return f'{"; ".join(others)}; call ~/clear_fault when that is corrected'
@@ -112,6 +120,8 @@ def get_up_refusal(health: Health, latch: FaultLatch, policy: Policy | None) -> 
         return health.uncertainty
     if health.spins:
         return 'it turns faster than max_turn_rate: wait until it is at rest, or look at the gyro'
+    if not swings and policy is None and lying_on(imu.down) is Lying.BACK:
+        return ON_ITS_BACK
     return health.unmeasured(policy)
 
 
@@ -128,6 +138,8 @@ class GetUp(Motion):
         last: Targets,
         final: FinalPoses,
         policy: Policy | None = None,
+        *,
+        swings: bool = False,
     ) -> None:
         """Begin with waiting for rest.
 
@@ -136,8 +148,10 @@ class GetUp(Motion):
             last: The last targets of all joints in [rad].
             final: Where it leads.
             policy: What brings it to its feet before poses are tried; None for the poses alone.
+            swings: Whether it may throw itself off its back.
         """
         self._robot, self._last, self._final, self._policy = robot, last, final, policy
+        self._swings = swings
         self._motion: Motion = Hold(last, math.inf)
         self._deadline = REST_DEADLINE
         self._time = self._blind = 0.0
@@ -228,6 +242,9 @@ class GetUp(Motion):
         recoveries = RECOVERIES[lying]
         stages = recoveries[(self._tries[lying] - 1) % len(recoveries)]
         swings = any(stage.duration is not None for stage in stages)
+        if swings and not self._swings:
+            self._failure = ON_ITS_BACK
+            return
         how = 'throws itself over at full speed, stand clear' if swings else 'turns over'
         for stage in stages:
             targets = self._robot.with_legs(stage.legs, self._last)

@@ -331,7 +331,8 @@ class StateMachine:
     def _get_up(self, last: Targets) -> GetUp:
         self._generator.others = self._poses.with_arm(last)
         final = FinalPoses(self._poses.lying(last), self._generator.stand_targets)
-        return GetUp(self._poses.robot, last, final, self._get_up_policy)
+        swings = self._parameters.get_up_swings
+        return GetUp(self._poses.robot, last, final, self._get_up_policy, swings=swings)
 
     def _stand(self, last: Targets) -> None:
         self._generator.others = self._poses.with_arm(last)

@@ -33,6 +33,7 @@ class StateParameters:
         setpoint_speed_ratio: Speed of a set-point per speed of its joint; a soft servo that is
             compensated for has its set-point further ahead, and needs 2.
         policy_fallback_walks: Whether the gait goes on walking when a policy fails, or stands.
+        get_up_swings: Whether the mode get_up may throw the robot off its back, at full speed.
     """
 
     period: float = 0.02
@@ -52,6 +53,7 @@ class StateParameters:
     hold_band: float = 0.25
     setpoint_speed_ratio: float = 1.0
     policy_fallback_walks: bool = False
+    get_up_swings: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.
