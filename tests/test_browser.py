@@ -43,6 +43,7 @@ STARTING = 90.0  # [s]
 REACTION = 15.0  # [s] until a motion begins or ends on a busy machine; real ones are far shorter
 REST = 0.6  # [s] of joint states without motion
 MOVES = 0.01  # [rad/s]
+UNDER_WAY = 0.05  # [rad] from its start: STOP names joints that move, and a motion starts softly
 JOG, TARGETS, DRIVES, PLAN = 'Jog', 'Targets', 'Drives', 'Plan'
 TURN, TURN_BACK = '+ about z', '− about z'
 WRIST = 'panda_joint7'
@@ -282,8 +283,8 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     page = seen.show(TARGETS)
     seen.unlock()
     chromium.drag(page, JOINT1, 0.1)
-    wanted = chromium.slider_value(page, JOINT1)
-    seen.wait(seen.moves, 'a motion')
+    wanted, start = chromium.slider_value(page, JOINT1), seen.position()
+    seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
     page.keyboard.press('Space')
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.2

@@ -54,12 +54,15 @@ def assert_replayed(rig: NodeRig, env: dict[str, str], log: Path) -> None:
         messages.clear()
     with RunningProcess(replay_command(log, 'loop:=true', 'rate:=2.0'), env) as player:
         rig.wait_for_status('serial link', DiagnosticStatus.OK, 'reports arrive')
-        rig.receive('/joint_states', 100)
+        known = {tuple(message.position) for message in live['/joint_states']}
+        states = rig.received['/joint_states']
+
+        def moves() -> bool:
+            return len(known & {tuple(message.position) for message in states}) >= 3
+
+        rig.client.spin_until(moves, 20.0, 'a motion, to the bit as it was')
         player.wait_for('stale: no report')
         assert player.stop() == 0, player.output
-    positions = {tuple(message.position) for message in rig.received['/joint_states']}
-    known = {tuple(message.position) for message in live['/joint_states']}
-    assert len(positions & known) >= 3  # it moves, to the bit as it did
     for topic in ('/imu', '/odom', '/battery_state', '/tf'):
         assert rig.received[topic], topic
     ours, theirs = rig.received['/imu'][-1], live['/imu'][-1]

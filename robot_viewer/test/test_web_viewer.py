@@ -34,7 +34,7 @@ from robot_viewer.page.robot_page import RobotPage
 pytestmark = pytest.mark.scenario
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-TIMEOUT = 20.0  # [s]
+TIMEOUT = 60.0  # [s]
 TWIST = (0.0, 0.0, 0.3, 0.0, 0.0, 0.0)
 
 

@@ -3,7 +3,7 @@
 """Publishes numbered messages for the recording tests.
 
 The number of messages and their period [s] are arguments; the first waits for the subscriptions.
-After SIGUSR1 as many follow once more.
+After SIGUSR1 as many follow once more; SIGINT ends it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ BEST_EFFORT = QoSProfile(  # type: ignore[no-untyped-call]
 def main() -> None:
     """Publish, and print `published`."""
     length, period = int(sys.argv[1]), float(sys.argv[2])
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
+    awaited = {signal.SIGUSR1, signal.SIGINT}
+    signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
     rclpy.init()
     node = Node('source')
     latched = node.create_publisher(String, 'latched', LATCHED)
@@ -43,10 +44,12 @@ def main() -> None:
     for number in count():
         numbers.publish(UInt32(data=number))
         loose.publish(UInt32(data=number))
-        time.sleep(period)
+        if signal.sigtimedwait({signal.SIGINT}, period) is not None:
+            return
         if (number + 1) % length == 0:
             print('published', flush=True)
-            signal.sigwait({signal.SIGUSR1})
+            if signal.sigwait(awaited) == signal.SIGINT:
+                return
 
 
 if __name__ == '__main__':
