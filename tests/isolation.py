@@ -19,7 +19,7 @@ from dds_network import restrict_dds
 DOMAINS = 100  # above, DDS ports run into the ephemeral ones
 RESERVATIONS = 24500  # a TCP port for each domain; who holds it has the domain
 
-_turn = itertools.count(os.getpid())
+_turn = itertools.count(37 * os.getpid())  # far from other workers, whose ids are next to it
 _logs = TemporaryDirectory(prefix='ros_logs_')  # and what black boxes write
 
 
