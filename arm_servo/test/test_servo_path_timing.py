@@ -169,6 +169,7 @@ def quick(name: str, end: Array, time: float) -> TrajectoryGoal:
 @settings(max_examples=4, deadline=None)
 @given(seed=st.integers(0, 10**6), time=st.floats(0.02, 0.5), count=st.integers(1, 4))
 @example(seed=573804, time=0.5, count=2)
+@example(seed=14016, time=0.5, count=3)
 def test_the_factor_of_a_refusal_suffices(name: str, seed: int, time: float, count: int) -> None:
     """What was refused for its time is accepted with as much more of it as the words say."""
     rng, limits = np.random.default_rng(seed), robot(name).limits

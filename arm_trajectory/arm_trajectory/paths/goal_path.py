@@ -47,7 +47,7 @@ MIN_APPROACH_MARGIN = 0.25
 START_TOLERANCE = 1e-3
 """How far from a first point without time the arm may be before it is taken there in [rad]."""
 
-MAX_ITERATIONS = 8
+MAX_ITERATIONS = 40
 """How often the time that suffices is improved."""
 
 QUANTITIES = (('rad/s', 'speed'), ('rad/s2', 'acceleration'), ('rad/s3', 'jerk'))
@@ -229,7 +229,7 @@ def _sufficient(points: Points, limits: JointLimits, state: RobotState, guess: f
             return factor
         if isinstance(answer, GoalPath):
             return factor
-        factor = _hundredths(factor * max(answer.factor, 1.01))
+        factor = _hundredths(factor * max(answer.factor, 1.02))
     return factor
 
 
