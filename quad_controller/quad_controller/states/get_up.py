@@ -44,7 +44,6 @@ STAND_SPEED = 1.5  # [rad/s]
 POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
 EASE_TIME = 0.3  # [s] over which a policy takes over
 
-LEG_JOINTS = 12  # of a robot without an arm
 REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
 BY_HAND = 'put it on its feet by hand, then call ~/clear_fault, or request get_up again'
@@ -236,7 +235,7 @@ class GetUp(Motion):
 
     def _turn_over(self, lying: Lying) -> Iterator[None]:
         """Try one of the recoveries from a side, the next one when that was tried before."""
-        if lying is Lying.BACK and len(self._robot.names) > LEG_JOINTS:
+        if lying is Lying.BACK and self._robot.others:
             self._failure = WITH_AN_ARM
             return
         recoveries = RECOVERIES[lying]
