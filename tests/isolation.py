@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import itertools
 import os
-from pathlib import Path
-import re
 import socket
 from tempfile import TemporaryDirectory
 
@@ -58,15 +56,6 @@ class Isolation:
         return env
 
 
-def _clean(domain_id: int) -> None:
-    """Remove what killed processes left in the shared memory of a domain: others wait for it."""
-    first = 7400 + 250 * domain_id  # the ports of DDS (RTPS 2.5, 9.6.1.1)
-    for path in Path('/dev/shm').glob('*fastrtps_port*'):
-        number = re.search(r'port(\d+)', path.name)
-        if number is not None and first <= int(number[1]) < first + 250:
-            path.unlink(missing_ok=True)
-
-
 @contextmanager
 def reserve() -> Iterator[Isolation]:
     """Reserve a ROS domain and a CAN bus, against all processes of this machine that do the same.
@@ -84,7 +73,6 @@ def reserve() -> Iterator[Isolation]:
                 reservation.bind(('127.0.0.1', RESERVATIONS + domain_id))
             except OSError:
                 continue
-            _clean(domain_id)
             yield Isolation(domain_id)
             return
     raise RuntimeError('all ROS domains are taken; do tests of this machine hang?')

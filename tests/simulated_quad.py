@@ -86,6 +86,7 @@ class SimulatedQuad:
                 self._stack.enter_context(self.tap)
             for name in ('hardware', 'controller'):
                 self.start(name)
+            self.client.spin_until(lambda: bool(self.truth), TIMEOUT, 'ground truth')
         except BaseException:
             self._stack.close()
             raise
@@ -128,7 +129,6 @@ class SimulatedQuad:
 
     def spin(self, seconds: float) -> None:
         """Serve callbacks until the robot's clock has gone on by so many seconds."""
-        self.client.spin_until(lambda: bool(self.truth), 20.0, 'ground truth')
         begin = self._now()
         self.client.spin_until(lambda: self._now() >= begin + seconds, 60.0, 'robot time')
 

@@ -20,7 +20,7 @@ from network_link import Condition
 from processes import executable, RunningProcess
 import pytest
 
-from dds_network import NETWORK_VARIABLE, PROFILE_VARIABLE, restrict_dds
+from dds_network import NETWORK_VARIABLE, PROFILE_VARIABLE
 
 pytestmark = pytest.mark.scenario
 
@@ -44,13 +44,6 @@ def foreign(isolation: Isolation, **variables: str) -> dict[str, str]:
     for name in (PROFILE_VARIABLE, 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
         env.pop(name, None)
     return env | variables
-
-
-def beside(isolation: Isolation) -> dict[str, str]:
-    """Return the environment of a process of the robot's host that shares no memory with it."""
-    env = isolation.env | {'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
-    restrict_dds(env)
-    return env
 
 
 @contextmanager
@@ -86,7 +79,7 @@ def test_nobody_comes_in_uninvited(isolation: Isolation) -> None:
         assert robot.packets()[0] > 0  # they did knock
         assert robot.packets()[1] - before < 20  # ARP, ICMP and IGMP answer; DDS does not
         # a process of this host reaches it, also by the loopback interface alone
-        assert look(robot, beside(isolation), 3 * LOOK)['answer'] is True
+        assert look(robot, isolation.env, 3 * LOOK)['answer'] is True
 
 
 @pytest.mark.parametrize(
@@ -125,7 +118,7 @@ def test_a_link_that_is_cut_or_slow_stops_the_arm_and_heals(isolation: Isolation
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (
             brought_up(robot, isolation, '--network', robot.interface) as bringup,
-            robot.run([sys.executable, CLIENT, 'watch'], beside(isolation)) as watch,
+            robot.run([sys.executable, CLIENT, 'watch'], isolation.env) as watch,
             desk.run([executable('robot_viewer', 'web_viewer')], env) as viewer,
             held_key('1', desk.command(key), env),
         ):
@@ -157,7 +150,7 @@ def test_a_page_of_the_other_side_jogs_stops_with_the_link_and_heals(isolation: 
         env = isolation.env | {NETWORK_VARIABLE: desk.interface}
         with (
             brought_up(robot, isolation, '--network', robot.interface),
-            robot.run([sys.executable, CLIENT, 'watch'], beside(isolation)) as watch,
+            robot.run([sys.executable, CLIENT, 'watch'], isolation.env) as watch,
             desk.run([executable('robot_viewer', 'web_viewer')], env) as viewer,
             chromium.browser(desk.command([])) as browser,
         ):

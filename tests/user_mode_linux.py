@@ -88,9 +88,8 @@ def run_in_guest(command: Sequence[str], scratch: Path, timeout: float) -> tuple
         Exit code and output of the command; code -1 when the guest did not come to its end.
     """
     output, status, init = scratch / 'output', scratch / 'status', scratch / 'init.sh'
-    # shared memory and python's caches would be shared with the host's processes
+    # python's caches would be shared with the host's processes
     variables = dict(os.environ) | {
-        'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
         'PYTHONDONTWRITEBYTECODE': '1',
         'HYPOTHESIS_STORAGE_DIRECTORY': '/run/hypothesis',
         'TMPDIR': '/run',

@@ -19,7 +19,6 @@ RANGE_VARIABLE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 PEERS_VARIABLE = 'ROS_STATIC_PEERS'
 SERVER_VARIABLE = 'ROS_DISCOVERY_SERVER'
 LOCALHOST_ONLY_VARIABLE = 'ROS_LOCALHOST_ONLY'
-_TRANSPORTS_VARIABLE = 'FASTDDS_BUILTIN_TRANSPORTS'
 _RMW_VARIABLE = 'RMW_IMPLEMENTATION'
 _FAST_DDS = 'rmw_fastrtps'
 _OFF = 'OFF'
@@ -65,9 +64,7 @@ def dds_variables(environ: Mapping[str, str], reach: Reach) -> dict[str, str]:
     """
     if own_transports(environ):
         return {}
-    shared_memory = environ.get(_TRANSPORTS_VARIABLE) != 'UDPv4'
-    profile = profile_file(reach, shared_memory=shared_memory)
-    variables = {PROFILE_VARIABLE: str(profile)}
+    variables = {PROFILE_VARIABLE: str(profile_file(reach))}
     if environ.get(RANGE_VARIABLE) != _OFF:
         variables[RANGE_VARIABLE] = _PROFILE_DECIDES
     if environ.get(LOCALHOST_ONLY_VARIABLE) == '1':

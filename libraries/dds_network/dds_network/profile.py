@@ -15,7 +15,7 @@ from .exceptions import NetworkChoiceError
 from .reach import Reach
 
 LOCALHOST_PROFILE = Path(__file__).with_name('dds_network_localhost.xml')
-"""The profile with loopback and shared memory alone; all others are made from it."""
+"""The profile with loopback alone; all others are made from it."""
 PREFIX = 'dds_network_'
 """How the file of every profile of this package begins."""
 # RTPS 2.2, 9.6.1.4.1; naming peers takes the place of this default
@@ -28,19 +28,18 @@ def is_own_profile(path: str) -> bool:
     return Path(path).name.startswith(PREFIX)
 
 
-def profile_file(reach: Reach, *, shared_memory: bool = True) -> Path:
+def profile_file(reach: Reach) -> Path:
     """Return the file with a profile; it is written where it is not there.
 
     Args:
         reach: What DDS uses besides loopback.
-        shared_memory: False where processes do not share /dev/shm.
 
     Raises:
         NetworkChoiceError: It cannot be written.
     """
-    if reach.is_this_host and shared_memory:
+    if reach.is_this_host:
         return LOCALHOST_PROFILE
-    text = profile_text(reach, shared_memory=shared_memory)
+    text = profile_text(reach)
     name = f'{PREFIX}{hashlib.sha256(text.encode()).hexdigest()[:16]}.xml'
     folder = Path(tempfile.gettempdir()) / f'dds_network-{os.getuid()}'
     try:
@@ -49,7 +48,7 @@ def profile_file(reach: Reach, *, shared_memory: bool = True) -> Path:
         raise NetworkChoiceError(f'{folder}: {error.strerror or error}') from error
 
 
-def profile_text(reach: Reach, *, shared_memory: bool = True) -> str:
+def profile_text(reach: Reach) -> str:
     """Return a profile as XML; arguments as of :func:`profile_file`."""
     ET.register_namespace('', _NAMESPACE)
     root = ET.parse(LOCALHOST_PROFILE).getroot()  # noqa: S314  # our own file
@@ -60,9 +59,6 @@ def profile_text(reach: Reach, *, shared_memory: bool = True) -> str:
         first = _add(_add(_find(root, 'rtps'), 'builtin'), 'initialPeersList')
         for peer in (_DISCOVERY_GROUP, *reach.peers):
             _add(_add(_add(first, 'locator'), 'udpv4'), 'address').text = peer
-    if not shared_memory:
-        transports = _find(root, 'userTransports')
-        transports.remove(transports[0])
     return ET.tostring(root, encoding='unicode')
 
 

@@ -29,7 +29,7 @@ class Interface:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """What DDS uses besides loopback and shared memory.
+    """What DDS uses besides loopback.
 
     Attributes:
         interfaces: Interfaces on which its sockets receive.

@@ -36,16 +36,17 @@ def children(profile: str, tag: str) -> list[str]:
     return [element.text or '' for element in found]
 
 
-def test_the_default_is_loopback_and_shared_memory() -> None:
-    """Nothing else, whatever ROS's own variables say; a file that is always there."""
+def test_the_default_is_loopback_alone() -> None:
+    """Nothing else, whatever the variables of ROS and Fast DDS say; a file that is always there."""
     environ = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_LOCALHOST_ONLY': '1'}
+    environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'SHM'
     assert restrict_dds(environ) == Reach()
     assert environ[PROFILE_VARIABLE] == str(LOCALHOST_PROFILE)
     assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'
     assert environ['ROS_LOCALHOST_ONLY'] == '0'
     profile = LOCALHOST_PROFILE.read_text(encoding='utf-8')
     assert children(profile, 'interfaceWhiteList') == ['127.0.0.1']
-    assert texts(profile, 'type') == ['SHM', 'UDPv4']
+    assert texts(profile, 'type') == ['UDPv4']
     assert texts(profile, 'useBuiltinTransports') == ['false']
 
 
@@ -54,8 +55,6 @@ def test_an_open_profile_adds_interfaces_and_peers() -> None:
     profile = profile_text(OPEN)
     assert children(profile, 'interfaceWhiteList') == ['127.0.0.1', '10.0.0.5']
     assert texts(profile, 'address')[-2:] == ['239.255.0.1', '10.0.0.9']
-    without = profile_text(OPEN, shared_memory=False)
-    assert children(without, 'userTransports') == ['udp']
 
 
 def test_profiles_are_written_for_this_user_alone(

@@ -16,8 +16,6 @@ VIEWER = Executable('robot_viewer', 'web_viewer')
 """Serves the page, and says its URL when it is ready."""
 OFF = 'NO_VIEW'
 """Variable that leaves the page out, where it is neither empty nor 0."""
-WITHOUT_SHARED_MEMORY = {'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
-"""A page that hangs may hold a lock in the memory that all nodes share: the others would wait."""
 POLITE = ('nice', '-n', '5')
 """Whatever moves the robot comes first, from the start of the program on."""
 STOP_STEPS = (
@@ -63,7 +61,7 @@ def view_process(
     return ProcessSpec(
         name='viewer',
         argv=(*POLITE, *node_argv(VIEWER, find, ros.frame_parameters, ros=ros)),
-        environment={**LOG_FORMAT, **WITHOUT_SHARED_MEMORY},
+        environment=dict(LOG_FORMAT),
         notifies_ready=True,
         ready_timeout=ready_timeout,
         required=False,
