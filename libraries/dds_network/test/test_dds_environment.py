@@ -37,7 +37,7 @@ def children(profile: str, tag: str) -> list[str]:
 
 
 def test_the_default_is_loopback_alone() -> None:
-    """Nothing else, whatever the variables of ROS and Fast DDS say; a file that is always there."""
+    """Whatever the variables of ROS and Fast DDS say; a file that is always there."""
     environ = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_LOCALHOST_ONLY': '1'}
     environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'SHM'
     assert restrict_dds(environ) == Reach()
