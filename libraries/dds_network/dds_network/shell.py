@@ -16,14 +16,17 @@ from .environment import (
     NETWORK_VARIABLE,
     own_transports,
     PEERS_VARIABLE,
+    PROFILE_VARIABLE,
     RANGE_VARIABLE,
     selected_reach,
     SERVER_VARIABLE,
+    TRANSPORTS_VARIABLE,
 )
 from .exceptions import NetworkChoiceError
 from .reach import Reach
 
 _SUBNET = 'SUBNET'
+_UDP = 'UDPv4'
 
 
 def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
@@ -33,7 +36,16 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
         environ: The environment before it is changed.
         reach: What DDS may use.
     """
-    if own_transports(environ) or not reach.is_this_host:
+    if own_transports(environ):
+        yield describe_dds(environ)
+        return
+    transports = environ.get(TRANSPORTS_VARIABLE) or _UDP
+    if transports != _UDP:
+        yield (
+            f'{TRANSPORTS_VARIABLE}={transports} has no effect, DDS uses {_UDP} alone; for others, '
+            f'name a profile of your own in {PROFILE_VARIABLE}'
+        )
+    if not reach.is_this_host:
         yield describe_dds(environ)
         return
     without_effect = [

@@ -19,6 +19,7 @@ from dds_network import (
     restrict_dds,
 )
 from dds_network.profile import LOCALHOST_PROFILE, profile_file, profile_text
+from dds_network.shell import main
 
 OPEN = Reach((Interface('eth0', '10.0.0.5'),), ('10.0.0.9',))
 
@@ -122,3 +123,24 @@ def test_discovery_that_is_off_stays_off() -> None:
     environ = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF'}
     restrict_dds(environ)
     assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'OFF'
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'remedy'),
+    [
+        ('ROS_STATIC_PEERS', '10.0.0.9', f'export {NETWORK_VARIABLE}='),
+        ('ROS_DISCOVERY_SERVER', '10.0.0.9:11811', f'export {NETWORK_VARIABLE}='),
+        ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET', f'export {NETWORK_VARIABLE}='),
+        ('FASTDDS_BUILTIN_TRANSPORTS', 'SHM', PROFILE_VARIABLE),
+    ],
+)
+def test_a_shell_hears_which_setting_has_no_effect(
+    name: str, value: str, remedy: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With its remedy; one that changes nothing is not spoken of."""
+    assert main({'ROS_DISCOVERY_SERVER': '127.0.0.1', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}) == 0
+    assert not capsys.readouterr().err
+    assert main({name: value}) == 0
+    said = capsys.readouterr().err
+    assert f'{name}={value} has no effect' in said
+    assert remedy in said
