@@ -42,8 +42,8 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
     transports = environ.get(TRANSPORTS_VARIABLE) or _UDP
     if transports != _UDP:
         yield (
-            f'{TRANSPORTS_VARIABLE}={transports} has no effect, DDS uses {_UDP} alone; for others, '
-            f'name a profile of your own in {PROFILE_VARIABLE}'
+            f'{TRANSPORTS_VARIABLE}={transports} has no effect, DDS uses {_UDP} alone; for '
+            f'others, name a profile of your own in {PROFILE_VARIABLE}'
         )
     if not reach.is_this_host:
         yield describe_dds(environ)
