@@ -7,10 +7,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+import gc
 import itertools
 import os
 import socket
 from tempfile import TemporaryDirectory
+
+import psutil
 
 from dds_network import restrict_dds
 
@@ -56,15 +59,21 @@ class Isolation:
         return env
 
 
+def _is_in(domain_id: int) -> bool:
+    """Return whether this process has a participant of DDS in a domain."""
+    port = 7400 + 250 * domain_id  # it listens there for others (RTPS 2.5, 9.6.1.1)
+    return any(each.laddr[1] == port for each in psutil.Process().net_connections('udp'))
+
+
 @contextmanager
 def reserve() -> Iterator[Isolation]:
     """Reserve a ROS domain and a CAN bus, against all processes of this machine that do the same.
 
-    A domain is used again as late as possible: the nodes of a test that has just ended are
-    still discovered in its domain.
+    A domain is used again as late as possible: the nodes of a test that was killed are still
+    discovered in its domain.
 
     Raises:
-        RuntimeError: Every domain is reserved.
+        RuntimeError: Every domain is reserved, or this process has not left the one it had.
     """
     with socket.socket() as reservation:
         for _ in range(DOMAINS):
@@ -74,5 +83,9 @@ def reserve() -> Iterator[Isolation]:
             except OSError:
                 continue
             yield Isolation(domain_id)
+            if _is_in(domain_id):
+                gc.collect()
+                if _is_in(domain_id):
+                    raise RuntimeError(f'nodes of this process are left in domain {domain_id}')
             return
     raise RuntimeError('all ROS domains are taken; do tests of this machine hang?')

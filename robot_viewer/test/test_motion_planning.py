@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import closing
 import time
 from typing import Any
 
@@ -14,22 +15,19 @@ from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.msg import MoveItErrorCodes, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionIK
 import pytest
-import rclpy
 from rclpy.action.server import CancelResponse
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_motion_plan import SRDF
-from test_web_viewer import LATCHED, TIMEOUT
 from trajectory_msgs.msg import JointTrajectoryPoint
 from urdf_reader import Transform
 from urdf_robots import ARM
+from viewer_rig import in_domain, LATCHED, ViewerRig
 
-from node_runner import make_executor
 from node_runner.action_goals import serve_goals
 from robot_viewer.nodes.motion_planning import ANSWER_TIME
 from robot_viewer.nodes.planning_messages import box_message, changed
-from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.motion_plan import (
     AddBox,
     ChooseGoal,
@@ -94,12 +92,13 @@ class Server:
         return result
 
 
-class Planner:
+class Planner(ViewerRig):
     """What the page takes for a move_group, and a robot."""
 
     def __init__(self) -> None:
         """Offer it, with the page beside it."""
-        node = self.node = Node('move_group')
+        node = Node('move_group')
+        super().__init__(node)
         self.objects: dict[str, SceneObject] = {}
         self.asked: list[Any] = []
         self.events: list[String] = []
@@ -120,10 +119,6 @@ class Planner:
         states = node.create_publisher(JointState, 'joint_states', 10)
         state = JointState(name=['shoulder', 'lift', 'roll'], position=[0.1, 0.2, 0.3])
         node.create_timer(0.05, lambda: states.publish(state))
-        self.viewer = WebViewer()
-        self._executor = make_executor()
-        self._executor.add_node(node)
-        self._executor.add_node(self.viewer)
 
     @property
     def panel(self) -> PlanPanel:
@@ -135,18 +130,12 @@ class Planner:
     @property
     def said(self) -> str:
         """What the panel says."""
-        return self.panel._outcome.content
+        panel = self.viewer.page._plan
+        return panel._outcome.content if panel else ''
 
     def ask(self, request: PlanRequest) -> None:
         """Ask as a button of the page does."""
         self.panel._ask(request)
-
-    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Serve both nodes until something is true."""
-        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
-        while not condition():
-            assert self.node.get_clock().now().nanoseconds < deadline, f'{what}: {self.said}'
-            self._executor.spin_once(0.05)
 
     def plan(self) -> None:
         """Have a motion to the state 'up' planned."""
@@ -176,12 +165,6 @@ class Planner:
             answer.scene.world.collision_objects += scene.world.collision_objects
         return answer
 
-    def close(self) -> None:
-        """End both."""
-        self.viewer.page.close()
-        self.viewer.destroy_node()
-        self.node.destroy_node()
-
 
 def _trajectory() -> Any:
     trajectory = MoveGroup.Result().planned_trajectory
@@ -198,14 +181,11 @@ def _trajectory() -> Any:
 def planner(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Planner]:
     """Start the page beside a move_group, as if it were open, and wait for the panel."""
     monkeypatch.setattr(RobotPage, 'watched', True)
-    rclpy.init(args=['--ros-args', '-p', 'port:=8600'], domain_id=isolation.domain_id)
-    made = Planner()
-    made.spin_until(lambda: made.viewer.page._plan is not None, 'the panel')
-    made.spin_until(lambda: made.node.count_subscribers('joint_states') > 0, 'the page')
-    made.spin_until(lambda: len(made.viewer._positions) > 2, 'joint states')
-    yield made
-    made.close()
-    rclpy.shutdown()
+    with in_domain(isolation, 'port:=8600'), closing(Planner()) as made:
+        made.spin_until(lambda: made.viewer.page._plan is not None, 'the panel')
+        made.spin_until(lambda: made.node.count_subscribers('joint_states') > 0, 'the page')
+        made.spin_until(lambda: len(made.viewer._positions) > 2, 'joint states')
+        yield made
 
 
 def test_what_is_planned_is_executed_once(planner: Planner) -> None:

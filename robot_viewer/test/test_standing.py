@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
+from contextlib import closing
 import math
 import sys
 from types import SimpleNamespace
@@ -15,18 +16,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from isolation import Isolation
 import pytest
-import rclpy
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
-from test_web_viewer import LATCHED, TIMEOUT
 from urdf_reader import from_rpy, read_urdf, Vector
+from viewer_rig import in_domain, LATCHED, ViewerRig
 
-from node_runner import make_executor
 from quad_msgs.msg import FootContacts
 from robot_viewer.link_poses import link_poses
 from robot_viewer.nodes.body import Body
-from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.body_panel import BodyPanel, DOWN_COLOR
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.standing import (
@@ -200,21 +198,17 @@ def test_another_robot_has_nothing_of_the_one_before() -> None:
 def dog(isolation: Isolation, monkeypatch: pytest.MonkeyPatch) -> Iterator[Dog]:
     """Start a page beside it, as if it were open."""
     monkeypatch.setattr(RobotPage, 'watched', True)
-    rclpy.init(args=['--ros-args', '-p', 'port:=8700'], domain_id=isolation.domain_id)
-    made = Dog()
-    yield made
-    made.viewer.page.close()
-    made.viewer.destroy_node()
-    made.node.destroy_node()
-    rclpy.shutdown()
+    with in_domain(isolation, 'port:=8700'), closing(Dog()) as made:
+        yield made
 
 
-class Dog:
+class Dog(ViewerRig):
     """What the page takes for a quadruped."""
 
     def __init__(self) -> None:
         """Publish its description, and take poses of the body."""
-        node = self.node = Node('dog')
+        node = Node('dog')
+        super().__init__(node)
         self.poses: list[Pose] = []
         self.lift = 0.0
         node.create_subscription(Pose, 'body_pose', self.poses.append, 10)
@@ -225,10 +219,6 @@ class Dog:
         self._contacts = node.create_publisher(FootContacts, 'foot_contacts', 10)
         self.sends_contacts = True
         node.create_timer(0.05, self._publish)
-        self.viewer = WebViewer()
-        self._executor = make_executor()
-        self._executor.add_node(node)
-        self._executor.add_node(self.viewer)
         self._text.publish(String(data=URDF))
 
     @property
@@ -237,13 +227,6 @@ class Dog:
         panel = self.viewer.page._body
         assert panel is not None
         return panel
-
-    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Serve both nodes until something is true."""
-        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
-        while not condition():
-            assert self.node.get_clock().now().nanoseconds < deadline, what
-            self._executor.spin_once(0.05)
 
     def _publish(self) -> None:
         positions = [self.lift, 0.0, 0.0, 0.0]

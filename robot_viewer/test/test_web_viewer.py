@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from importlib import import_module
 import socket
 import threading
@@ -19,31 +19,29 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.service import Service
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
 from urdf_robots import ARM
+from viewer_rig import in_domain, LATCHED, ViewerRig
 
-from node_runner import make_executor, ParameterError
+from node_runner import ParameterError
 from robot_viewer.nodes import listening
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-TIMEOUT = 60.0  # [s]
 TWIST = (0.0, 0.0, 0.3, 0.0, 0.0, 0.0)
 
 
-class Robot:
+class Robot(ViewerRig):
     """What the page meets: services of drives, a servo, and a viewer beside it."""
 
     def __init__(self) -> None:
         """Offer them."""
-        self.node = Node('robot')
+        super().__init__(Node('robot'))
         self.calls: list[str] = []
         self.jogs: list[TwistStamped] = []
         self.states: list[JointState] = []
@@ -58,10 +56,6 @@ class Robot:
         )
         self.node.create_subscription(JointState, 'joint_states', self.states.append, 10)
         self.description = self.node.create_publisher(String, 'robot_description', LATCHED)
-        self.viewer = WebViewer()
-        self._executor = make_executor()
-        self._executor.add_node(self.node)
-        self._executor.add_node(self.viewer)
 
     def offer_stop(self) -> Service:
         """Offer to stop all of it, as a master does."""
@@ -91,19 +85,6 @@ class Robot:
 
         return answer
 
-    def spin_until(self, condition: Callable[[], bool], what: str) -> None:
-        """Serve both nodes until something is true."""
-        deadline = self.node.get_clock().now().nanoseconds + TIMEOUT * 1e9
-        while not condition():
-            assert self.node.get_clock().now().nanoseconds < deadline, what
-            self._executor.spin_once(0.05)
-
-    def close(self) -> None:
-        """End both."""
-        self.viewer.page.close()
-        self.viewer.destroy_node()
-        self.node.destroy_node()
-
 
 @pytest.fixture
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
@@ -117,11 +98,8 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
     """Start the page beside a robot."""
     assert opened
-    rclpy.init(args=['--ros-args', '-p', 'port:=8500'], domain_id=isolation.domain_id)
-    made = Robot()
-    yield made
-    made.close()
-    rclpy.shutdown()
+    with in_domain(isolation, 'port:=8500'), closing(Robot()) as made:
+        yield made
 
 
 def test_stop_halts_every_drive(robot: Robot) -> None:
@@ -251,8 +229,7 @@ def test_each_heartbeat_is_one_command(robot: Robot) -> None:
     robot.spin_until(lambda: len(robot.jogs) == 3, 'jogs')
     assert robot.jogs[0].twist.linear.z == pytest.approx(0.3)
     assert robot.jogs[0].header.stamp.sec > 0
-    for _ in range(20):
-        robot._executor.spin_once(0.02)
+    robot.spin_times(20)
     assert len(robot.jogs) == 3
 
 
@@ -266,8 +243,7 @@ def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
     robot.spin_until(lambda: robot.viewer._joint_states is None, 'the end of the sliders')
     count = len(robot.states)
     robot.viewer.publish_joints(dict.fromkeys(names, 0.0))
-    for _ in range(20):
-        robot._executor.spin_once(0.02)
+    robot.spin_times(20)
     assert len(robot.states) == count
     robot.node.destroy_publisher(other)
 
@@ -334,8 +310,7 @@ def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
     assert controllers.found['/arm_controller'].busy
     robot.viewer.aim('/arm_controller', {'a': 2.0}, 0.5)
     robot.viewer.stop()
-    for _ in range(20):
-        robot._executor.spin_once(0.02)
+    robot.spin_times(20)
     assert len(sent) == 1
     assert not controllers.found['/arm_controller'].busy
     assert controllers.history.of('a')[-1].target == 0.5
@@ -360,9 +335,6 @@ def test_a_host_that_is_none_of_this_computer_is_refused(
         return find(name, *arguments, **options)
 
     monkeypatch.setattr(socket, 'getaddrinfo', found)
-    rclpy.init(args=['--ros-args', '-p', f'host:={host}'], domain_id=isolation.domain_id)
-    try:
-        with pytest.raises(ParameterError, match=f"host is '{host}': .*; give an address"):
-            WebViewer()
-    finally:
-        rclpy.shutdown()
+    refusal = f"host is '{host}': .*; give an address"
+    with in_domain(isolation, f'host:={host}'), pytest.raises(ParameterError, match=refusal):
+        WebViewer()
