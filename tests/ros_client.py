@@ -102,8 +102,13 @@ class RosClient:
     ) -> None:
         """Leave the domain."""
         self._executor.shutdown()
-        for waitable in list(self.node.waitables):
-            if isinstance(waitable, (ActionClient, ActionServer)):
-                waitable.destroy()  # rclpy leaves it, and it keeps the node in its domain
-        self.node.destroy_node()
+        destroy_with_actions(self.node)
         rclpy.shutdown(context=self._context)
+
+
+def destroy_with_actions(node: Node) -> None:
+    """Destroy a node, and its actions, which rclpy leaves: they keep it in its domain."""
+    for waitable in list(node.waitables):
+        if isinstance(waitable, (ActionClient, ActionServer)):
+            waitable.destroy()
+    node.destroy_node()

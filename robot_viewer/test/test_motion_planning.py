@@ -23,8 +23,9 @@ from test_motion_plan import SRDF
 from trajectory_msgs.msg import JointTrajectoryPoint
 from urdf_reader import Transform
 from urdf_robots import ARM
-from viewer_rig import in_domain, LATCHED, ViewerRig
+from viewer_rig import in_domain, ViewerRig
 
+from node_runner import LATCHED
 from node_runner.action_goals import serve_goals
 from robot_viewer.nodes.motion_planning import ANSWER_TIME
 from robot_viewer.nodes.planning_messages import box_message, changed

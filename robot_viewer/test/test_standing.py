@@ -20,8 +20,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
 from urdf_reader import from_rpy, read_urdf, Vector
-from viewer_rig import in_domain, LATCHED, ViewerRig
+from viewer_rig import in_domain, ViewerRig
 
+from node_runner import LATCHED
 from quad_msgs.msg import FootContacts
 from robot_viewer.link_poses import link_poses
 from robot_viewer.nodes.body import Body

@@ -24,9 +24,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
 from urdf_robots import ARM
-from viewer_rig import in_domain, LATCHED, ViewerRig
+from viewer_rig import in_domain, ViewerRig
 
-from node_runner import ParameterError
+from node_runner import LATCHED, ParameterError
 from robot_viewer.nodes import listening
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.robot_page import RobotPage

@@ -9,15 +9,12 @@ from contextlib import contextmanager
 
 from isolation import Isolation
 import rclpy
-from rclpy.action.client import ActionClient
-from rclpy.action.server import ActionServer
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_client import destroy_with_actions
 
 from node_runner import make_executor
 from robot_viewer.nodes.web_viewer import WebViewer
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TIMEOUT = 60.0  # [s]
 
 
@@ -59,14 +56,11 @@ class ViewerRig:
             self._executor.spin_once(0.02)
 
     def close(self) -> None:
-        """End both, and leave their domain, in which executors and actions keep nodes."""
+        """End both, and leave their domain, in which an executor keeps nodes."""
         self.viewer.page.close()
         self._executor.shutdown()
         for node in (self.viewer, self.node):
-            for each in list(node.waitables):
-                if isinstance(each, ActionClient | ActionServer):
-                    each.destroy()
-            node.destroy_node()
+            destroy_with_actions(node)
 
 
 @contextmanager

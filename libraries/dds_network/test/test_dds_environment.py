@@ -134,7 +134,7 @@ def test_discovery_that_is_off_stays_off() -> None:
         ('FASTDDS_BUILTIN_TRANSPORTS', 'SHM', PROFILE_VARIABLE),
     ],
 )
-def test_a_shell_hears_which_setting_has_no_effect(
+def test_settings_without_effect_are_reported(
     name: str, value: str, remedy: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With its remedy; one that changes nothing is not spoken of."""
