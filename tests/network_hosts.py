@@ -12,6 +12,7 @@ import os
 from pathlib import Path
 import shutil
 import subprocess
+import time
 import uuid
 
 from network_link import Link
@@ -20,6 +21,7 @@ import pytest
 
 # each host has its own shared memory, as machines have
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
+_LINK_TIME = 10.0  # [s]
 _MARK = 8  # characters that make the names of a test its own
 
 
@@ -123,6 +125,14 @@ def _configure(*hosts: Host) -> None:
         _ip('-n', host.namespace, 'link', 'set', 'lo', 'up')
         _ip('-n', host.namespace, 'addr', 'add', f'{host.address}/24', 'dev', host.interface)
         host.set_link('up')
+    deadline = time.monotonic() + _LINK_TIME
+    for host in hosts:  # the kernel notices within a second; Fast DDS leaves out what is not up
+        while (
+            'DOWN' in _ip('-n', host.namespace, '-br', 'link', 'show', host.interface).split()[1]
+        ):
+            if time.monotonic() > deadline:
+                raise OSError(f'{host.interface} does not come up')
+            time.sleep(0.02)
 
 
 def _ip(*arguments: str) -> str:

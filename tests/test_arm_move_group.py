@@ -563,7 +563,7 @@ def _plans_anew_around_what_appears(arm: MovingArm) -> None:
     _goes(arm, 'crate')
     visitor, observer = _visitor(arm, -0.65, size=0.06), Observer(arm)
     goal = move_goal([-1.2, *READY[1:]])
-    goal.request.max_velocity_scaling_factor = 0.1
+    goal.request.max_velocity_scaling_factor = 0.05  # a busy machine is late with the box
     goal.planning_options.replan = True
     goal.planning_options.replan_delay = 0.1
     run = move(arm, goal)

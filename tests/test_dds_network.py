@@ -82,6 +82,22 @@ def test_nobody_comes_in_uninvited(isolation: Isolation) -> None:
         assert look(robot, isolation.env, 3 * LOOK)['answer'] is True
 
 
+def test_a_network_without_a_link_is_refused(isolation: Isolation) -> None:
+    """It would stay closed when the cable comes."""
+    with two_hosts() as (robot, _):
+        robot.set_link('down')
+        command = [
+            executable('arm_bringup', 'bringup'),
+            'panda',
+            '--simulate',
+            '--network',
+            'cable0',
+        ]
+        with robot.run(command, isolation.env) as bringup:
+            bringup.wait_for('no link at cable0', 30.0)
+            assert bringup.wait(30.0) == 2
+
+
 @pytest.mark.parametrize(
     ('server', 'network', 'variables'),
     [

@@ -9,9 +9,11 @@ import fcntl
 import socket
 import struct
 
+_SIOCGIFFLAGS = 0x8913
 _SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
 _IFREQ_SIZE = 40  # [byte] struct ifreq
 _NAME_SIZE = 16  # [byte] IFNAMSIZ
+_RUNNING = 0x40  # linux/if.h: IFF_RUNNING, a cable or an access point is at the other end
 _ANY_PORT = 7400  # connecting a UDP socket sends nothing; the port does not matter
 
 
@@ -20,9 +22,8 @@ def read_interfaces() -> dict[str, str]:
     found = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
-            request = name.encode()[: _NAME_SIZE - 1].ljust(_IFREQ_SIZE, b'\0')
             try:
-                answer = fcntl.ioctl(probe, _SIOCGIFADDR, request)
+                answer = fcntl.ioctl(probe, _SIOCGIFADDR, _request(name))
             except OSError as error:
                 if error.errno not in {errno.EADDRNOTAVAIL, errno.ENODEV}:
                     raise
@@ -30,6 +31,18 @@ def read_interfaces() -> dict[str, str]:
             # struct sockaddr_in behind the name: family, port, address
             found[name] = socket.inet_ntoa(struct.unpack_from('4s', answer, _NAME_SIZE + 4)[0])
     return found
+
+
+def has_link(name: str) -> bool:
+    """Return whether an interface is up, with something at its other end."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        answer = fcntl.ioctl(probe, _SIOCGIFFLAGS, _request(name))
+    (flags,) = struct.unpack_from('H', answer, _NAME_SIZE)
+    return bool(flags & _RUNNING)
+
+
+def _request(name: str) -> bytes:
+    return name.encode()[: _NAME_SIZE - 1].ljust(_IFREQ_SIZE, b'\0')
 
 
 def resolve_host(name: str) -> str:

@@ -34,10 +34,13 @@ class Reach:
     Attributes:
         interfaces: Interfaces on which its sockets receive.
         peers: IPv4 addresses that it announces itself to, for networks without multicast.
+        without_link: Names of interfaces that are left out, as nothing is at their other end:
+            Fast DDS would not open them later, either.
     """
 
     interfaces: tuple[Interface, ...] = ()
     peers: tuple[str, ...] = ()
+    without_link: tuple[str, ...] = ()
 
     @property
     def is_this_host(self) -> bool:
@@ -50,9 +53,13 @@ class Reach:
             return 'DDS stays on this host'
         names = ', '.join(f'{each.name} ({each.address})' for each in self.interfaces)
         peers = f', announced to {", ".join(self.peers)}' if self.peers else ''
+        left_out = ''.join(
+            f'; {name} has no link and is left out until the next start'
+            for name in self.without_link
+        )
         return (
             f'DDS is open on {names}{peers}; it has no authentication: whoever reaches this '
-            'network can command the robot'
+            f'network can command the robot{left_out}'
         )
 
 
@@ -61,6 +68,7 @@ def resolve_reach(
     interfaces: Mapping[str, str],
     resolve_host: Callable[[str], str] = host.resolve_host,
     source_address: Callable[[str], str] = host.source_address,
+    has_link: Callable[[str], bool] = host.has_link,
 ) -> Reach:
     """Find the interfaces and peers that a text names.
 
@@ -70,11 +78,13 @@ def resolve_reach(
         interfaces: The IPv4 addresses of this host by the name of their interface.
         resolve_host: Returns the IPv4 address of a host name.
         source_address: Returns the address of this host that faces a peer.
+        has_link: Returns whether something is at the other end of an interface.
 
     Raises:
-        NetworkChoiceError: There is no such interface or host, or no route to it.
+        NetworkChoiceError: There is no such interface or host, no route to it, or no link at all.
     """
     opened: dict[str, Interface] = {}
+    without_link: dict[str, None] = {}
     peers: dict[str, None] = {}
     names = {address: name for name, address in interfaces.items()}
     for word in filter(None, re.split(r'[,\s]+', text)):
@@ -92,8 +102,16 @@ def resolve_reach(
                 f'packets to {word} leave from {address}, which is the address of no interface; '
                 f'name the interface instead: {_available(interfaces)}'
             )
-        opened[name] = Interface(name, address)
-    return Reach(tuple(opened.values()), tuple(peers))
+        if has_link(name):
+            opened[name] = Interface(name, address)
+        else:
+            without_link[name] = None
+    if without_link and not opened:
+        raise NetworkChoiceError(
+            f'no link at {", ".join(without_link)}: is the cable plugged in, the Wi-Fi connected? '
+            'Fast DDS would leave it out for good; start again when it is there'
+        )
+    return Reach(tuple(opened.values()), tuple(peers), tuple(without_link))
 
 
 def _peer_address(

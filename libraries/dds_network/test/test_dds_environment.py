@@ -49,6 +49,7 @@ def test_the_default_is_loopback_alone() -> None:
     assert children(profile, 'interfaceWhiteList') == ['127.0.0.1']
     assert texts(profile, 'type') == ['UDPv4']
     assert texts(profile, 'useBuiltinTransports') == ['false']
+    assert texts(profile, 'non_blocking_send') == ['true']
 
 
 def test_an_open_profile_adds_interfaces_and_peers() -> None:

@@ -6,6 +6,7 @@ import socket
 import pytest
 
 from dds_network import Interface, NetworkChoiceError, Reach
+from dds_network.host import has_link, read_interfaces
 from dds_network.reach import resolve_reach
 
 INTERFACES = {'lo': '127.0.0.1', 'eth0': '10.0.0.5', 'wlan0': '192.168.1.5'}
@@ -50,11 +51,31 @@ def source_address(peer: str) -> str:
 )
 def test_interfaces_and_peers(text: str, reach: Reach) -> None:
     """A peer opens the interface that leads to it, and nothing else."""
-    assert resolve_reach(text, INTERFACES, resolve_host, source_address) == reach
+    found = resolve_reach(text, INTERFACES, resolve_host, source_address, lambda _: True)
+    assert found == reach
 
 
 @pytest.mark.parametrize('text', ['eth1', 'eth0,robo', '8.8.8.8', '172.16.0.1', '*'])
 def test_what_does_not_exist_is_refused(text: str) -> None:
     """Unknown names, no route, and a source address that no interface has."""
     with pytest.raises(NetworkChoiceError):
-        resolve_reach(text, INTERFACES, resolve_host, source_address)
+        resolve_reach(text, INTERFACES, resolve_host, source_address, lambda _: True)
+
+
+def test_an_interface_without_link_is_left_out() -> None:
+    """With words, and not alone: nobody would come in by it, also when the cable is back."""
+
+    def is_wlan(name: str) -> bool:
+        return name == 'wlan0'
+
+    found = resolve_reach('eth0 robot', INTERFACES, resolve_host, source_address, is_wlan)
+    assert found == Reach((WLAN,), ('192.168.1.20',), ('eth0',))
+    assert 'eth0 has no link' in found.describe()
+    with pytest.raises(NetworkChoiceError, match='no link at eth0: is the cable'):
+        resolve_reach('eth0,10.0.0.9', INTERFACES, resolve_host, source_address, is_wlan)
+
+
+def test_the_loopback_interface_has_a_link() -> None:
+    """As the kernel says it."""
+    assert read_interfaces()['lo'] == '127.0.0.1'
+    assert has_link('lo')
