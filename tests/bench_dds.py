@@ -65,9 +65,11 @@ def over_a_slow_link(*, own: bool) -> None:
         read = desk.command([sys.executable, __file__, 'read'])
         command = robot.command([sys.executable, __file__, 'publish', robot.interface])
         with subprocess.Popen(read, env=environment(isolation, desk.address, own=own)) as reader:
-            env = environment(isolation, robot.address, own=own)
-            report('a reader over 400 kbit/s', command, env, own=own)
-            reader.terminate()
+            try:
+                env = environment(isolation, robot.address, own=own)
+                report('a reader over 400 kbit/s', command, env, own=own)
+            finally:
+                reader.terminate()
 
 
 def environment(isolation: Isolation, address: str, *, own: bool) -> dict[str, str]:
@@ -99,7 +101,9 @@ def publish(interface: str) -> None:
     publisher = node.create_publisher(JointState, TOPIC, 10)
     if interface:
         deadline = time.monotonic() + MATCH_TIME
-        while not publisher.get_subscription_count() and time.monotonic() < deadline:
+        while not publisher.get_subscription_count():
+            if time.monotonic() > deadline:
+                sys.exit('there is no reader')
             time.sleep(0.05)
         subprocess.run(['tc', 'qdisc', 'add', 'dev', interface, *SLOW], check=True)
     angles = [0.1] * 7

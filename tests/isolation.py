@@ -86,6 +86,9 @@ def reserve() -> Iterator[Isolation]:
             if _is_in(domain_id):
                 gc.collect()
                 if _is_in(domain_id):
-                    raise RuntimeError(f'nodes of this process are left in domain {domain_id}')
+                    raise RuntimeError(
+                        f'nodes of this process are left in domain {domain_id}, of an executor '
+                        'that is not shut down, an action that is not destroyed, or a failed test'
+                    )
             return
     raise RuntimeError('all ROS domains are taken; do tests of this machine hang?')

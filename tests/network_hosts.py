@@ -19,7 +19,7 @@ from network_link import Link
 from processes import RunningProcess
 import pytest
 
-# each host has its own shared memory, as machines have
+# each host has its own shared memory, as machines have: programs with ROS alone use it
 _OWN_MEMORY = 'mount -t tmpfs tmpfs /dev/shm && exec "$@"'
 _LINK_TIME = 10.0  # [s]
 _MARK = 8  # characters that make the names of a test its own
@@ -52,6 +52,19 @@ class Host:
         """Set its end of the cable ``up`` or ``down``."""
         _ip('-n', self.namespace, 'link', 'set', self.interface, state)
 
+    def wait_for_link(self, state: str) -> None:
+        """Wait until its end of the cable is ``UP`` or ``DOWN``: the kernel takes up to a second.
+
+        Raises:
+            RuntimeError: It does not become so.
+        """
+        deadline = time.monotonic() + _LINK_TIME
+        show = '-n', self.namespace, '-br', 'link', 'show', self.interface
+        while ('DOWN' in _ip(*show).split()[1]) != (state == 'DOWN'):
+            if time.monotonic() > deadline:
+                raise RuntimeError(f'{self.interface} is not {state}')
+            time.sleep(0.02)
+
     def udp_addresses(self) -> set[str]:
         """Return the local addresses of all UDP sockets of this host."""
         table = _ip('netns', 'exec', self.namespace, 'cat', '/proc/net/udp')
@@ -75,6 +88,8 @@ def two_hosts() -> Iterator[tuple[Host, Host]]:
         with _possible():
             _ip('-n', robot.namespace, 'link', 'add', robot.interface, *ends)
             _configure(robot, desk)
+        for host in (robot, desk):  # Fast DDS leaves out what is not up
+            host.wait_for_link('UP')
         yield robot, desk
 
 
@@ -125,14 +140,6 @@ def _configure(*hosts: Host) -> None:
         _ip('-n', host.namespace, 'link', 'set', 'lo', 'up')
         _ip('-n', host.namespace, 'addr', 'add', f'{host.address}/24', 'dev', host.interface)
         host.set_link('up')
-    deadline = time.monotonic() + _LINK_TIME
-    for host in hosts:  # the kernel notices within a second; Fast DDS leaves out what is not up
-        while (
-            'DOWN' in _ip('-n', host.namespace, '-br', 'link', 'show', host.interface).split()[1]
-        ):
-            if time.monotonic() > deadline:
-                raise OSError(f'{host.interface} does not come up')
-            time.sleep(0.02)
 
 
 def _ip(*arguments: str) -> str:

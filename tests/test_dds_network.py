@@ -78,24 +78,21 @@ def test_nobody_comes_in_uninvited(isolation: Isolation) -> None:
             assert look(desk, foreign(isolation, **variables)) == {'nodes': [], 'answer': None}
         assert robot.packets()[0] > 0  # they did knock
         assert robot.packets()[1] - before < 20  # ARP, ICMP and IGMP answer; DDS does not
-        # a process of this host reaches it, also by the loopback interface alone
+        # processes of this host reach it, also those that have ROS alone, and its own transports
         assert look(robot, isolation.env, 3 * LOOK)['answer'] is True
+        beside = foreign(isolation, ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
+        assert look(robot, beside, 3 * LOOK)['answer'] is True
 
 
-def test_a_network_without_a_link_is_refused(isolation: Isolation) -> None:
-    """It would stay closed when the cable comes."""
-    with two_hosts() as (robot, _):
-        robot.set_link('down')
-        command = [
-            executable('arm_bringup', 'bringup'),
-            'panda',
-            '--simulate',
-            '--network',
-            'cable0',
-        ]
-        with robot.run(command, isolation.env) as bringup:
-            bringup.wait_for('no link at cable0', 30.0)
-            assert bringup.wait(30.0) == 2
+def test_an_arm_whose_cable_is_not_plugged_in_works_on_its_host(isolation: Isolation) -> None:
+    """It says why nobody will come in, also when the cable comes."""
+    with two_hosts() as (robot, desk):
+        desk.set_link('down')
+        robot.wait_for_link('DOWN')
+        with brought_up(robot, isolation, '--network', robot.interface) as bringup:
+            assert 'cable0 has no link' in bringup.wait_for('DDS stays on this host')
+            env = isolation.env | {NETWORK_VARIABLE: robot.interface}
+            assert look(robot, env)['answer'] is True
 
 
 @pytest.mark.parametrize(

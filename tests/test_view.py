@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import closing, suppress
 import socket
 from typing import TYPE_CHECKING
 from urllib.request import urlopen
@@ -41,7 +41,11 @@ def is_open(url: str) -> bool:
 def memory_of_dds(robot: RunningProcess) -> list[str]:
     """Return what its processes share: whoever hangs or dies there lets the others wait."""
     processes = psutil.Process(robot.pid).children(recursive=True)
-    maps = [each.path for process in processes for each in process.memory_maps()]
+    maps = []
+    for process in processes:
+        with suppress(psutil.Error):  # it has ended meanwhile
+            maps += [each.path for each in process.memory_maps()]
+    assert maps
     return [path for path in maps if path.startswith(SHARED)]
 
 

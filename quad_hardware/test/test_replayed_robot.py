@@ -185,8 +185,8 @@ def test_commands_and_the_feet_that_they_let_stand_are_those_of_the_robot(
     """Each command of the log counts, and the contacts are known by them as they were live."""
     _, log, live = recorded
     _, _, replayed = fed(log)
-    # a newer command replaces one that is not sent yet
-    assert live.commands - 5 <= replayed.commands <= live.commands
+    # on a busy machine a newer command replaces one that is not sent yet
+    assert 0.9 * live.commands <= replayed.commands <= live.commands
     assert live.commands >= 40
     for source in ContactSource:
         assert replayed.ratio_of(source) == pytest.approx(live.ratio_of(source), abs=0.1)

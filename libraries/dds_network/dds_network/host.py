@@ -13,12 +13,12 @@ _SIOCGIFFLAGS = 0x8913
 _SIOCGIFADDR = 0x8915  # linux/sockios.h: the first IPv4 address of an interface
 _IFREQ_SIZE = 40  # [byte] struct ifreq
 _NAME_SIZE = 16  # [byte] IFNAMSIZ
-_RUNNING = 0x40  # linux/if.h: IFF_RUNNING, a cable or an access point is at the other end
+_RUNNING = 0x40  # linux/if.h: IFF_RUNNING, what Fast DDS asks for
 _ANY_PORT = 7400  # connecting a UDP socket sends nothing; the port does not matter
 
 
 def read_interfaces() -> dict[str, str]:
-    """Return the IPv4 address of each interface that has one, by its name."""
+    """Return the IPv4 address of each interface by its name; empty where it has none."""
     found = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
@@ -27,6 +27,7 @@ def read_interfaces() -> dict[str, str]:
             except OSError as error:
                 if error.errno not in {errno.EADDRNOTAVAIL, errno.ENODEV}:
                     raise
+                found[name] = ''
                 continue
             # struct sockaddr_in behind the name: family, port, address
             found[name] = socket.inet_ntoa(struct.unpack_from('4s', answer, _NAME_SIZE + 4)[0])
@@ -34,9 +35,12 @@ def read_interfaces() -> dict[str, str]:
 
 
 def has_link(name: str) -> bool:
-    """Return whether an interface is up, with something at its other end."""
+    """Return whether an interface is operational: no cable is missing, no access point."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        answer = fcntl.ioctl(probe, _SIOCGIFFLAGS, _request(name))
+        try:
+            answer = fcntl.ioctl(probe, _SIOCGIFFLAGS, _request(name))
+        except OSError:  # it went meanwhile
+            return False
     (flags,) = struct.unpack_from('H', answer, _NAME_SIZE)
     return bool(flags & _RUNNING)
 

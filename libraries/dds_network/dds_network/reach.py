@@ -34,8 +34,8 @@ class Reach:
     Attributes:
         interfaces: Interfaces on which its sockets receive.
         peers: IPv4 addresses that it announces itself to, for networks without multicast.
-        without_link: Names of interfaces that are left out, as nothing is at their other end:
-            Fast DDS would not open them later, either.
+        without_link: Names of interfaces that are left out, as they have no link or no address:
+            Fast DDS does not open them later, either.
     """
 
     interfaces: tuple[Interface, ...] = ()
@@ -49,14 +49,14 @@ class Reach:
 
     def describe(self) -> str:
         """Return what is open, and what that means, for people."""
-        if self.is_this_host:
-            return 'DDS stays on this host'
-        names = ', '.join(f'{each.name} ({each.address})' for each in self.interfaces)
-        peers = f', announced to {", ".join(self.peers)}' if self.peers else ''
         left_out = ''.join(
-            f'; {name} has no link and is left out until the next start'
+            f'; {name} has no link or no address and is left out: connect it, and start again'
             for name in self.without_link
         )
+        if self.is_this_host:
+            return f'DDS stays on this host{left_out}'
+        names = ', '.join(f'{each.name} ({each.address})' for each in self.interfaces)
+        peers = f', announced to {", ".join(self.peers)}' if self.peers else ''
         return (
             f'DDS is open on {names}{peers}; it has no authentication: whoever reaches this '
             f'network can command the robot{left_out}'
@@ -75,42 +75,39 @@ def resolve_reach(
     Args:
         text: Names of interfaces, and addresses or names of peers, separated by commas or blanks;
             empty or ``localhost`` for none.
-        interfaces: The IPv4 addresses of this host by the name of their interface.
+        interfaces: The IPv4 addresses of this host by the name of their interface; empty for one
+            without.
         resolve_host: Returns the IPv4 address of a host name.
         source_address: Returns the address of this host that faces a peer.
-        has_link: Returns whether something is at the other end of an interface.
+        has_link: Returns whether an interface is operational.
 
     Raises:
-        NetworkChoiceError: There is no such interface or host, no route to it, or no link at all.
+        NetworkChoiceError: There is no such interface or host, or no route to it.
     """
     opened: dict[str, Interface] = {}
     without_link: dict[str, None] = {}
     peers: dict[str, None] = {}
-    names = {address: name for name, address in interfaces.items()}
+    names = {address: name for name, address in interfaces.items() if address}
     for word in filter(None, re.split(r'[,\s]+', text)):
-        address = interfaces.get(word)
+        peer, address = '', interfaces.get(word)
         if address is None:
             address = _peer_address(word, interfaces, resolve_host)
             if address not in names and not address.startswith(_LOOPBACK):
-                peers[address] = None
-                address = _facing(word, address, source_address)
+                peer, address = address, _facing(word, address, source_address)
         if address.startswith(_LOOPBACK):
             continue
-        name = names.get(address)
+        name = word if word in interfaces else names.get(address)
         if name is None:
             raise NetworkChoiceError(
                 f'packets to {word} leave from {address}, which is the address of no interface; '
                 f'name the interface instead: {_available(interfaces)}'
             )
-        if has_link(name):
-            opened[name] = Interface(name, address)
-        else:
+        if not address or not has_link(name):
             without_link[name] = None
-    if without_link and not opened:
-        raise NetworkChoiceError(
-            f'no link at {", ".join(without_link)}: is the cable plugged in, the Wi-Fi connected? '
-            'Fast DDS would leave it out for good; start again when it is there'
-        )
+            continue
+        opened[name] = Interface(name, address)
+        if peer:
+            peers[peer] = None
     return Reach(tuple(opened.values()), tuple(peers), tuple(without_link))
 
 
@@ -136,5 +133,9 @@ def _facing(word: str, address: str, source_address: Callable[[str], str]) -> st
 
 
 def _available(interfaces: Mapping[str, str]) -> str:
-    outside = [name for name, address in interfaces.items() if not address.startswith(_LOOPBACK)]
+    outside = [
+        name
+        for name, address in interfaces.items()
+        if address and not address.startswith(_LOOPBACK)
+    ]
     return ', '.join(outside) or 'only loopback'

@@ -45,8 +45,8 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
             f'{TRANSPORTS_VARIABLE}={transports} has no effect, DDS uses {_UDP} alone; for '
             f'others, name a profile of your own in {PROFILE_VARIABLE}'
         )
-    if not reach.is_this_host:
-        yield describe_dds(environ)
+    if reach.without_link or not reach.is_this_host:
+        yield reach.describe()
         return
     without_effect = [
         f'{name}={environ[name]}'

@@ -63,19 +63,23 @@ def test_what_does_not_exist_is_refused(text: str) -> None:
 
 
 def test_an_interface_without_link_is_left_out() -> None:
-    """With words, and not alone: nobody would come in by it, also when the cable is back."""
+    """With the peers behind it, and with words: nobody comes in when it is connected later."""
 
     def is_wlan(name: str) -> bool:
         return name == 'wlan0'
 
-    found = resolve_reach('eth0 robot', INTERFACES, resolve_host, source_address, is_wlan)
-    assert found == Reach((WLAN,), ('192.168.1.20',), ('eth0',))
-    assert 'eth0 has no link' in found.describe()
-    with pytest.raises(NetworkChoiceError, match='no link at eth0: is the cable'):
-        resolve_reach('eth0,10.0.0.9', INTERFACES, resolve_host, source_address, is_wlan)
+    text = 'eth0 10.0.0.9 usb0 robot'
+    interfaces = INTERFACES | {'usb0': ''}
+    found = resolve_reach(text, interfaces, resolve_host, source_address, is_wlan)
+    assert found == Reach((WLAN,), ('192.168.1.20',), ('eth0', 'usb0'))
+    assert 'eth0 has no link or no address' in found.describe()
+    alone = resolve_reach('eth0', interfaces, resolve_host, source_address, is_wlan)
+    assert alone.is_this_host
+    assert 'stays on this host; eth0 has no link' in alone.describe()
 
 
 def test_the_loopback_interface_has_a_link() -> None:
     """As the kernel says it."""
     assert read_interfaces()['lo'] == '127.0.0.1'
     assert has_link('lo')
+    assert not has_link('no.such.device')

@@ -20,7 +20,7 @@ from .type_support import load_type_support
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:
     """Initialise rclpy without its signal handlers, with DDS on the networks that are open.
 
-    A process that can be reached from outside this host logs so.
+    A process that can be reached from outside this host logs so, or that it cannot, though asked.
 
     Args:
         args: Command line; None for the process's own.
@@ -30,12 +30,12 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
         NetworkChoiceError: ``DDS_NETWORK`` names what does not exist, or would be ignored.
         RuntimeError: ROS does not accept the arguments, or its environment variables.
     """
-    restrict_dds(os.environ)
+    reach = restrict_dds(os.environ)
     load_type_support()
     rclpy.init(  # noqa: TID251  # the one place
         args=None if args is None else list(args),
         context=context,
         signal_handler_options=SignalHandlerOptions.NO,
     )
-    if not is_this_host(os.environ):
+    if reach.without_link or not is_this_host(os.environ):
         get_logger('dds_network').warning(describe_dds(os.environ))

@@ -43,7 +43,7 @@ def _reach(domain: str, environment: Mapping[str, str]) -> Finding:
     if this_host:
         return note(
             'domain',
-            f'{domain}, on this machine only',
+            f'{domain}; {reach}',
             f'to reach other machines: export {NETWORK_VARIABLE}=INTERFACE, and the same '
             'ROS_DOMAIN_ID on each',
         )
