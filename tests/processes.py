@@ -184,13 +184,21 @@ class RunningProcess:
                 self.signal(signal.SIGABRT)
                 with suppress(subprocess.TimeoutExpired):
                     self.wait(ABORTING_TIMEOUT)
-        with suppress(ProcessLookupError):
-            os.killpg(self.pid, signal.SIGKILL)
+        if not self._gave_its_id_away():
+            with suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGKILL)
         self._process.wait()
         self._reader.join()
         self._readiness.close()
         if hangs and exc is None:
             raise AssertionError(f'{self.command} did not end in:\n{self.output}')
+
+    def _gave_its_id_away(self) -> bool:
+        """Return whether another process has its id: in minutes a suite uses all that there are.
+
+        What is left of its session keeps the id from being given away.
+        """
+        return self._process.returncode is not None and psutil.pid_exists(self.pid)
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
