@@ -23,6 +23,8 @@ QUICK = tuple(
     for signal, timeout in [(Signals.SIGTERM, 0.3), (Signals.SIGINT, 0.3), (Signals.SIGKILL, 9)]
 )
 """A ladder with short time-outs, for processes that ignore signals."""
+PATIENT = (StopStep(Signals.SIGTERM, TIMEOUT), StopStep(Signals.SIGKILL, 9.0))
+"""One for processes that end by the first signal, when they get the processor."""
 
 NOTIFY = """
 def notify():
@@ -99,7 +101,8 @@ def program(kind: str, name: str = '', **options: object) -> ProcessSpec:
     code = f'import os, signal, sys\n{NOTIFY}' + '\n'.join(line[8:] for line in lines)
     # isolated and without site: it starts in milliseconds
     argv = (sys.executable, '-I', '-S', '-c', code)
-    values: dict[str, object] = {'stop_steps': QUICK, 'ready_timeout': TIMEOUT, **options}
+    steps = QUICK if kind == 'deaf' else PATIENT
+    values: dict[str, object] = {'stop_steps': steps, 'ready_timeout': TIMEOUT, **options}
     return ProcessSpec(name or kind, argv, **values)  # type: ignore[arg-type]
 
 
