@@ -12,7 +12,6 @@ process of this workspace opens UDP sockets on the loopback interface only, unle
 """
 
 from .environment import (
-    describe_dds,
     is_this_host,
     NETWORK_VARIABLE,
     open_dds,
@@ -29,7 +28,6 @@ __all__ = [
     'Interface',
     'NetworkChoiceError',
     'Reach',
-    'describe_dds',
     'is_this_host',
     'open_dds',
     'restrict_dds',

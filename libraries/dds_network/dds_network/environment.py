@@ -42,10 +42,10 @@ def selected_reach(environ: Mapping[str, str]) -> Reach:
     Raises:
         NetworkChoiceError: He names what does not exist, or what his own transports would ignore.
     """
-    text = environ.get(NETWORK_VARIABLE, '').strip()
+    own, text = own_transports(environ), environ.get(NETWORK_VARIABLE, '').strip()
     if not text:
-        return Reach()
-    if own := own_transports(environ):
+        return Reach(own_transports=own)
+    if own:
         raise NetworkChoiceError(
             f'{text!r} would have no effect, as {own} decides which networks DDS uses; unset one '
             'of the two'
@@ -107,20 +107,7 @@ def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
     """
     if names is not None:
         environ[NETWORK_VARIABLE] = names
-    restrict_dds(environ)
-    return describe_dds(environ)
-
-
-def describe_dds(environ: Mapping[str, str]) -> str:
-    """Return what DDS is open to, for people.
-
-    Raises:
-        NetworkChoiceError: As of :func:`selected_reach`.
-    """
-    reach = selected_reach(environ)
-    if own := own_transports(environ):
-        return f'{own} decides which networks DDS uses; it may be open to all of them'
-    return reach.describe()
+    return restrict_dds(environ).describe()
 
 
 def is_this_host(environ: Mapping[str, str]) -> bool:
@@ -129,4 +116,4 @@ def is_this_host(environ: Mapping[str, str]) -> bool:
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.
     """
-    return selected_reach(environ).is_this_host and not own_transports(environ)
+    return selected_reach(environ).is_this_host

@@ -36,19 +36,23 @@ class Reach:
         peers: IPv4 addresses that it announces itself to, for networks without multicast.
         without_link: Names of interfaces that are left out, as they have no link or no address:
             Fast DDS does not open them later, either.
+        own_transports: By what a person configures the transports himself; empty when he does not.
     """
 
     interfaces: tuple[Interface, ...] = ()
     peers: tuple[str, ...] = ()
     without_link: tuple[str, ...] = ()
+    own_transports: str = ''
 
     @property
     def is_this_host(self) -> bool:
         """Whether nothing but loopback is used."""
-        return not self.interfaces
+        return not self.interfaces and not self.own_transports
 
     def describe(self) -> str:
         """Return what is open, and what that means, for people."""
+        if own := self.own_transports:
+            return f'{own} decides which networks DDS uses; it may be open to all of them'
         left_out = ''.join(
             f'; {name} has no link or no address and is left out: connect it, and start again'
             for name in self.without_link

@@ -11,10 +11,8 @@ import sys
 
 from .environment import (
     dds_variables,
-    describe_dds,
     LOCALHOST_ONLY_VARIABLE,
     NETWORK_VARIABLE,
-    own_transports,
     PEERS_VARIABLE,
     PROFILE_VARIABLE,
     RANGE_VARIABLE,
@@ -36,8 +34,8 @@ def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
         environ: The environment before it is changed.
         reach: What DDS may use.
     """
-    if own_transports(environ):
-        yield describe_dds(environ)
+    if reach.own_transports:
+        yield reach.describe()
         return
     transports = environ.get(TRANSPORTS_VARIABLE) or _UDP
     if transports != _UDP:

@@ -8,7 +8,6 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from dds_network import (
-    describe_dds,
     Interface,
     is_this_host,
     NETWORK_VARIABLE,
@@ -17,6 +16,7 @@ from dds_network import (
     PROFILE_VARIABLE,
     Reach,
     restrict_dds,
+    selected_reach,
 )
 from dds_network.profile import LOCALHOST_PROFILE, profile_file, profile_text
 from dds_network.shell import main
@@ -104,7 +104,7 @@ def test_a_choice_that_would_be_ignored_is_refused(own: dict[str, str], named: s
     """By the variable or by --network: nobody believes that it counts, not that it is closed."""
     environ = {NETWORK_VARIABLE: named, **own}
     (decider,) = own.items()
-    for call in (restrict_dds, describe_dds, is_this_host, lambda env: open_dds(env, None)):
+    for call in (restrict_dds, selected_reach, is_this_host, lambda env: open_dds(env, None)):
         with pytest.raises(NetworkChoiceError, match='='.join(decider)):
             call(environ)
     with pytest.raises(NetworkChoiceError, match='unset one of the two'):

@@ -12,7 +12,7 @@ from rclpy.context import Context
 from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
-from dds_network import describe_dds, is_this_host, restrict_dds
+from dds_network import restrict_dds
 
 from .type_support import load_type_support
 
@@ -37,5 +37,5 @@ def init_ros(args: Sequence[str] | None = None, context: Context | None = None) 
         context=context,
         signal_handler_options=SignalHandlerOptions.NO,
     )
-    if reach.without_link or not is_this_host(os.environ):
-        get_logger('dds_network').warning(describe_dds(os.environ))
+    if reach.without_link or not reach.is_this_host:
+        get_logger('dds_network').warning(reach.describe())

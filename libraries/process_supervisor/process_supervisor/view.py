@@ -61,7 +61,7 @@ def view_process(
     return ProcessSpec(
         name='viewer',
         argv=(*POLITE, *node_argv(VIEWER, find, ros.frame_parameters, ros=ros)),
-        environment=dict(LOG_FORMAT),
+        environment=LOG_FORMAT,
         notifies_ready=True,
         ready_timeout=ready_timeout,
         required=False,

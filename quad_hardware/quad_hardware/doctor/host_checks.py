@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 import importlib.util
 
-from dds_network import describe_dds, is_this_host, NETWORK_VARIABLE, NetworkChoiceError
+from dds_network import NETWORK_VARIABLE, NetworkChoiceError, selected_reach
 
 from ..link.vendor_library import is_installed
 from .finding import error, Finding, good, note, warning
@@ -36,18 +36,18 @@ def check_environment(environment: Mapping[str, str]) -> Iterator[Finding]:
 
 def _reach(domain: str, environment: Mapping[str, str]) -> Finding:
     try:
-        this_host, reach = is_this_host(environment), describe_dds(environment)
+        reach = selected_reach(environment)
     except NetworkChoiceError as problem:
         remedy = f'export {NETWORK_VARIABLE} with an interface or a peer that exists'
         return error('domain', f'{NETWORK_VARIABLE}: {problem}', remedy)
-    if this_host:
+    if reach.is_this_host:
         return note(
             'domain',
-            f'{domain}; {reach}',
+            f'{domain}; {reach.describe()}',
             f'to reach other machines: export {NETWORK_VARIABLE}=INTERFACE, and the same '
             'ROS_DOMAIN_ID on each',
         )
-    return good('domain', f'{domain}, the same everywhere; {reach}')
+    return good('domain', f'{domain}, the same everywhere; {reach.describe()}')
 
 
 def check_memory(meminfo: str) -> Iterator[Finding]:
