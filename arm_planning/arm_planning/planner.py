@@ -331,8 +331,10 @@ def _pose_tolerances(goal: PoseGoal, link: str) -> PathConstraints:
     """Return what holds where a link reaches a goal."""
     off = np.asarray(goal.position_tolerance, dtype=float)
     shape = Box(*(2.0 * off).tolist()) if off.ndim else Sphere(float(off))
-    region = PlacedShape(shape, Pose(ORIGIN.rotation, goal.pose.position))
-    place = PositionConstraint(link, ORIGIN.position, [region])
+    middle = goal.pose.position + goal.pose.rotation @ goal.offset
+    place = PositionConstraint(
+        link, goal.offset, [PlacedShape(shape, Pose(ORIGIN.rotation, middle))]
+    )
     turn = OrientationConstraint(link, goal.pose.rotation, goal.orientation_tolerance)
     return PathConstraints(orientations=[turn], positions=[place])
 

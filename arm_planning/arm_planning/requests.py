@@ -45,12 +45,14 @@ class PoseGoal:
             axes of the root link.
         orientation_tolerance: Angles about the axes of the goal's pose in [rad] (3); MoveIt's
             absolute_x_axis_tolerance and so on.
+        offset: The point of the link in [m] (3) to which the position tolerance applies.
     """
 
     pose: Pose
     link: str = ''
     position_tolerance: float | Array = 0.0
     orientation_tolerance: Array = field(default_factory=lambda: frozen(np.zeros(3)))
+    offset: Array = field(default_factory=lambda: frozen(np.zeros(3)))
 
 
 Goal = JointGoal | PoseGoal

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import deepcopy
+import math
 from typing import Any
 
 from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from isolation import reserve
 from move_group_rig import (
@@ -45,11 +47,15 @@ from moveit_msgs.srv import (
     GetPositionIK,
     QueryPlannerInterfaces,
 )
-from planning_messages import box
+import numpy as np
+from planning_messages import box, panda
 import pytest
+from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 
+from arm_model import combined, Pose
+from arm_planning.ros.geometry import pose_message, pose_of
 from node_runner import LATCHED
 
 HAND, BASE = 'panda_link8', 'panda_link0'
@@ -93,6 +99,13 @@ def tip(rig: MoveGroupRig) -> PoseMessage:
     asked = GetPositionFK.Request(fk_link_names=[HAND])
     asked.header.frame_id = BASE
     return rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+
+
+def turned_pose(x: float, y: float, z: float, axis: tuple[float, float, float]) -> PoseMessage:
+    """Return a pose that is a quarter turn about an axis."""
+    half = math.sqrt(0.5)
+    turn = Quaternion(w=half, **dict(zip('xyz', (half * each for each in axis), strict=True)))
+    return PoseMessage(position=Point(x=x, y=y, z=z), orientation=turn)
 
 
 def at(rig: MoveGroupRig) -> list[float]:
@@ -313,6 +326,65 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     # clear_all_collision_objects(): one message without an id
     publisher.publish(CollisionObject(operation=CollisionObject.REMOVE))
     rig.client.spin_until(lambda: not scene().world.collision_objects, 30.0, 'an empty scene')
+
+
+@pytest.mark.parametrize('name', ['tool', 'tool/tip'])
+@pytest.mark.parametrize('turned', [True, False], ids=['a pose', 'a position only'])
+def test_goals_and_path_constraints_of_what_is_held(
+    rig: MoveGroupRig, name: str, turned: bool
+) -> None:
+    """A body that is turned in the hand, and its subframe, come to the place that is wanted."""
+    held = box('tool', edge=0.02)
+    held.header.frame_id, held.pose = HAND, turned_pose(0.1, 0.02, 0.1, axis=(0.0, 1.0, 0.0))
+    held.subframe_names = ['tip']
+    held.subframe_poses = [turned_pose(0.05, 0.0, 0.03, axis=(0.0, 0.0, 1.0))]
+    change = PlanningScene(is_diff=True)
+    change.robot_state.is_diff = True
+    change.robot_state.attached_collision_objects = [
+        AttachedCollisionObject(link_name=HAND, object=held, touch_links=['panda_link7'])
+    ]
+    assert rig.client.call(
+        ApplyPlanningScene, '/apply_planning_scene', ApplyPlanningScene.Request(scene=change)
+    ).success
+    try:
+        in_hand = pose_of(held.pose, 'tool')
+        if name == 'tool/tip':
+            in_hand = combined(in_hand, pose_of(held.subframe_poses[0], 'tip'))
+
+        def place_of(joints: list[float]) -> Pose:
+            where = panda().positions(dict(zip(JOINTS, joints, strict=True)))
+            return combined(panda().kinematics.link_pose(HAND, where), in_hand)
+
+        begin = place_of(READY)
+        wanted = pose_message(Pose(begin.rotation, np.add(begin.position, [0.0, 0.06, 0.08])))
+        goal = pose_goal(wanted, name, BASE)
+        request = interface_request(goal)
+        kept = deepcopy(goal.position_constraints[0])
+        kept.constraint_region.primitives = [
+            SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.04, 0.2, 0.3])
+        ]
+        kept.constraint_region.primitive_poses = [pose_message(begin)]
+        kept.constraint_region.primitive_poses[0].orientation = Quaternion(w=1.0)
+        request.path_constraints.position_constraints = [kept]
+        if not turned:
+            goal.orientation_constraints = []
+        _status, moved = rig.move(action_goal(request))
+        assert moved.error_code.val == SUCCESS, moved.error_code
+        assert (place_of(at(rig)).position - begin.position).tolist() == pytest.approx(
+            [0.0, 0.06, 0.08], abs=1e-3
+        )
+        if turned:
+            assert place_of(at(rig)).rotation == pytest.approx(begin.rotation, abs=2e-3)
+        kept.constraint_region.primitive_poses[0].position.x += 0.1
+        refused = rig.plan(request).error_code
+        assert refused.val == MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, refused
+    finally:
+        held.operation = CollisionObject.REMOVE
+        release = ApplyPlanningScene.Request(scene=change)
+        assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
+        change.robot_state.attached_collision_objects = []
+        change.world.collision_objects = [CollisionObject(operation=CollisionObject.REMOVE)]
+        assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
 
 
 NAMES: dict[str, str] = {

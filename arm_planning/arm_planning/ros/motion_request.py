@@ -195,13 +195,17 @@ class RequestReader:
         Raises:
             PlanningError: There is no such frame.
         """
+        link, place = self._link_of(frame)
+        return link, combined(pose, inverse(place))
+
+    def _link_of(self, frame: str) -> tuple[str, Pose]:
+        """Return the link that carries a frame (empty for the tip), and the frame's pose in it."""
         if not frame:
-            return self._model.tip, pose
+            return self._model.tip, ORIGIN
         try:
-            link, place = self._snapshot.link_of(frame)
+            return self._snapshot.link_of(frame)
         except PlanningError as error:
             raise PlanningError(PlanningCode.INVALID_LINK_NAME, f'link_name: {error}') from error
-        return link, combined(pose, inverse(place))
 
     def _joint_goal(self, messages: Sequence[Any]) -> JointGoal:
         ranges = self._joint_ranges(messages)
@@ -255,26 +259,17 @@ class RequestReader:
                 f'position of {positions[0].link_name}, orientation of another link:'
                 f' {turns[0].link_name}; a goal is for one link'
             )
-        frame = next(iter(names))
-        tolerance = frozen(ANY_ORIENTATION)
-        rotation = None
+        link, _ = self._link_of(next(iter(names)))
+        here = self._snapshot.frame(link, self._positions)
+        rotation, tolerance = here.rotation, frozen(ANY_ORIENTATION)
         if turns:
-            wanted = self._orientation(turns[0])
+            wanted = self._of_link(self._orientation(turns[0]))
             rotation, tolerance = wanted.rotation, wanted.tolerance
-        self.on_link(ORIGIN, frame)  # or it is unknown
-        here = self._snapshot.frame(frame or self._model.tip, self._positions)
-        radius: float | Array = 0.0
-        place, offset = here.position, np.zeros(3)
-        if positions:
-            place, radius, offset = self._region_goal(positions[0])
-        if rotation is None and offset.any():
-            raise _bad_goal(
-                'target_point_offset without an orientation constraint of the link; give it one'
-            )
-        turned = here.rotation if rotation is None else rotation
-        pose = Pose(frozen(turned), frozen(place - turned @ offset))
-        link, in_link = self.on_link(pose, frame)
-        return PoseGoal(in_link, link, radius, tolerance)
+        if not positions:
+            return PoseGoal(Pose(rotation, here.position), link, 0.0, tolerance)
+        point, radius, offset = self._region_goal(positions[0])
+        place = frozen(point - rotation @ offset)
+        return PoseGoal(Pose(rotation, place), link, radius, tolerance, offset)
 
     def _region_goal(self, message: Any) -> tuple[Array, float | Array, Array]:  # noqa: ANN401
         """Return middle, tolerance and the point of the link of a position constraint."""
@@ -304,7 +299,7 @@ class RequestReader:
                 f' and {len(region.meshes)} meshes; give it one primitive with a pose'
             )
         offset = placement(xyz(message.target_point_offset), (), what, BAD_GOAL).position
-        link, in_link = self.on_link(Pose(ORIGIN.rotation, -offset), message.link_name)
+        link, place = self._link_of(message.link_name)
         regions = []
         for primitive, pose in zip(region.primitives, region.primitive_poses, strict=True):
             try:
@@ -314,9 +309,8 @@ class RequestReader:
             lengths = [float(each) for each in primitive.dimensions]
             if not all(0.0 <= each < math.inf for each in lengths):
                 raise _bad_goal(f'{what}: the lengths of its region are {lengths}')
-            place = self.pose(pose, message.header.frame_id, what)
-            regions.append(PlacedShape(shape, place))
-        return PositionConstraint(link, frozen(-in_link.position), regions)
+            regions.append(PlacedShape(shape, self.pose(pose, message.header.frame_id, what)))
+        return PositionConstraint(link, frozen(place.position + place.rotation @ offset), regions)
 
     def _orientation(self, message: Any) -> OrientationConstraint:  # noqa: ANN401
         what = f'orientation constraint of {message.link_name!r}'
