@@ -40,6 +40,7 @@ def spin(
     executor: Executor | None = None,
     *,
     linger: float = 0.0,
+    survive: Callable[[Exception], None] | None = None,
 ) -> None:
     """Serve nodes until an event is set, or until ``rclpy.shutdown``.
 
@@ -50,6 +51,7 @@ def spin(
         stop: Ends it within :data:`WAKE_PERIOD`.
         executor: What serves them; :func:`make_executor` chooses when it is None.
         linger: Time for which they are served after that in [s], see :data:`LINGER`.
+        survive: Reports what a callback raised, and the others go on; None raises it here.
     """
     executor = executor or make_executor()
     for node in nodes:
@@ -58,7 +60,7 @@ def spin(
     try:
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
         while ok() and not stop.is_set():
-            executor.spin_once(timeout_sec=WAKE_PERIOD)
+            _spin_once(executor, survive)
         end = time.monotonic() + linger
         while ok() and (left := end - time.monotonic()) > 0.0:
             executor.spin_once(timeout_sec=min(left, WAKE_PERIOD))
@@ -66,6 +68,17 @@ def spin(
         pass
     finally:
         executor.shutdown()
+
+
+def _spin_once(executor: Executor, survive: Callable[[Exception], None] | None) -> None:
+    try:
+        executor.spin_once(timeout_sec=WAKE_PERIOD)
+    except ExternalShutdownException:
+        raise
+    except Exception as error:
+        if survive is None:
+            raise
+        survive(error)
 
 
 def spin_beside(

@@ -42,6 +42,35 @@ def test_spin_serves_until_the_end(
         try_shutdown()
 
 
+@pytest.mark.parametrize('make', [make_executor, SingleThreadedExecutor])
+def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
+    isolation: Isolation, make: Callable[[], Executor]
+) -> None:
+    """The same callback, and the others, are called again; without a report it is raised."""
+    rclpy.init(args=[], domain_id=isolation.domain_id)
+    try:
+        node = rclpy.create_node('spinner')
+        stop, reported, others = threading.Event(), list[str](), list[int]()
+
+        def fail() -> None:
+            raise ValueError('no such thing')
+
+        def report(error: Exception) -> None:
+            reported.append(str(error))
+            if len(reported) > 2 and others:
+                stop.set()
+
+        node.create_timer(0.005, fail)
+        node.create_timer(0.005, lambda: others.append(1))
+        spin([node], stop, make(), survive=report)
+        assert set(reported) == {'no such thing'}
+        with pytest.raises(ValueError, match='no such thing'):
+            spin([node], threading.Event(), make())
+        node.destroy_node()
+    finally:
+        try_shutdown()
+
+
 def test_spin_lingers(isolation: Isolation) -> None:
     """What is due soon after the event is done, as the result of a goal that has just ended."""
     rclpy.init(args=[], domain_id=isolation.domain_id)
