@@ -146,7 +146,8 @@ class UrdfShape:
         shape: What it is: box, cylinder, sphere, mesh, or empty where there is none.
         attributes: Its attributes as they are written.
         origin: Where it is in the link's frame.
-        color: Red, green, blue and opacity from 0 to 1; None where the URDF gives none.
+        color: Red, green, blue and opacity from 0 to 1; None where the URDF gives no usable one.
+        note: Why its color is not usable; empty where it is, or where there is none.
     """
 
     link: str
@@ -154,6 +155,7 @@ class UrdfShape:
     attributes: Mapping[str, str]
     origin: Transform
     color: Color | None = None
+    note: str = ''
 
     def lengths(self, *names: str) -> tuple[float, ...]:
         """Return the numbers of some of its attributes in [m].
@@ -253,7 +255,7 @@ class KinematicTree:
         """Go through what the links look like.
 
         Raises:
-            DescriptionError: The origin or the color of one is not usable.
+            DescriptionError: The origin of one is not usable.
         """
         return self._shapes('visual')
 
@@ -279,12 +281,14 @@ class KinematicTree:
             for element in link.findall(tag):
                 shape = next(iter(element.find('geometry') or ()), None)
                 place = f'link {name}, <{tag}>'
+                color, note = _color(element.find('material'), materials)
                 yield UrdfShape(
                     name,
                     '' if shape is None else shape.tag,
                     {} if shape is None else dict(shape.attrib),
                     _origin(element, place),
-                    _color(element.find('material'), materials, place),
+                    color,
+                    note,
                 )
 
     def bare_urdf(self, bound: float) -> str:
@@ -386,20 +390,25 @@ def _origin(element: ET.Element, what: str) -> Transform:
 
 
 def _color(
-    material: ET.Element | None, materials: Mapping[str | None, ET.Element], place: str
-) -> Color | None:
-    """Return the color of a material, or of the one of the robot with its name."""
+    material: ET.Element | None, materials: Mapping[str | None, ET.Element]
+) -> tuple[Color | None, str]:
+    """Return the color of a material, or of the robot's one of that name, and what is wrong.
+
+    A wrong color is no reason to refuse a robot: the shape has none then.
+    """
     if material is None:
-        return None
+        return None, ''
     known = (material, materials.get(material.get('name')))
     color = next((c for m in known if m is not None and (c := m.find('color')) is not None), None)
     if color is None:
-        return None
-    numbers = [_number(word, f'{place}, <color>') for word in color.get('rgba', '').split()]
-    if len(numbers) != 4:
-        raise DescriptionError(f'{place}: <color> needs rgba with four numbers from 0 to 1')
-    red, green, blue, opacity = numbers
-    return red, green, blue, opacity
+        return None, ''
+    words = color.get('rgba', '').split()
+    try:
+        red, green, blue, opacity = (min(max(_number(each, ''), 0.0), 1.0) for each in words)
+    except ValueError:
+        text = ' '.join(words)
+        return None, f'<color rgba="{text}"> needs four numbers from 0 to 1; shown grey'
+    return (red, green, blue, opacity), ''
 
 
 def _axis(element: ET.Element, joint: str) -> Vector:
