@@ -5,8 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
+from contextlib import closing
 import gzip
 from http.client import HTTPConnection
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
@@ -14,9 +17,10 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
-from robot_viewer.page import gate as page_gate
-from robot_viewer.page.gate import Gate
-from robot_viewer.page.overlay import Overlay, STOP_HEADER
+from robot_viewer.loopback import binding_problem
+from robot_viewer.page import overlay
+from robot_viewer.page.gate import COOKIE, Gate
+from robot_viewer.page.overlay import Overlay, STOP_HEADER, StopAnswer
 from robot_viewer.page.robot_page import RobotPage, Twist, Velocity
 
 TIMEOUT = 10.0  # [s]
@@ -27,12 +31,17 @@ class Nothing:
     """Does nothing that is asked for, but to count what stops."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin with none, and a robot that has stopped."""
         self.stops = 0
+        self.answer: StopAnswer | None = StopAnswer(stands=True, text='stopped: all')
 
-    def stop(self) -> None:
-        """Count it."""
+    def stop(self) -> Future[StopAnswer]:
+        """Count it; with no answer, the future stays as it is."""
         self.stops += 1
+        future: Future[StopAnswer] = Future()
+        if self.answer is not None:
+            future.set_result(self.answer)
+        return future
 
     def call(self, service: str) -> None:
         """Nothing."""
@@ -59,6 +68,12 @@ def actions() -> Nothing:
     return Nothing()
 
 
+@pytest.fixture(autouse=True)
+def ros_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the token of this test's pages."""
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
+
+
 @pytest.fixture(params=['127.0.0.1', EVERYWHERE], ids=['loopback', 'open'])
 def page(request: pytest.FixtureRequest, actions: Nothing) -> Iterator[RobotPage]:
     """Serve a page."""
@@ -69,8 +84,8 @@ def page(request: pytest.FixtureRequest, actions: Nothing) -> Iterator[RobotPage
 
 def get(page: RobotPage, path: str = '/', **headers: str) -> tuple[int, str, str]:
     """Request a path; return status, text and the cookie that is set."""
-    port = urlsplit(page.url).port
-    connection = HTTPConnection('127.0.0.1', port, timeout=TIMEOUT)
+    place = urlsplit(page.url)
+    connection = HTTPConnection(place.hostname or '', place.port, timeout=TIMEOUT)
     try:
         connection.request('GET', path, headers=headers)
         answer = connection.getresponse()
@@ -106,8 +121,72 @@ def test_stop_is_for_those_who_may_open_the_page(page: RobotPage, actions: Nothi
     if cookie:
         assert get(page, '/stop', **header)[0] == 403
     assert actions.stops == 0
-    assert get(page, '/stop', **cookie, **header)[0] == 200
+    assert get(page, '/stop', **cookie, **header)[:2] == (200, 'stopped: all\n')
     assert actions.stops == 1
+
+
+@pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
+@pytest.mark.parametrize(
+    ('answer', 'expected'),
+    [
+        (
+            StopAnswer(stands=False, text='NOT known to stand: joint1'),
+            (502, 'NOT known to stand: joint1\n'),
+        ),
+        (None, (504, 'no answer from the robot: use the emergency stop\n')),
+    ],
+)
+def test_only_a_robot_that_confirms_has_stopped(
+    page: RobotPage,
+    actions: Nothing,
+    monkeypatch: pytest.MonkeyPatch,
+    answer: StopAnswer | None,
+    expected: tuple[int, str],
+) -> None:
+    """That the page's own process has the request says nothing of the robot."""
+    monkeypatch.setattr(overlay, 'ANSWER_TIMEOUT', 0.1)
+    actions.answer = answer
+    assert get(page, '/stop', **{STOP_HEADER: '1'})[:2] == expected
+
+
+def test_two_pages_of_one_host_and_one_that_is_started_again(actions: Nothing) -> None:
+    """A browser has the cookies of one host together; STOP of each page works with them."""
+    header = {STOP_HEADER: '1'}
+    with closing(RobotPage(EVERYWHERE, 8300, actions)) as second:
+        with closing(RobotPage(EVERYWHERE, 8300, actions)) as first:
+            cookies = dict(cookie_of(each)['Cookie'].split('=') for each in (first, second))
+            assert len(cookies) == 2, 'the second replaced that of the first'
+            jar = '; '.join(f'{name}={value}' for name, value in cookies.items())
+            assert get(first, '/stop', Cookie=jar, **header)[0] == 200
+            assert get(second, '/stop', Cookie=jar, **header)[0] == 200
+            port = urlsplit(first.url).port
+        with closing(RobotPage(EVERYWHERE, port or 0, actions)) as again:
+            assert urlsplit(again.url).port == port
+            assert get(again, '/stop', Cookie=jar, **header)[0] == 200
+
+
+@pytest.mark.parametrize('host', [EVERYWHERE, '::', '::1', '127.0.0.2'])
+def test_the_url_of_any_binding_opens_the_page(actions: Nothing, host: str) -> None:
+    """It names an address of this computer, not the one that stands for all."""
+    if ':' in host and binding_problem(host):
+        pytest.skip('this computer has no IPv6')
+    with closing(RobotPage(host, 8300, actions)) as page:
+        status, text, _ = get(page, **cookie_of(page))
+        assert (status, '<html' in text) == (200, True)
+        assert urlsplit(page.url).hostname not in {EVERYWHERE, '::'}
+
+
+@pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
+@pytest.mark.parametrize('host', ['127.0.0.2', 'ip6-localhost', '[::1]', 'localhost'])
+def test_each_name_of_this_host_opens_the_page(page: RobotPage, host: str) -> None:
+    """As /etc/hosts of Debian has them, and the addresses of 127.0.0.0/8."""
+    assert get(page, Host=f'{host}:{urlsplit(page.url).port}')[0] == 200
+
+
+@pytest.mark.parametrize('page', [EVERYWHERE], indirect=True)
+def test_a_link_of_another_site_opens_the_page(page: RobotPage) -> None:
+    """The cookie comes with the request that follows; not with those that the site makes."""
+    assert 'SameSite=Lax' in get(page, f'/?{urlsplit(page.url).query}')[2]
 
 
 @pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
@@ -128,7 +207,8 @@ def test_the_page_has_stop_whether_it_is_packed_or_not(page: RobotPage) -> None:
 @pytest.mark.parametrize('query', ['', '?token=', '?token=x', '?other=1'])
 def test_a_page_that_is_open_to_others_needs_its_token(page: RobotPage, query: str) -> None:
     """In the URL; a wrong cookie is none."""
-    status, text, cookie = get(page, f'/{query}', Cookie=f'{page_gate.COOKIE}=wrong')
+    wrong = f'{COOKIE.format(urlsplit(page.url).port)}=wrong'
+    status, text, cookie = get(page, f'/{query}', Cookie=wrong)
     assert (status, cookie) == (403, '')
     assert 'by the URL that was printed' in text
 

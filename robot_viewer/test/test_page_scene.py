@@ -94,6 +94,32 @@ def test_what_cannot_be_shown_is_named_and_the_rest_is_there(server: ViserServer
 
 
 @pytest.mark.parametrize(
+    ('mesh', 'content', 'note'),
+    [
+        ('a.stl', b'solid nothing', 'finger: '),
+        ('a.obj', b'f 1 2 3', 'finger: '),
+        ('a.dae', b'<COLLADA', 'finger: '),
+        ('a.xyz123', b'', 'finger: '),
+    ],
+)
+def test_a_mesh_that_no_reader_takes_is_named(
+    server: ViserServer, tmp_path: Path, mesh: str, content: bytes, note: str
+) -> None:
+    """Whatever its reader raises: the rest of the robot is there."""
+    (tmp_path / mesh).write_bytes(content)
+    scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=mesh)), tmp_path)
+    (found,) = scene.notes
+    assert found.startswith(note)
+
+
+def test_a_color_that_is_none_is_named_and_its_shape_is_there(server: ViserServer) -> None:
+    """Three numbers instead of four; in grey."""
+    urdf = URDF.format(mesh='package://nobody/cube.stl').replace('1 0 0 0.5', '1 0 0')
+    notes = RobotScene(server.scene, read_urdf(urdf)).notes
+    assert notes[0] == 'base: <color rgba="1 0 0"> needs four numbers from 0 to 1; shown grey'
+
+
+@pytest.mark.parametrize(
     ('kind', 'limit', 'ends'),
     [
         ('revolute', '<limit lower="0.1" upper="2" velocity="1" effort="1"/>', (0.1, 2.0)),

@@ -5,17 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import closing, contextmanager
 from importlib import import_module
 import socket
+import sys
 import threading
 from typing import Any
 
 from canopen_interfaces.srv import CONmtID
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
 import pytest
 import rclpy
+from rclpy.action.server import ActionServer
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -25,15 +29,30 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, Trigger
 from urdf_robots import ARM
 from viewer_rig import in_domain, ViewerRig
+from viser import GuiEvent
 
 from node_runner import LATCHED, ParameterError
+from robot_viewer.nodes import controllers as controllers_module
 from robot_viewer.nodes import listening
 from robot_viewer.nodes.web_viewer import WebViewer
+from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import RobotPage
 
 pytestmark = pytest.mark.scenario
 
 TWIST = (0.0, 0.0, 0.3, 0.0, 0.0, 0.0)
+TWO_SLIDERS = """
+<robot name="two"><link name="0"/><link name="1"/><link name="2"/>
+  <joint name="a" type="revolute"><parent link="0"/><child link="1"/>
+    <limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+  <joint name="b" type="revolute"><parent link="1"/><child link="2"/>
+    <limit lower="-2" upper="2" velocity="9" effort="1"/></joint>
+</robot>
+"""
+BAD_ORIGIN = """
+<robot name="r"><link name="a"><visual><origin xyz="1 2"/>
+  <geometry><sphere radius="1"/></geometry></visual></link></robot>
+"""
 
 
 class Robot(ViewerRig):
@@ -43,6 +62,7 @@ class Robot(ViewerRig):
         """Offer them."""
         super().__init__(Node('robot'))
         self.calls: list[str] = []
+        self.success = True
         self.jogs: list[TwistStamped] = []
         self.states: list[JointState] = []
         for drive in ('joint1', 'joint2'):
@@ -75,15 +95,28 @@ class Robot(ViewerRig):
         self.calls.clear()
         return called
 
+    def answer_to(self, stop: Future[StopAnswer]) -> StopAnswer:
+        """Serve until the robot has answered to a STOP, and return what."""
+        self.spin_until(stop.done, 'an answer')
+        return stop.result()
+
     def _answer(
         self, name: str
     ) -> Callable[[Trigger.Request, Trigger.Response], Trigger.Response]:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
             self.calls.append(name)
-            response.success, response.message = True, 'done'
+            response.success, response.message = self.success, 'done'
             return response
 
         return answer
+
+
+def state_message() -> Any:
+    """Return a state of a controller of two joints."""
+    state = import_module('control_msgs.msg').JointTrajectoryControllerState()
+    state.joint_names = ['a', 'b']
+    state.feedback.positions = state.reference.positions = [0.5, -0.25]
+    return state
 
 
 @pytest.fixture
@@ -105,10 +138,41 @@ def robot(isolation: Isolation, opened: list[bool]) -> Iterator[Robot]:
 def test_stop_halts_every_drive(robot: Robot) -> None:
     """And nothing that merely has a service of that name."""
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
-    robot.viewer.stop()
+    answer = robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
+    assert robot.answer_to(answer) == StopAnswer(stands=True, text='done. done')
     robot.viewer.call('/nobody/enable')  # after good answers one that fails, which is a warning
     assert not robot.called_until_enable()
+
+
+def test_stop_is_answered_by_the_robot_alone(robot: Robot) -> None:
+    """Not by a robot that refuses, by none, or by one whose process hangs or has ended."""
+    answer = robot.viewer.stop()
+    assert robot.answer_to(answer) == StopAnswer(
+        stands=False, text='nothing here offers to be stopped'
+    )
+    robot.success = False
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    answer = robot.viewer.stop()
+    robot.called_until_enable()
+    assert robot.answer_to(answer) == StopAnswer(stands=False, text='/joint1/halt: done')
+    robot.success = True
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=robot.node.context.get_domain_id())
+    hung = Node('hung', context=context)  # it serves nothing
+    hung.create_service(Trigger, 'stop', lambda _, response: response)
+    robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
+    client = robot.viewer._trigger_clients['/stop']
+    robot.spin_until(client.service_is_ready, 'a connection')
+    answer = robot.viewer.stop()
+    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
+    assert not answer.done(), 'one of those that were asked has not answered'
+    hung.destroy_node()
+    rclpy.shutdown(context=context)
+    robot.spin_until(lambda: not client.service_is_ready(), 'its end')
+    answer = robot.viewer.stop()
+    robot.called_until_enable()
+    assert robot.answer_to(answer) == StopAnswer(stands=False, text='/stop is not there')
 
 
 def test_stop_calls_one_service_that_stops_all(robot: Robot) -> None:
@@ -274,19 +338,19 @@ def test_a_robot_that_is_out_of_reach_is_said_to_be(
     assert not robot.node.count_publishers('joint_states'), 'no sliders for a robot that was there'
 
 
-def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
-    """The last of several counts; what the page does not move stays; a stop forgets it.
+def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others stay at their references, also outside of their sliders, or go on as they were.
 
-    What follows after that is a new request, which an empty trajectory says.
+    A stop forgets all; what follows is a new request, which an empty trajectory says.
     """
     sent: list[Any] = []
     kind = import_module('trajectory_msgs.msg').JointTrajectory  # no dependency of the package
-    state = import_module('control_msgs.msg').JointTrajectoryControllerState()
-    state.joint_names = ['a', 'b']
+    state = state_message()
+    state.feedback.positions, state.reference.positions = [0.5, -9.0], [0.504, -9.004]
     robot.node.create_subscription(kind, 'arm_controller/joint_trajectory', sent.append, 10)
     states = robot.node.create_publisher(type(state), 'arm_controller/controller_state', 10)
+    robot.description.publish(String(data=TWO_SLIDERS))
     controllers = robot.viewer._controllers
-    state.feedback.positions = state.reference.positions = [0.5, -0.25]
 
     def known() -> bool:
         states.publish(state)
@@ -296,30 +360,101 @@ def test_a_target_becomes_one_smooth_motion_of_all_joints(robot: Robot) -> None:
             and bool(found.joints)
             and robot.node.count_publishers('arm_controller/joint_trajectory') > 0
             and found.commands.get_subscription_count() > 0
+            and '/arm_controller' in robot.viewer.page._targets
         )
 
     robot.spin_until(known, 'the controller')
-    robot.viewer.aim('/arm_controller', {'a': 0.9}, 0.5)
-    robot.viewer.aim('/arm_controller', {'a': 1.0}, 0.5)
+    sliders = robot.viewer.page._targets['/arm_controller']._sliders
+
+    def slide(joint: str, position: float) -> None:
+        """Move a slider as a browser does."""
+        slider = sliders[joint]
+        slider._impl.value = position
+        for callback in slider._impl.update_cb:
+            callback(GuiEvent(None, 7, slider))
+
+    slide('a', 0.9)
+    slide('a', 1.0)
     robot.spin_until(lambda: bool(sent), 'a trajectory')
     (point,) = sent[0].points
     assert list(sent[0].joint_names) == ['a', 'b']
-    assert list(point.positions) == [1.0, -0.25]
+    assert list(point.positions) == [1.0, -9.004]
     assert list(point.velocities) == list(point.accelerations) == [0.0, 0.0]
-    assert point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 > 0.9  # 15/8 of 0.5
+    assert point.time_from_start.sec + point.time_from_start.nanosec * 1e-9 > 4.5  # 15/8 of 2.5
     assert controllers.found['/arm_controller'].busy
-    robot.viewer.aim('/arm_controller', {'a': 2.0}, 0.5)
+    slide('b', -1.0)
+    robot.spin_until(lambda: len(sent) == 2, 'another trajectory')
+    assert list(sent[1].points[0].positions) == [1.0, -1.0]
+    slide('a', 99.0)  # a number may be typed
+    robot.spin_until(lambda: len(sent) == 3, 'another trajectory')
+    assert list(sent[2].points[0].positions) == [2.0, -1.0]
+    slide('a', 0.0)
     robot.viewer.stop()
     robot.spin_times(20)
-    assert len(sent) == 1
+    assert len(sent) == 3
     assert not controllers.found['/arm_controller'].busy
-    assert controllers.history.of('a')[-1].target == 0.5
-    for count in (3, 5):  # after a stop, and after a target that was not reached
+    assert controllers.history.of('a')[-1].target == 0.504
+    monkeypatch.setattr(controllers_module, 'SETTLING_TIMEOUT', 0.1)
+    monkeypatch.setattr(controllers_module, 'motion_time', lambda *_: 0.1)
+    for count in (5, 7):  # after a stop, and after a target that was not reached
         robot.viewer.aim('/arm_controller', {'a': 1.0}, 1.0)
         robot.spin_until(lambda count=count: len(sent) == count, 'an empty trajectory and another')
         assert not sent[-2].points
-        assert sent[-1].points
+        assert list(sent[-1].points[0].positions) == [1.0, -9.004]
         robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
+
+
+def test_nothing_that_the_robot_sends_ends_the_page(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What cannot be shown is said once, in the log and on the page; STOP works all the same."""
+    said: list[str] = []
+    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: said.append(text))
+    statuses = robot.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+    odd = DiagnosticStatus(name='odd', level=b'\x09', message='a level of nobody')
+
+    def shown() -> bool:
+        statuses.publish(DiagnosticArray(status=[odd]))
+        html = robot.viewer.page._statuses
+        return html is not None and 'a level of nobody' in html.content
+
+    robot.spin_until(shown, 'the status')
+    for wrong in ('<robot', BAD_ORIGIN):
+        robot.description.publish(String(data=wrong))
+        robot.spin_until(lambda: bool(said), 'a sentence')
+        assert said.pop().startswith('robot_description cannot be shown: ')
+    robot.description.publish(String(data=ARM))
+    robot.spin_until(lambda: 'robot arm' in said, 'the robot')
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    robot.viewer.stop()
+    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
+
+
+@pytest.mark.parametrize(
+    ('package', 'what'),
+    [('control_msgs', 'targets are not offered'), ('moveit_msgs', 'planning is not offered')],
+)
+def test_messages_that_are_not_installed_here_leave_the_rest(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch, package: str, what: str
+) -> None:
+    """Another computer offers what has them; it is said once, with the package."""
+    said: list[str] = []
+    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: said.append(text))
+    state = state_message()
+    moveit = import_module('moveit_msgs.action')
+    for module in ('msg', 'action', 'srv'):
+        monkeypatch.setitem(sys.modules, f'{package}.{module}', None)
+    robot.node.create_publisher(type(state), 'arm_controller/controller_state', 10)
+    ActionServer(robot.node, moveit.MoveGroup, 'move_action', lambda _: None)
+    ActionServer(robot.node, moveit.ExecuteTrajectory, 'execute_trajectory', lambda _: None)
+    robot.spin_until(lambda: bool(said), 'a sentence')
+    assert said == [
+        f'{what}: {package} is not installed here; build the workspace with it, or install it'
+    ]
+    robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
+    robot.viewer.stop()
+    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
+    assert len([each for each in said if package in each]) == 1
 
 
 @pytest.mark.parametrize('host', ['192.0.2.1', 'no.such.host.invalid', 'x..y'])

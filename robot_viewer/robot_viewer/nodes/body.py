@@ -107,7 +107,8 @@ class Body:
             end.topic_type for end in self._node.get_publishers_info_by_topic(CONTACTS)
         ):
             self._found.add(CONTACTS)
-            self._listen_to_contacts()
+            kind = import_module('quad_msgs.msg').FootContacts
+            self._listening.add(kind, CONTACTS, self._take_contacts, qos_profile_sensor_data)
         if self._poses is None and self._node.count_subscribers('body_pose'):
             self._poses = self._node.create_publisher(
                 PoseMessage, 'body_pose', QoSProfile(depth=1)
@@ -116,16 +117,6 @@ class Body:
             self._panel = self._page.offer_body()
         if self._panel is not None and self._poses is not None:
             self._panel.offer_pose(self.send)
-
-    def _listen_to_contacts(self) -> None:
-        try:
-            kind = import_module('quad_msgs.msg').FootContacts
-        except ModuleNotFoundError:  # the robot may be on another machine
-            self._node.get_logger().warning(
-                f'{CONTACTS} is not shown: {CONTACTS_TYPE} is missing here; install quad_msgs'
-            )
-            return
-        self._listening.add(kind, CONTACTS, self._take_contacts, qos_profile_sensor_data)
 
     def send(self, pose: Pose) -> None:
         """Publish a pose of the body once, at once; the controller moves there slowly."""

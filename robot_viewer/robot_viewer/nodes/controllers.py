@@ -44,6 +44,7 @@ class Controller:
         commands: Where it takes trajectories.
         joints: Its joints, once it has named them.
         positions: Where they are in [rad] or [m].
+        references: Where the controller holds them.
         wanted: Targets that were not sent yet, and the share of the greatest velocity.
         targets: Where the joints are on their way to; empty when they are not.
         ends: Steady time at which they are there in [s].
@@ -54,6 +55,7 @@ class Controller:
     commands: Publisher
     joints: tuple[str, ...] = ()
     positions: dict[str, float] = field(default_factory=dict)
+    references: dict[str, float] = field(default_factory=dict)
     wanted: tuple[Mapping[str, float], float] | None = None
     targets: Mapping[str, float] = field(default_factory=dict)
     ends: float = -math.inf
@@ -72,6 +74,20 @@ class Controller:
             abs(self.positions.get(name, math.inf) - target) < NEAR
             for name, target in self.targets.items()
         )
+
+    @property
+    def places(self) -> dict[str, float]:
+        """Where joints stay that are not sent anywhere, or go on to.
+
+        It is the reference, or each target elsewhere would move a joint on by its following error.
+        A joint that is far from it is not held there: it stays where it is.
+        """
+        held = {
+            name: self.references[name]
+            for name, position in self.positions.items()
+            if abs(self.references.get(name, math.inf) - position) < NEAR
+        }
+        return {**self.positions, **held, **self.targets}
 
 
 class Controllers:
@@ -131,18 +147,20 @@ class Controllers:
         controller.joints = tuple(message.joint_names)
         positions = dict(zip(controller.joints, message.feedback.positions, strict=False))
         targets = dict(zip(controller.joints, message.reference.positions, strict=False))
-        controller.positions = positions
+        controller.positions, controller.references = positions, targets
         self.history.add(targets, positions, time.monotonic())
 
     def aim(self, name: str, targets: Mapping[str, float], share: float) -> None:
-        """Have targets sent; of several at once the last one counts.
+        """Have targets sent, and no other joint moved; of several of a joint the last one counts.
 
         Args:
             name: The controller.
             targets: By joint in [rad] or [m].
             share: Of the greatest velocity, above 0 to 1.
         """
-        self.found[name].wanted = (targets, share)
+        controller = self.found[name]
+        earlier = controller.wanted[0] if controller.wanted else {}
+        controller.wanted = ({**earlier, **targets}, share)
 
     def stop(self) -> None:
         """Send nothing that was not sent yet, and wait for nothing: the robot was stopped."""
@@ -163,9 +181,8 @@ class Controllers:
                     controller.lets_go = False
             elif controller.wanted is not None and controller.positions:
                 (targets, share), controller.wanted = controller.wanted, None
-                duration = motion_time(controller.positions, targets, velocities, share)
-                # what is not on the page stays where it is
-                controller.targets = {**controller.positions, **targets}
+                controller.targets = {**controller.places, **targets}
+                duration = motion_time(controller.positions, controller.targets, velocities, share)
                 controller.ends = now + duration
                 controller.sent = now
                 controller.commands.publish(_trajectory(controller, duration))

@@ -4,15 +4,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import sys
 import threading
+import traceback
 
 from rclpy.node import Node
 
 from node_runner import log_as, notify_ready, spin
 
 
-def serve(node: Node, seen_at: str, close: Callable[[], None], stop: threading.Event) -> None:
+class Border:
+    """Where errors of what comes from ROS end: said once in a sentence, and all else goes on."""
+
+    def __init__(self, node: Node, say: Callable[[str], None] = lambda _: None) -> None:
+        """Report nothing yet.
+
+        Args:
+            node: Whose log has the sentences.
+            say: Shows each of them elsewhere, too.
+        """
+        self._node, self._say = node, say
+        self._said: set[str] = set()
+
+    @contextmanager
+    def around(self, what: str) -> Iterator[None]:
+        """Report what the block raises, and go on behind it.
+
+        Args:
+            what: What is not shown or offered then.
+        """
+        try:
+            yield
+        except Exception as error:  # noqa: BLE001  # whatever comes from ROS
+            self.report(what, error)
+
+    def report(self, what: str, error: Exception) -> None:
+        """Say an error, once.
+
+        Args:
+            what: What is not shown or offered.
+            error: Why.
+        """
+        text = f'{what}: {_reason(error)}'
+        if text in self._said:
+            return
+        self._said.add(text)
+        self._node.get_logger().error(text)
+        self._node.get_logger().debug(''.join(traceback.format_exception(error)))
+        self._say(text)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ModuleNotFoundError):
+        package = (error.name or str(error)).partition('.')[0]
+        return f'{package} is not installed here; build the workspace with it, or install it'
+    return str(error) if isinstance(error, ValueError) else f'{type(error).__name__}: {error}'
+
+
+def serve(
+    node: Node,
+    seen_at: str,
+    close: Callable[[], None],
+    stop: threading.Event,
+    border: Border | None = None,
+) -> None:
     """Serve a viewer until it is to end, and let its viewers go.
 
     Args:
@@ -20,11 +77,15 @@ def serve(node: Node, seen_at: str, close: Callable[[], None], stop: threading.E
         seen_at: Where the robot is seen, in words.
         close: Lets them go.
         stop: Ends it.
+        border: Where errors of its callbacks end; None for the log.
     """
+    border = border or Border(node)
     log_as(node)
+    sys.stdout.write(f'{seen_at}\n')  # not into /rosout and bags: it may have a token
+    sys.stdout.flush()
     notify_ready(seen_at)
     try:
-        spin([node], stop)
+        spin([node], stop, survive=lambda error: border.report('a message or answer', error))
     finally:
         close()
         node.destroy_node()

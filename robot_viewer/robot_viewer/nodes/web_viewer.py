@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
+import concurrent.futures
 from contextlib import suppress
 from functools import partial
 from importlib import import_module
@@ -25,7 +26,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
-from urdf_reader import DescriptionError, read_urdf, Transform
+from urdf_reader import KinematicTree, read_urdf, Transform
 
 from node_runner import (
     destroyed_when_refused,
@@ -37,7 +38,8 @@ from node_runner import (
 )
 
 from ..loopback import binding_problem
-from ..page.robot_page import RobotPage, Status, Twist, Velocity
+from ..page.overlay import StopAnswer
+from ..page.robot_page import RobotPage, STALE, Status, Twist, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
@@ -45,7 +47,7 @@ from .controllers import Controllers
 from .first_motion import FirstMotion
 from .listening import Listening
 from .motion_planning import MotionPlanning
-from .serving import serve
+from .serving import Border, serve
 
 NAME = 'web_viewer'
 PORT = 8080
@@ -125,6 +127,7 @@ class WebViewer(Node):
         self._walks: Publisher | None = None
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
+        self.border = Border(self, lambda text: self.page.say(text, failed=True))
         self._body = Body(self, self.page, self._listening, self._positions)
         self._first_motion = FirstMotion(
             self, self.page, self._positions, self._statuses, self._order
@@ -139,17 +142,14 @@ class WebViewer(Node):
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
         self.seen_at = f'the robot is seen at {self.page.url}'
-        self.get_logger().info(self.seen_at)
 
     # -- what is shown
 
     def _describe(self, message: String) -> None:
-        try:
-            tree = read_urdf(message.data)
-        except DescriptionError as error:
-            self.get_logger().error(f'robot_description cannot be shown: {error}')
-            self.page.say(f'robot_description: {error}', failed=True)
-            return
+        with self.border.around('robot_description cannot be shown'):
+            self._show(read_urdf(message.data))
+
+    def _show(self, tree: KinematicTree) -> None:
         self._root, self._drawn = tree.root, {}
         self._velocities = greatest_velocities(tree)
         notes = self.page.show_robot(tree)
@@ -176,7 +176,7 @@ class WebViewer(Node):
 
     def _take_statuses(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            level = int.from_bytes(status.level, 'little')
+            level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
             values = {each.key: each.value for each in status.values}
             self._statuses[status.name] = Status(status.name, level, status.message, values)
 
@@ -223,16 +223,21 @@ class WebViewer(Node):
 
     def _look_around(self) -> None:
         services = dict(self.get_service_names_and_types())
-        self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
-        self._first_motion.look(services, self._drives)
-        self._find_jogging()
-        self._controllers.look(self.resolve_topic_name('robot_description'))
-        for name, controller in self._controllers.found.items():
-            if controller.joints:
-                self.page.offer_targets(name, controller.joints)
-        self._find_walking(services)
-        self._planning.look(services)
-        self._body.look()
+        around = self.border.around
+        with around('drives are not offered'):
+            self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
+        with around('the first motion is not offered'):
+            self._first_motion.look(services, self._drives)
+        with around('jogging is not offered'):
+            self._find_jogging()
+        with around('targets are not offered'):
+            self._find_controllers()
+        with around('walking is not offered'):
+            self._find_walking(services)
+        with around('planning is not offered'):
+            self._planning.look(services)
+        with around('the body is not shown'):
+            self._body.look()
         others = self.count_publishers('joint_states') - (self._joint_states is not None)
         self._robot_publishes |= bool(others)  # also while a link is cut, or when it has ended
         self._own = not self._robot_publishes and bool(self._root)
@@ -258,6 +263,12 @@ class WebViewer(Node):
             self._client(service)  # it takes time to find its server, which a STOP has not
         self.page.offer_drives(self._drives)
 
+    def _find_controllers(self) -> None:
+        self._controllers.look(self.resolve_topic_name('robot_description'))
+        for name, controller in self._controllers.found.items():
+            if controller.joints:
+                self.page.offer_targets(name, controller.joints)
+
     def _find_jogging(self) -> None:
         topic = 'servo_node/delta_twist_cmds'
         if self._jogs is None and self.count_subscribers(topic):
@@ -267,24 +278,18 @@ class WebViewer(Node):
     def _find_walking(self, services: Mapping[str, Sequence[str]]) -> None:
         name = self.resolve_service_name('set_mode')
         if self._set_mode is None and SET_MODE_TYPE in services.get(name, ()):
-            try:
-                kind = import_module('quad_msgs.srv').SetMode
-            except ModuleNotFoundError:  # the robot may be on another machine
-                self.get_logger().warning(
-                    f'the page offers no walking: {SET_MODE_TYPE} is missing here; install '
-                    'quad_msgs',
-                    once=True,
-                )
-                return
+            kind = import_module('quad_msgs.srv').SetMode
             self._set_mode = self.create_client(kind, 'set_mode')
             self._walks = self.create_publisher(TwistMessage, 'cmd_vel', QoSProfile(depth=1))
             self.page.offer_walk(WALKING_MODES)
 
     # -- what people do on the page, in its threads
 
-    def stop(self) -> None:
-        """Stop whatever moves."""
-        self._order(self._stop)
+    def stop(self) -> concurrent.futures.Future[StopAnswer]:
+        """Stop whatever moves; the future has the robot's answer."""
+        answer: concurrent.futures.Future[StopAnswer] = concurrent.futures.Future()
+        self._order(partial(self._stop, answer))
+        return answer
 
     def call(self, service: str) -> None:
         """Call a Trigger service."""
@@ -323,11 +328,12 @@ class WebViewer(Node):
     def _order(self, order: Callable[[], object]) -> None:
         self._orders.append(order)
 
-    def _stop(self) -> None:
-        self._controllers.stop()
-        self._first_motion.stop()
-        self._planning.stop()
-        called = {service for service in self._stops if self._call(service)}
+    def _stop(self, answer: concurrent.futures.Future[StopAnswer]) -> None:
+        calls = {service: self._call(service) for service in sorted(self._stops)}
+        called = {service for service, call in calls.items() if call is not None}
+        for stop in (self._controllers.stop, self._first_motion.stop, self._planning.stop):
+            with self.border.around('STOP'):
+                stop()
         try:
             doubtful = self._doubtful_stops(called)
         except Exception as error:  # noqa: BLE001  # whatever it is, the drives are halted
@@ -335,13 +341,17 @@ class WebViewer(Node):
             doubtful = {service: [] for service in called}
         for drive in self._drives:
             if _stop_beside(drive) not in called - doubtful.keys():
-                self._call(f'{drive}/halt')
+                calls[f'{drive}/halt'] = self._call(f'{drive}/halt')
         for service, others in doubtful.items():
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
             self._report(service, f'{text}, too. Give that service another name', failed=True)
-        if not self._drives and not self._stops:
-            self.page.say('STOP: nothing here offers to be stopped', failed=True)
+        if not calls:
+            text = 'nothing here offers to be stopped'
+            self.page.say(f'STOP: {text}', failed=True)
+            answer.set_result(StopAnswer(stands=False, text=text))
+            return
+        _StopCalls(calls, answer)
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
         """Return those that are not a robot's own alone, with the other nodes that offer them.
@@ -368,14 +378,15 @@ class WebViewer(Node):
             self._trigger_clients[service] = self.create_client(Trigger, service)
         return self._trigger_clients[service]
 
-    def _call(self, service: str) -> bool:
-        """Call a Trigger service; return whether it is there."""
+    def _call(self, service: str) -> Future | None:
+        """Call a Trigger service; return its answer to come, None where it is not there."""
         client = self._client(service)
         if not client.service_is_ready():
             self._report(service, 'is not there', failed=True)
-            return False
-        client.call_async(Trigger.Request()).add_done_callback(partial(self._answered, service))
-        return True
+            return None
+        future = client.call_async(Trigger.Request())
+        future.add_done_callback(partial(self._answered, service))
+        return future
 
     def _request_mode(self, mode: str) -> None:
         if self._set_mode is not None:
@@ -408,6 +419,47 @@ class WebViewer(Node):
         self._joint_states.publish(message)
 
 
+class _StopCalls:
+    """The calls of one STOP: the robot stands when each of them was answered with success."""
+
+    def __init__(
+        self,
+        calls: Mapping[str, Future | None],
+        answer: concurrent.futures.Future[StopAnswer],
+    ) -> None:
+        """Wait for them; the first that fails is the answer.
+
+        Args:
+            calls: By service; None where it is not there.
+            answer: What is to be answered.
+        """
+        self._answer = answer
+        self._open = {service for service, call in calls.items() if call is not None}
+        self._texts: list[str] = []
+        for service, call in calls.items():
+            if call is None:
+                self._fail(f'{service} is not there')
+            else:
+                call.add_done_callback(partial(self._answered, service))
+
+    def _answered(self, service: str, call: Future) -> None:
+        self._open.discard(service)
+        if call.exception() is not None:
+            self._fail(f'{service}: no answer: {call.exception()}')
+            return
+        response = call.result()
+        if not response.success:
+            self._fail(f'{service}: {response.message}')
+            return
+        self._texts.append(response.message)
+        if not self._open and not self._answer.done():
+            self._answer.set_result(StopAnswer(stands=True, text='. '.join(self._texts)))
+
+    def _fail(self, text: str) -> None:
+        if not self._answer.done():  # also when the page waits no more
+            self._answer.set_result(StopAnswer(stands=False, text=text))
+
+
 def _stop_beside(node: str) -> str:
     """Return the service that stops all of the robot in whose namespace a node is."""
     return f'{node.rpartition("/")[0]}/{STOP}'
@@ -424,4 +476,4 @@ def main() -> int:
 
 def _serve(stop: threading.Event) -> None:
     node = WebViewer()
-    serve(node, node.seen_at, node.page.close, stop)
+    serve(node, node.seen_at, node.page.close, stop, node.border)

@@ -9,13 +9,16 @@ connect to a loopback port. So each request is looked at before viser sees it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 import hmac
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from inspect import isawaitable
+import os
+from pathlib import Path
 import secrets
+from tempfile import NamedTemporaryFile
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -23,10 +26,13 @@ import websockets.asyncio.server as websocket_server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from ..loopback import is_loopback, LOOPBACK_NAMES
+from ..loopback import is_loopback
 from .overlay import Overlay, text_response
 
-COOKIE = 'robot_viewer_token'
+COOKIE = 'robot_viewer_token_{}'
+"""By port: a browser sends the cookies of a host to all its ports, and each page has one."""
+HTTP_PORT = 80
+KEPT_AS = 'robot_viewer_token'
 
 
 class Gate:
@@ -34,7 +40,8 @@ class Gate:
 
     On loopback the Host and Origin headers have to name this host: no page of elsewhere, also
     under a name that was pointed here (DNS rebinding), moves the robot. Beyond it a token is
-    needed, once in the URL and then as a cookie, and Origin has to be the page's own host.
+    needed, once in the URL and then as a cookie, and Origin has to be the page's own host. The
+    token stays, so that the STOP of a page that is open works when its server was started again.
 
     Attributes:
         token: What a page from elsewhere needs; empty on loopback.
@@ -48,7 +55,7 @@ class Gate:
             overlay: What lies over the page for those who may open it.
         """
         self._overlay = overlay
-        self.token = '' if is_loopback(host) else secrets.token_urlsafe(24)
+        self.token = '' if is_loopback(host) else _lasting_token()
         self._serving = False
 
     def answer(self, path: str, headers: Headers) -> Response | None:
@@ -59,28 +66,34 @@ class Gate:
             headers: Its headers.
         """
         hosts = headers.get_all('Host')
-        host = urlsplit(f'//{hosts[0]}').hostname if len(hosts) == 1 else None
-        if host is None or (not self.token and host not in LOOPBACK_NAMES):
+        place = urlsplit(f'//{hosts[0]}') if len(hosts) == 1 else None
+        if (
+            place is None
+            or place.hostname is None
+            or not (self.token or is_loopback(place.hostname))
+        ):
             return _refusal('the page is for this host only; open it as http://localhost')
         origins = headers.get_all('Origin')
         if origins and [urlsplit(origin).netloc for origin in origins] != hosts:
             return _refusal('another page may not use this one')
-        if not self.token or self._is_known(headers.get_all('Cookie')):
+        name = COOKIE.format(place.port or HTTP_PORT)
+        if not self.token or self._is_known(name, headers.get_all('Cookie')):
             return None
         given = parse_qs(urlsplit(path).query).get('token', [''])
         if not hmac.compare_digest(given[0].encode(), self.token.encode()):
             return _refusal('open the page by the URL that was printed at its start')
-        cookie = f'{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/'
+        # Lax: also a link of another site opens the page; its requests carry the cookie no more
+        cookie = f'{name}={self.token}; HttpOnly; SameSite=Lax; Path=/'
         return text_response(HTTPStatus.SEE_OTHER, '', {'Location': '/', 'Set-Cookie': cookie})
 
-    def _is_known(self, cookies: list[str]) -> bool:
+    def _is_known(self, name: str, cookies: list[str]) -> bool:
         jar = SimpleCookie()
         try:
             for cookie in cookies:
                 jar.load(cookie)
         except CookieError:
             return False
-        given = jar[COOKIE].value if COOKIE in jar else ''
+        given = jar[name].value if name in jar else ''
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     @contextmanager
@@ -111,7 +124,7 @@ class Gate:
         connection: Any,  # noqa: ANN401
         request: Request,
     ) -> Response | None:
-        answer = self.answer(request.path, request.headers) or self._overlay.answer(request)
+        answer = self.answer(request.path, request.headers) or await self._overlay.answer(request)
         if answer is not None or next_one is None:
             return answer
         result = next_one(connection, request)
@@ -119,6 +132,23 @@ class Gate:
             result = await result
         page: Response | None = result
         return page and self._overlay.over(page)
+
+
+def _lasting_token() -> str:
+    """Return the token of this user's pages, which is made once; without a home, one for now."""
+    fresh = secrets.token_urlsafe(24)
+    try:
+        folder = Path(os.environ.get('ROS_HOME') or Path.home() / '.ros')
+        folder.mkdir(parents=True, exist_ok=True)
+        kept = folder / KEPT_AS
+        with NamedTemporaryFile('w', dir=folder) as file:  # only its owner may read it
+            file.write(fresh)
+            file.flush()
+            with suppress(FileExistsError):
+                os.link(file.name, kept)
+        return kept.read_text().strip() or fresh
+    except (OSError, RuntimeError):
+        return fresh
 
 
 def _refusal(reason: str) -> Response:

@@ -8,7 +8,10 @@ request of its own over HTTP, not behind whatever waits in the page's connection
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
 import gzip
 from http import HTTPStatus
 from pathlib import Path
@@ -20,23 +23,39 @@ STOP_PATH = '/stop'
 STOP_HEADER = 'X-Robot-Stop'
 """What no page of another site can send without being asked."""
 END = b'</body>'
+ANSWER_TIMEOUT = 8.0
+"""Time in [s] that a request for STOP waits for the robot; the page warns long before."""
+NO_ANSWER = 'no answer from the robot: use the emergency stop'
+
+
+@dataclass(frozen=True, slots=True)
+class StopAnswer:
+    """What the robot answered to a STOP.
+
+    Attributes:
+        stands: It has confirmed that nothing moves.
+        text: Its words, or why there are none.
+    """
+
+    stands: bool
+    text: str
 
 
 class Overlay:
     """Answers requests for STOP, and adds itself to the page that viser serves."""
 
-    def __init__(self, stop: Callable[[], None]) -> None:
+    def __init__(self, stop: Callable[[], Future[StopAnswer]]) -> None:
         """Take what STOP does.
 
         Args:
-            stop: Called in the thread of the server; it does not wait.
+            stop: Called in the thread of the server; it does not wait for the robot.
         """
         self._stop = stop
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
         self._page = b''
 
-    def answer(self, request: Request) -> Response | None:
-        """Return the answer to a request for STOP; None for others.
+    async def answer(self, request: Request) -> Response | None:
+        """Return what the robot answers to a request for STOP; None for other requests.
 
         Args:
             request: One that may come in.
@@ -45,8 +64,13 @@ class Overlay:
             return None
         if STOP_HEADER not in request.headers:
             return text_response(HTTPStatus.FORBIDDEN, f'STOP needs the header {STOP_HEADER}')
-        self._stop()
-        return text_response(HTTPStatus.OK, 'STOP is on its way')
+        try:
+            called = asyncio.shield(asyncio.wrap_future(self._stop()))
+            answer = await asyncio.wait_for(called, ANSWER_TIMEOUT)
+        except TimeoutError:
+            return text_response(HTTPStatus.GATEWAY_TIMEOUT, NO_ANSWER)
+        status = HTTPStatus.OK if answer.stands else HTTPStatus.BAD_GATEWAY
+        return text_response(status, answer.text)
 
     def over(self, response: Response) -> Response:
         """Return a response with the overlay in it, if it is the page.

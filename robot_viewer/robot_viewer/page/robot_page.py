@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from functools import partial
@@ -28,6 +29,7 @@ from viser import (
 
 from first_motion import JointKind as MotionKind
 
+from ..loopback import shown_host
 from .aim import History
 from .body_panel import BodyPanel
 from .deadman import Deadman, HEARTBEAT
@@ -35,7 +37,7 @@ from .drive_table import drive_html
 from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
 from .motion_plan import PlanRequest
-from .overlay import Overlay
+from .overlay import Overlay, StopAnswer
 from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
 from .target_panel import PlotPanel, TargetPanel
@@ -78,7 +80,8 @@ WALKS: Mapping[str, Velocity] = {
 
 COLORS = ('#2f9e44', '#e8a400', '#e03131', '#868e96')
 """Of the levels of a status: good, warning, error, stale."""
-WORST = (2, 3, 1, 0)
+STALE = 3
+WORST = (2, STALE, 1, 0)
 """Levels of a status, the worst first."""
 
 
@@ -102,8 +105,8 @@ class Status:
 class Actions(Protocol):
     """What a page may have done; any thread may call it, and none of it waits."""
 
-    def stop(self) -> None:
-        """Stop whatever moves."""
+    def stop(self) -> Future[StopAnswer]:
+        """Stop whatever moves; the future has the robot's answer."""
 
     def call(self, service: str) -> None:
         """Call a Trigger service."""
@@ -144,8 +147,7 @@ class RobotPage:
         gate = Gate(host, Overlay(self._stop))
         with gate.before(), redirect_stdout(io.StringIO()):  # viser draws its own banner
             self._server = ViserServer(host, port, label='robot', verbose=False)
-        shown = 'localhost' if not gate.token else host
-        self.url = f'http://{shown}:{self._server.get_port()}'
+        self.url = f'http://{shown_host(host)}:{self._server.get_port()}'
         if gate.token:
             self.url += f'/?token={gate.token}'
         self._scene: RobotScene | None = None
@@ -249,7 +251,7 @@ class RobotPage:
                 self._statuses = self._server.gui.add_html('')
         ordered = sorted(statuses, key=lambda status: (WORST.index(status.level), status.name))
         self._statuses.content = ''.join(
-            f'{_line(status.name, COLORS[min(status.level, 3)], strong=True)}'
+            f'{_line(status.name, COLORS[status.level], strong=True)}'
             f'<div style="margin:0 0 0.5em 1em">{escape(status.message)}</div>'
             for status in ordered
         )
@@ -306,8 +308,7 @@ class RobotPage:
             return
         unwell = [status for status in drives.values() if status.level]
         self._drive_state.content = ''.join(
-            _line(f'{status.name}: {status.message}', COLORS[min(status.level, 3)])
-            for status in unwell
+            _line(f'{status.name}: {status.message}', COLORS[status.level]) for status in unwell
         ) or _line('no drive reports anything wrong', COLORS[0])
 
     def offer_targets(self, controller: str, joints: Sequence[str]) -> bool:
@@ -401,13 +402,13 @@ class RobotPage:
             for title, velocity in WALKS.items():
                 self._held(title, partial(self._walk, speed, velocity), rest)
 
-    def _stop(self) -> None:
+    def _stop(self) -> Future[StopAnswer]:
         self._deadman.stop()  # or a button that is held would go on
         for panel in list(self._targets.values()):
             panel.lock()  # or a slider that is dragged
         if self._body is not None:
             self._body.lock()
-        self._actions.stop()
+        return self._actions.stop()
 
     def say(self, text: str, *, failed: bool = False) -> None:
         """Show what became of the last request."""

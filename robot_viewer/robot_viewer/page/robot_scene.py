@@ -181,10 +181,15 @@ class RobotScene:
         missing: dict[str, list[str]] = {}
         shapes = [each for each in shapes_of(self._tree) if each.link in self._links]
         for number, shape in enumerate(shapes):
+            if shape.note:
+                missing.setdefault(shape.note, []).append(shape.link)
             try:
                 self._add_shape(f'{self._paths[shape.link]}/shape{number}', shape)
-            except (OSError, ValueError) as error:  # noqa: PERF203  # the others are shown
+            except ValueError as error:
                 missing.setdefault(str(error), []).append(shape.link)
+            except Exception as error:  # noqa: BLE001  # readers of meshes; the others are shown
+                reason = f'{type(error).__name__}: {error}'
+                missing.setdefault(reason, []).append(shape.link)
         self.notes += [f'{", ".join(links)}: {reason}' for reason, links in missing.items()]
 
     def _add_shape(self, name: str, shape: UrdfShape) -> None:

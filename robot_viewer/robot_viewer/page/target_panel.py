@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 import time
 
 import numpy as np
@@ -33,7 +34,7 @@ Aim = Callable[[Mapping[str, float], float], None]
 
 
 class TargetPanel:
-    """A slider for each joint of a controller: whoever moves one sends all where they show.
+    """A slider for each joint of a controller: whoever moves one sends that joint where it shows.
 
     Only what a person does in a browser sends anything; sliders that follow the robot do not, nor
     do any after STOP until they are unlocked.
@@ -58,7 +59,7 @@ class TargetPanel:
         for joint in joints:
             low, high = travel(joint)
             slider = gui.add_slider(joint.name, low, high, (high - low) / 1000.0, low)
-            slider.on_update(self._moved)
+            slider.on_update(partial(self._moved, joint.name))
             self._sliders[joint.name] = slider
 
     def follow(self, positions: Mapping[str, float], *, busy: bool) -> None:
@@ -82,14 +83,15 @@ class TargetPanel:
     def _set_locked(self, *, locked: bool) -> None:
         self._unlock.visible = locked
 
-    def _moved(self, event: GuiEvent[GuiSliderHandle[float]]) -> None:
+    def _moved(self, joint: str, event: GuiEvent[GuiSliderHandle[float]]) -> None:
         if event.client_id is None:  # it follows its joint
             return
         if self._unlock.visible:
             return
         self._touched = time.monotonic()
-        targets = {name: slider.value for name, slider in self._sliders.items()}
-        self._aim(targets, self._speed.value / 100.0)
+        slider = event.target
+        target = min(max(slider.value, slider.min), slider.max)  # numbers are typed, too
+        self._aim({joint: target}, self._speed.value / 100.0)
 
 
 class PlotPanel:

@@ -116,7 +116,6 @@ class FoxgloveBridge(Node):
         self.create_timer(LOOK_PERIOD, self._look)
         self._look()
         self.url = _url(settings, self._relay.port, admission.token)
-        self.get_logger().info(self.seen_at)
 
     @property
     def seen_at(self) -> str:
