@@ -29,6 +29,7 @@ from .names import ArmNames, names_of
 from .pose import combined, inverse, ORIGIN, Pose, rotation_of, turned_twists
 from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
+from .scene.default_collisions import with_default_collisions
 from .scene.objects import AttachedBody, CollisionObject
 from .scene.octomap import octomap_boxes, OCTOMAP_NAME
 from .scene.padding import padded
@@ -93,4 +94,5 @@ __all__ = [
     'sample_link_pairs',
     'start_pose',
     'turned_twists',
+    'with_default_collisions',
 ]

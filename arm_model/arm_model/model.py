@@ -114,7 +114,8 @@ class RobotModel:
         self.scene = with_default_collisions(
             PlanningScene(self.kinematics, shapes.by_link, allowed),
             tree,
-            self.limits,
+            self.limits.lower,
+            self.limits.upper,
             contact_notes,
         )
         self.notes_beside_contact = tuple(notes)

@@ -30,6 +30,7 @@ from move_group_rig import (
 )
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup, MoveGroupSequence
 from moveit_msgs.msg import (
+    AllowedCollisionEntry,
     AttachedCollisionObject,
     CollisionObject,
     DisplayTrajectory,
@@ -37,6 +38,7 @@ from moveit_msgs.msg import (
     MoveItErrorCodes,
     PlanningScene,
     PlanningSceneComponents,
+    PlanningSceneWorld,
 )
 from moveit_msgs.srv import (
     ApplyPlanningScene,
@@ -385,6 +387,74 @@ def test_goals_and_path_constraints_of_what_is_held(
         change.robot_state.attached_collision_objects = []
         change.world.collision_objects = [CollisionObject(operation=CollisionObject.REMOVE)]
         assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
+
+
+def apply(rig: MoveGroupRig, **changes: Any) -> None:
+    """Apply a change of the scene."""
+    scene = PlanningScene(is_diff=True, **changes)
+    scene.robot_state.is_diff = True
+    asked = ApplyPlanningScene.Request(scene=scene)
+    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', asked).success
+
+
+def whole_scene(rig: MoveGroupRig) -> PlanningScene:
+    """Return the scene."""
+    asked = GetPlanningScene.Request()
+    return rig.client.call(GetPlanningScene, '/get_planning_scene', asked).scene
+
+
+def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroupRig) -> None:
+    """Defaults stay defaults, either triangle counts, and REMOVE forgets what a name may touch."""
+    place = tip(rig).position
+
+    def cup(operation: bytes) -> PlanningSceneWorld:
+        thing = box('cup', place.x, place.y, place.z, edge=0.05, operation=operation)
+        return PlanningSceneWorld(collision_objects=[thing])
+
+    def outcome() -> int:
+        return int(rig.plan(motion_request(joint_goal(READY))).error_code.val)
+
+    touching = MoveItErrorCodes.START_STATE_IN_COLLISION
+    apply(rig, world=cup(CollisionObject.ADD))
+    assert outcome() == touching
+    matrix = whole_scene(rig).allowed_collision_matrix
+    entries = len(matrix.entry_names)
+    matrix.default_entry_names, matrix.default_entry_values = ['cup'], [True]
+    apply(rig, allowed_collision_matrix=matrix)
+    assert outcome() == SUCCESS
+    matrix = whole_scene(rig).allowed_collision_matrix
+    assert (list(matrix.default_entry_names), list(matrix.default_entry_values)) == (
+        ['cup'],
+        [True],
+    )
+    apply(rig, allowed_collision_matrix=matrix)  # what was read
+    matrix.default_entry_values = [False]
+    kept = [number for number, name in enumerate(matrix.entry_names) if name != 'cup']
+    matrix.entry_names = [matrix.entry_names[number] for number in kept]
+    matrix.entry_values = [
+        AllowedCollisionEntry(enabled=[matrix.entry_values[row].enabled[each] for each in kept])
+        for row in kept
+    ]
+    assert len(kept) == entries
+    apply(rig, allowed_collision_matrix=matrix)
+    assert outcome() == touching
+    matrix.default_entry_names, matrix.default_entry_values = [], []
+    for is_upper in (True, False):
+        before = deepcopy(matrix)
+        filled = deepcopy(matrix)
+        filled.entry_names = [*filled.entry_names, 'cup']
+        for row in filled.entry_values:
+            row.enabled = [*row.enabled, is_upper]
+        filled.entry_values.append(
+            AllowedCollisionEntry(enabled=[*([not is_upper] * entries), False])
+        )
+        apply(rig, allowed_collision_matrix=filled)
+        assert outcome() == SUCCESS, is_upper
+        apply(rig, world=cup(CollisionObject.REMOVE))
+        apply(rig, world=cup(CollisionObject.ADD))
+        assert outcome() == touching
+        assert whole_scene(rig).allowed_collision_matrix == before
+    apply(rig, world=cup(CollisionObject.REMOVE))
 
 
 NAMES: dict[str, str] = {

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 from model_robots import two_arms_texts
 from moveit_msgs.msg import PositionIKRequest
@@ -75,6 +76,15 @@ def anywhere(draw: np.random.Generator) -> Array:
     places = dict(zip(robot().joints, draw.uniform(-1.2, 1.2, len(robot().joints)), strict=True))
     places |= {'right_1': 0.0, 'right_2': draw.normal(ACROSS, 0.3), 'left_3': 0.0}
     return robot().positions(places)
+
+
+def test_the_scene_of_the_robot_allows_what_no_group_can_help() -> None:
+    """Neighbouring links of every arm, not only of the group that comes first."""
+    allowed = robot().scene.allowed
+    for side, last in (('left', 3), ('right', 2)):
+        links = ['torso_link', *(f'{side}_{number}_link' for number in range(1, last + 1))]
+        assert all(allowed.allows(*pair) for pair in pairwise(links)), side
+    assert not allowed.allows('left_3_link', 'right_2_link')
 
 
 def moved(positions: Array, left: Array) -> Array:

@@ -154,11 +154,18 @@ def apply_attached_object(
     return draft.scene()
 
 
-def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
+def allowed_collisions(
+    message: MatrixMessage, before: AllowedCollisionMatrix | None = None
+) -> AllowedCollisionMatrix:
     """Return what may touch.
+
+    An entry that says what the defaults of its names say is none, as in MoveIt: whoever takes a
+    default back has not made an entry by sending the matrix that he read.
 
     Args:
         message: The message.
+        before: What may touch so far: of a pair whose two entries differ, as in a matrix that is
+            filled in one triangle only, the one that changes this counts.
 
     Raises:
         SceneError: Rows or columns are missing.
@@ -175,21 +182,29 @@ def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
             f'allowed_collision_matrix: {len(message.default_entry_names)} default_entry_names'
             f' and {len(defaults)} default_entry_values'
         )
-    entries = {
-        frozenset((first, names[column])): bool(rows[row].enabled[column])
-        for row, first in enumerate(names)
-        for column in range(row)
-    }
-    return AllowedCollisionMatrix(
-        entries, dict(zip(message.default_entry_names, map(bool, defaults), strict=True))
+    by_default = AllowedCollisionMatrix(
+        defaults=dict(zip(message.default_entry_names, map(bool, defaults), strict=True))
     )
+    before = before or AllowedCollisionMatrix()
+    entries = {}
+    for row, first in enumerate(names):
+        for column in range(row):
+            second = names[column]
+            one, other = bool(rows[row].enabled[column]), bool(rows[column].enabled[row])
+            allowed = one if one == other else not before.allows(first, second)
+            if not (
+                by_default.defaults.keys() & {first, second}
+                and by_default.allows(first, second) == allowed
+            ):
+                entries[frozenset((first, second))] = allowed
+    return AllowedCollisionMatrix(entries, by_default.defaults)
 
 
 def _merged(scene: PlanningScene, message: MatrixMessage) -> AllowedCollisionMatrix | None:
     """Return the matrix of a message, and what the scene has for links that it does not name."""
     if not (message.entry_names or message.default_entry_names):
         return None
-    given = allowed_collisions(message)
+    given = allowed_collisions(message, scene.allowed)
     named, links = set(message.entry_names), set(scene.kinematics.frames)
     kept = {
         pair: allowed

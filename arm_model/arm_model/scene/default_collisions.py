@@ -18,7 +18,6 @@ import numpy as np
 from urdf_reader import KinematicTree, Pair
 
 from ..arrays import Array
-from ..limits import JointLimits
 from .clearances import Clearances
 from .planning_scene import PlanningScene
 
@@ -64,7 +63,7 @@ class SampledContacts:
 
 
 def with_default_collisions(
-    scene: PlanningScene, tree: KinematicTree, limits: JointLimits, notes: list[str]
+    scene: PlanningScene, tree: KinematicTree, lower: Array, upper: Array, notes: list[str]
 ) -> PlanningScene:
     """Return the scene in which links may touch that cannot help it.
 
@@ -74,7 +73,8 @@ def with_default_collisions(
     Args:
         scene: The scene.
         tree: The description.
-        limits: Limits of the joints.
+        lower: Least positions of the scene's joints in [rad] or [m].
+        upper: Greatest positions.
         notes: Where pairs are named that were not in the SRDF.
     """
     allowed = scene.allowed
@@ -87,7 +87,7 @@ def with_default_collisions(
             'the SRDF has no disable_collisions: adjacent links are not checked for collision'
             f' with each other ({_named(adjacent)})'
         )
-    touching = always_in_contact(scene, limits)
+    touching = always_in_contact(scene, lower, upper)
     enabled = {pair for pair in touching if allowed.entries.get(pair) is False}
     if always := _sorted(touching - enabled):
         notes.append(
@@ -126,18 +126,17 @@ def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]
     return frozenset(pair for pair in pairs if pair <= set(scene.link_shapes))
 
 
-def always_in_contact(scene: PlanningScene, limits: JointLimits) -> frozenset[Pair]:
+def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> frozenset[Pair]:
     """Return pairs of links that touch in nearly all poses.
 
     Args:
         scene: The scene.
-        limits: Limits of the joints; a continuous one turns once.
+        lower: Least positions of its joints; minus infinity for one that turns without end.
+        upper: Greatest positions.
     """
     clearances, apart = Clearances(scene), Counter[Pair]()
     candidates = set(map(frozenset, scene.pairs))
-    lower = np.where(limits.continuous, -HALF_TURN, limits.lower)
-    upper = np.where(limits.continuous, HALF_TURN, limits.upper)
-    for positions in _drawn(lower, upper, SAMPLES):
+    for positions in _drawn(*_one_turn(lower, upper), SAMPLES):
         touching = clearances.contacts(positions)
         apart.update(candidates.difference(frozenset(each.bodies) for each in touching))
         candidates = {pair for pair in candidates if apart[pair] <= (1 - MIN_SHARE) * SAMPLES}
@@ -157,9 +156,8 @@ def sampled_contacts(
         upper: Greatest positions.
         samples: Number of poses.
     """
-    lower = np.where(np.isfinite(lower), lower, -HALF_TURN)
-    upper = np.where(np.isfinite(upper), upper, HALF_TURN)
     clearances = Clearances(scene)
+    lower, upper = _one_turn(lower, upper)
     poses = np.array(list(_drawn(lower, upper, samples)))
     found = np.array([clearances.least(pose, np.inf).copy() for pose in poses])
     columns: dict[Pair, list[int]] = {}
@@ -194,6 +192,14 @@ def _least_nearby(
         if found < 0.0:
             break
     return found
+
+
+def _one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Return ranges in which joints without an end turn once."""
+    return (
+        np.where(np.isfinite(lower), lower, -HALF_TURN),
+        np.where(np.isfinite(upper), upper, HALF_TURN),
+    )
 
 
 def _drawn(lower: Array, upper: Array, samples: int) -> Iterator[Array]:

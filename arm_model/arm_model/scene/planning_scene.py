@@ -19,6 +19,7 @@ from ..kinematics import Kinematics
 from ..pose import combined, inverse, Pose
 from .allowed_collisions import AllowedCollisionMatrix
 from .objects import AttachedBody, CollisionObject
+from .octomap import OCTOMAP_NAME
 from .shapes import native, PlacedShape
 
 
@@ -183,7 +184,11 @@ class PlanningScene:
         self._check_links(name, link)
         place = inverse(self.kinematics.link_pose(link, positions))
         thing = self.objects[name].at(combined(place, self.objects[name].pose))
-        return self.without(name).with_attached(AttachedBody(thing, link, frozenset(touch_links)))
+        body = AttachedBody(thing, link, frozenset(touch_links))
+        return self.with_contents(
+            objects={each: other for each, other in self.objects.items() if each != name},
+            attached_bodies={**self.attached_bodies, name: body},
+        )
 
     def with_attached(self, body: AttachedBody) -> PlanningScene:
         """Return the scene with an attached body, in the place of one with its name.
@@ -210,7 +215,9 @@ class PlanningScene:
             raise ObjectNameError(f'no attached body {name!r}; {self._known()}')
         body = self.attached_bodies[name]
         place = self.kinematics.link_pose(body.link, positions)
-        return self.without(name).with_object(body.object.at(combined(place, body.object.pose)))
+        thing = body.object.at(combined(place, body.object.pose))
+        bodies = {each: other for each, other in self.attached_bodies.items() if each != name}
+        return self.with_contents(objects={**self.objects, name: thing}, attached_bodies=bodies)
 
     def pose(self, name: str, positions: Array) -> Pose:
         """Return where an object or an attached body is, in the root link.
@@ -238,6 +245,9 @@ class PlanningScene:
     ) -> PlanningScene:
         """Return the scene with several parts replaced in one step; None keeps a part.
 
+        An object that goes leaves nothing in the matrix: the next of its name is checked. Entries
+        of the octomap stay.
+
         Args:
             objects: Objects of the world by name.
             attached_bodies: Attached bodies by name.
@@ -247,12 +257,17 @@ class PlanningScene:
         Raises:
             SceneError: Two things have one name, or a link is unknown.
         """
+        objects = self.objects if objects is None else objects
+        attached_bodies = self.attached_bodies if attached_bodies is None else attached_bodies
+        allowed = self.allowed if allowed is None else allowed
+        for name in {*self.objects, *self.attached_bodies} - {*objects, *attached_bodies}:
+            allowed = allowed if name == OCTOMAP_NAME else allowed.without(name)
         return PlanningScene(
             self.kinematics,
             self.link_shapes if link_shapes is None else link_shapes,
-            self.allowed if allowed is None else allowed,
-            (self.objects if objects is None else objects).values(),
-            (self.attached_bodies if attached_bodies is None else attached_bodies).values(),
+            allowed,
+            objects.values(),
+            attached_bodies.values(),
         )
 
     def with_others(self, kinematics: Kinematics) -> PlanningScene:

@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 from urdf_reader import DescriptionError, find_group, parse_srdf, read_urdf
 
-from arm_model import Array, frozen, Kinematics, ModelError, PlanningScene, RobotModel
+from arm_model import (
+    AllowedCollisionMatrix,
+    Array,
+    frozen,
+    Kinematics,
+    ModelError,
+    PlanningScene,
+    RobotModel,
+    with_default_collisions,
+)
 
 from ..exceptions import PlanningCode, PlanningError
 
@@ -68,8 +77,14 @@ class RobotGroups:
         )
         self._models: dict[str, RobotModel] = {}
         self._placed: dict[str, RobotModel] = {}
-        first = self.model(next(iter(joints), self.names[0])).scene
-        self.scene = PlanningScene(self.kinematics, first.link_shapes, first.allowed)
+        shapes = self.model(next(iter(joints), self.names[0])).scene.link_shapes
+        self.scene = with_default_collisions(
+            PlanningScene(self.kinematics, shapes, AllowedCollisionMatrix.of_srdf(semantic)),
+            tree,
+            np.array([ranges[name].lower for name in self.joints]),
+            np.array([ranges[name].upper for name in self.joints]),
+            notes=[],  # the models of the groups have them
+        )
 
     @property
     def joints(self) -> Sequence[str]:
