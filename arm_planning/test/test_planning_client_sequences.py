@@ -457,6 +457,30 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
     apply(rig, world=cup(CollisionObject.REMOVE))
 
 
+def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> None:
+    """Whatever the scene of a goal says in is_diff; an empty one changes nothing."""
+    apply(rig, world=PlanningSceneWorld(collision_objects=[box('old', 0.0, 0.9, 0.2)]))
+    publisher = rig.client.node.create_publisher(PlanningSceneWorld, '/planning_scene_world', 1)
+    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    world = PlanningSceneWorld(collision_objects=[box('new', 0.0, -0.9, 0.2)])
+
+    def names() -> list[str]:
+        return [each.id for each in whole_scene(rig).world.collision_objects]
+
+    publisher.publish(world)
+    rig.client.spin_until(lambda: names() == ['new'], 30.0, 'the world that was published')
+    goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
+    goal.planning_options.planning_scene_diff = PlanningScene()
+    assert rig.move(goal)[1].error_code.val == SUCCESS
+    place = tip(rig).position
+    at_tip = box('part', place.x, place.y, place.z, edge=0.05)
+    goal.planning_options.planning_scene_diff.world.collision_objects = [at_tip]
+    assert rig.move(goal)[1].error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    assert names() == ['new']
+    publisher.publish(PlanningSceneWorld())
+    rig.client.spin_until(lambda: not names(), 30.0, 'an empty world')
+
+
 NAMES: dict[str, str] = {
     '/move_action': 'moveit_msgs/action/MoveGroup',
     '/execute_trajectory': 'moveit_msgs/action/ExecuteTrajectory',

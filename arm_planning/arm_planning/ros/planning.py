@@ -281,9 +281,10 @@ def _changed(
     diff: Any,  # noqa: ANN401
     positions: Array,
 ) -> SceneSnapshot:
-    """Return a scene with a change, where there is one."""
-    if diff is None or not diff.is_diff:
+    """Return a scene with a change, where there is one; it is a change whatever is_diff says."""
+    if diff is None:
         return snapshot
+    diff.is_diff = True
     return apply_scene(snapshot, diff, positions)
 
 

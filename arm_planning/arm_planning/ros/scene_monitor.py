@@ -36,6 +36,9 @@ from .tf_frames import TfFrames
 DEPTH = 100
 """Messages of changes that may wait: each of them counts."""
 
+NO_OCTOMAP = 'OcTree'
+"""Id of an octomap without data: it takes the place of the present one."""
+
 STATE_TIMEOUT = 1.0
 """Age at which joint states count no more in [s]."""
 
@@ -178,7 +181,7 @@ class SceneMonitor:
     def _clear_octomap(self, _request: Empty.Request, response: Empty.Response) -> Empty.Response:
         scene = PlanningScene(is_diff=True)
         scene.robot_state.is_diff = True
-        scene.world.octomap.octomap.id = 'OcTree'  # without data it takes the place of the present
+        scene.world.octomap.octomap.id = NO_OCTOMAP
         self._change('clear_octomap', apply_scene, scene)
         return response
 
@@ -189,8 +192,13 @@ class SceneMonitor:
                 self._places[name], self._arrivals[name] = position, now
 
     def _take_world(self, message: PlanningSceneWorld) -> None:
+        """Replace all objects of the world, and the octomap."""
         scene = PlanningScene(is_diff=True, world=message)
         scene.robot_state.is_diff = True
+        remove_all = CollisionObject(operation=CollisionObject.REMOVE)
+        scene.world.collision_objects = [remove_all, *message.collision_objects]
+        if not message.octomap.octomap.data:
+            scene.world.octomap.octomap.id = NO_OCTOMAP
         self._change('planning_scene_world', apply_scene, scene)
 
     def _change_by(self, topic: str, apply: Any) -> Callable[[Any], None]:  # noqa: ANN401
