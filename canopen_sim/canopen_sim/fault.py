@@ -88,6 +88,9 @@ class Fault(Enum):
     ENCODER_LOSS = _of_drive('the encoder gives no signal', 0x7305, at_once=True, lasting=True)
     BLOCKED_MOTOR = _of_drive('the motor is stuck', 0x7121, lasting=True)
     STO = _of_drive('safe torque off: no torque, and no fault', 0, at_once=True, lasting=True)
+    MODE_REQUIRED = _of_drive('refuses Operation enabled without a mode', 0, lasting=True)
+    MODE_ZERO_REFUSED = _of_drive('refuses mode 0 in 0x6060', 0, lasting=True)
+    MODE_HELD_UNDER_HALT = _of_drive('ignores 0x6060 while it is halted', 0, lasting=True)
 
     @property
     def label(self) -> str:

@@ -255,7 +255,10 @@ class DriveCommands:
         return f'to {destination:g}, {how}'
 
     async def init(self) -> str:
-        """Reset a fault, enable, home where bus.yml has a method, and select no mode."""
+        """Reset a fault, enable, home where bus.yml has a method, and select no mode.
+
+        A drive that refuses to have no mode is left in the one that it had, or bus.yml names.
+        """
         drive, steps = self.drive, self._steps
         await steps.ready()
         drive.released(Refusal(RefusalCause.COMMANDED, 'init'))
@@ -263,14 +266,19 @@ class DriveCommands:
         await steps.reach(DriveState.OPERATION_ENABLED)
         await steps.come_to_rest()
         homed = ''
+        before = steps.mode_to_return_to()
         try:
             if drive.view.parameters.supports(OperationMode.HOMING):
                 homed = await self._home_at_init()
+            if steps.needs_mode and drive.control.mode.number is OperationMode.HOMING:
+                await steps.return_to(before)
         finally:
-            if drive.node.online and not steps.quirks.no_mode_zero:
+            if drive.node.online and not steps.needs_mode:
                 drive.control.select(drive.control.modes[OperationMode.NO_MODE])
                 drive.control.halt.end_in(OperationMode.NO_MODE)
-        return f'{drive.view.state.title}{homed}{SELECT_MODE}'
+        mode = drive.control.mode.number
+        hint = f', in mode {mode.title}, as it refuses to have none' if mode else SELECT_MODE
+        return f'{drive.view.state.title}{homed}{hint}'
 
     async def enable(self) -> str:
         """Lead to Operation Enabled, without homing and without resetting a fault."""
@@ -305,17 +313,16 @@ class DriveCommands:
         drive, steps = self.drive, self._steps
         await steps.ready()
         steps.require_no_fault()
-        before = drive.control.mode
         if on_progress is not None:
             on_progress(HomingProgress.ENABLING)
         await steps.reach(DriveState.OPERATION_ENABLED)
+        before = steps.mode_to_return_to()
         try:
             answer = await home(steps, method, on_progress)
         except BaseException:  # also when it is cancelled, and there is no time to wait
             drive.control.select_back(before)
             raise
-        if before is not drive.control.mode and not steps.quirks.no_mode_zero:
-            await steps.switch(before)
+        await steps.return_to(before)
         return f'{answer}; {drive.describe()}'
 
     async def select_mode(self, number: OperationMode) -> str:

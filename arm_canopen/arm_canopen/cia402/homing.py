@@ -93,7 +93,12 @@ async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
     homing.started = True
     try:
         await steps.pause(HOMING_START)
-        await steps.until(lambda: _is_over(steps), steps.drive.config.homing_timeout, what)
+        await steps.until(
+            lambda: _is_over(steps),
+            steps.drive.config.homing_timeout,
+            what,
+            'raise homing_timeout_seconds in bus.yml where the way takes longer',
+        )
     finally:
         homing.started = False
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import contextlib
 
 from ..exceptions import CodecError, DriveError, SdoError, SdoTimeoutError
 from ..master.events import Severity
@@ -12,8 +13,11 @@ from ..master.scheduler import Scheduler
 from ..standard.drive import DriveState, OperationMode, Statusword
 from ..standard.objects import Index
 from .drive import Drive
+from .drive_control import NOT_TAKEN
 from .drive_view import FAULTY
+from .halt import RESUME_TIMEOUT
 from .modes import Mode
+from .position_modes import ProfilePosition
 from .quirks import quirks_of
 from .refusal import Refusal, RefusalCause
 from .stop_sequence import STOP_TIMEOUT
@@ -23,6 +27,7 @@ BUFFER_CLEAR = 6  # sub-index of 0x60C4 (CiA 402-2, clause 12)
 BUFFER_EMPTY, BUFFER_OPEN = 0, 1
 BUFFER_ATTEMPTS = 4
 READY_TIMEOUT = 2.0  # [s] from operational to the first PDOs and parameters
+REFUSED_SHARE = 0.5  # of a time-out, after which a drive counts as one that refuses
 SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
 
 
@@ -32,11 +37,14 @@ class DriveSequences:
     Attributes:
         drive: The drive.
         quirks: Where it deviates from the standard.
+        needs_mode: It refuses mode 0, or Operation enabled in that.
     """
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
         self.drive = drive
         self.quirks = quirks_of(drive.config.quirks)
+        self.needs_mode = self.quirks.no_mode_zero
+        self._keeps_mode_under_halt = False
         self._scheduler = scheduler
 
     async def ready(self, *, to_stop: bool = False) -> None:
@@ -83,9 +91,12 @@ class DriveSequences:
         timeout = self.quirks.state_timeout
         if not enabling:  # it may brake first (0x605B, 0x605C)
             timeout += drive.stop.ramp_time()
-        drive.control.goal = goal
         try:
-            await self.until(lambda: drive.view.state is goal, timeout, goal.title)
+            if enabling:
+                await self._select_where_required(timeout)
+            drive.control.goal = goal
+            slow = 'if it only takes longer: `quirks: slow_states` in bus.yml'
+            await self.until(lambda: drive.view.state is goal, timeout, goal.title, slow)
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
             drive.leave_operation()
             raise
@@ -106,6 +117,67 @@ class DriveSequences:
             await self._preload(shown, 'is not enabled')
         if drive.failure:
             raise self.refused('is not enabled')
+
+    async def _select_where_required(self, timeout: float) -> None:
+        """Select the mode of bus.yml for a drive that refuses Operation enabled without one.
+
+        Args:
+            timeout: Within which an enabled drive shows that in [s].
+
+        Raises:
+            DriveError: It does not take that mode.
+        """
+        drive, control = self.drive, self.drive.control
+        mode = self._configured_mode()
+        if mode is None or control.mode.number or drive.objects.mode_display:
+            return
+        if not self.needs_mode:
+            control.goal = DriveState.OPERATION_ENABLED
+            with contextlib.suppress(TimeoutError):
+                await self._scheduler.until(
+                    lambda: drive.view.state is control.goal or self._is_hopeless(),
+                    REFUSED_SHARE * timeout,
+                )
+            if drive.view.state is not DriveState.SWITCHED_ON or self._is_hopeless():
+                return
+            self.needs_mode = True
+            drive.warn(
+                'stays in Switched on while no mode is selected (0x6061 is 0): mode '
+                f'{mode.number.title} of bus.yml is selected first; with `quirks: no_mode_zero` '
+                'that is done at once'
+            )
+            control.goal = DriveState.SWITCHED_ON
+        await self.switch(mode)
+
+    def _configured_mode(self) -> Mode | None:
+        """Return the first mode that bus.yml names and the drive has."""
+        drive = self.drive
+        for number in (
+            drive.config.position_mode,
+            drive.config.velocity_mode,
+            drive.config.effort_mode,
+        ):
+            mode = next(
+                (mode for mode in drive.control.modes.values() if mode.number == number), None
+            )
+            if mode is not None and mode.number and drive.view.parameters.supports(mode.number):
+                return mode
+        return None
+
+    def mode_to_return_to(self) -> Mode:
+        """Return the mode for the time after homing; mode 0 only where the drive takes it."""
+        control = self.drive.control
+        if control.mode.number or not self.needs_mode:
+            return control.mode
+        shown = control.shown_mode
+        if shown is not None and shown.number not in (OperationMode.NO_MODE, OperationMode.HOMING):
+            return shown
+        return self._configured_mode() or control.mode
+
+    async def return_to(self, mode: Mode) -> None:
+        """Select the mode of before homing again, unless the drive refuses that one."""
+        if mode is not self.drive.control.mode and (mode.number or not self.needs_mode):
+            await self.switch(mode)
 
     async def _preload(self, mode: Mode | None, consequence: str) -> None:
         """Write the holding value of a mode whose target goes by SDO, whatever the drive has.
@@ -186,19 +258,79 @@ class DriveSequences:
             await self.reach(switching_state)
         if mode.number is OperationMode.INTERPOLATED_POSITION:
             await self._clear_buffer()
-        control.select(mode)
         try:
-            await self.until(
-                lambda: drive.objects.mode_display == mode.number,
-                self.quirks.mode_timeout,
-                f'mode {mode.number.title} in 0x6061',
-            )
+            await self._show(mode)
         except BaseException:  # also when it is cancelled: it stays halted in either mode
             control.select_back(before)
             raise
         control.halt.release()
         if leave:
             await self.reach(DriveState.OPERATION_ENABLED)
+
+    async def _show(self, mode: Mode) -> None:
+        """Select a mode, and wait until 0x6061 shows it.
+
+        Raises:
+            DriveError: It does not in time, or an older target would act without the halt.
+        """
+        drive, control = self.drive, self.drive.control
+        timeout = self.quirks.mode_timeout
+
+        def shown() -> bool:
+            return drive.objects.mode_display == mode.number
+
+        control.select(mode)
+        acting = control.holding_mode
+        halted = acting is not None and bool(control.halt.bits(acting))
+        if halted and not self._keeps_mode_under_halt:
+            with contextlib.suppress(TimeoutError):
+                await self._scheduler.until(
+                    lambda: shown() or self._is_hopeless(), REFUSED_SHARE * timeout
+                )
+        if halted and acting is not None and not shown():
+            await self._end_halt_at_rest(acting)
+            control.select(mode)
+        await self.until(
+            shown,
+            timeout,
+            f'mode {mode.number.title} in 0x6061',
+            'does its switching_state in bus.yml fit?',
+        )
+        if halted and not control.halt.held and not self._keeps_mode_under_halt:
+            self._keeps_mode_under_halt = True
+            drive.warn(
+                'ignores 0x6060 while it is halted (bit 8): from now on bit 8 is taken back at '
+                'rest while its mode is switched'
+            )
+
+    async def _end_halt_at_rest(self, acting: Mode) -> None:
+        """Take bit 8 back where the drive stands; no older target acts then.
+
+        Args:
+            acting: The mode that the drive is in.
+
+        Raises:
+            DriveError: It is a torque mode, or the drive does not take the target that holds it.
+        """
+        control = self.drive.control
+        if acting.number in TORQUE_MODES:
+            raise self.refused(
+                'does not switch its mode while it is halted (bit 8), and a torque would move it '
+                'without; disable it, select the mode, and enable it again'
+            )
+        control.select(acting)
+        actual = self.drive.view.actual()
+        if isinstance(acting, ProfilePosition):
+            here = self.drive.view.units.position_commanded(actual.position_inc)
+            delivery = acting.set_target(here)
+        else:
+            delivery = acting.preload(actual)
+        control.halt.leave(self._scheduler.now, delivery)
+        await self.until(
+            lambda: not control.halt.leaving, RESUME_TIMEOUT + 1.0, 'the end of its halt'
+        )
+        if control.halted:
+            raise DriveError(f'{self.drive.name} stays halted: {NOT_TAKEN}')
 
     async def _clear_buffer(self) -> None:
         """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06).
@@ -239,25 +371,33 @@ class DriveSequences:
         """Let time pass in [s]."""
         await self._scheduler.timer(duration)
 
-    async def until(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+    async def until(
+        self, condition: Callable[[], bool], timeout: float, what: str, remedy: str = ''
+    ) -> None:
         """Wait for a condition.
+
+        Args:
+            condition: What is waited for.
+            timeout: How long in [s].
+            what: It, in words.
+            remedy: What helps where it takes longer and nothing else is known to keep the drive.
 
         Raises:
             DriveError: It does not hold in time, or the drive faults or is lost before.
         """
-        drive = self.drive
-
-        def hopeless() -> bool:
-            faulted = drive.view.state in FAULTY and not drive.resetting
-            return not drive.node.online or faulted or drive.stop.running
-
         try:
-            await self._scheduler.until(lambda: condition() or hopeless(), timeout)
+            await self._scheduler.until(lambda: condition() or self._is_hopeless(), timeout)
         except TimeoutError:
-            raise self.refused(f'did not reach {what} within {timeout:g} s{self._why()}') from None
+            why = self._why() or (f' ({remedy})' if remedy else '')
+            raise self.refused(f'did not reach {what} within {timeout:g} s{why}') from None
         if not condition():
-            await drive.view.read_error_code()
+            await self.drive.view.read_error_code()
             raise self.refused(f'did not reach {what}')
+
+    def _is_hopeless(self) -> bool:
+        drive = self.drive
+        faulted = drive.view.state in FAULTY and not drive.resetting
+        return not drive.node.online or faulted or drive.stop.running
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""
@@ -281,6 +421,11 @@ class DriveSequences:
             )
         if not word & Statusword.REMOTE:
             return ' (bit 9, remote, is not set: is the drive under local control?)'
+        if self.drive.view.state is DriveState.SWITCHED_ON and not self.drive.objects.mode_display:
+            return (
+                ' (0x6061 is 0: does it refuse that without a mode? Select one before, or name '
+                'position_mode in bus.yml)'
+            )
         return ''
 
     def _require_operational(self) -> None:

@@ -81,8 +81,8 @@ class Drive:
         self._errors = errors
         self._clock = clock
         self._axis = Axis(model)
-        self._machine = StateMachine(objects, self._axis, self._begin_mode)
-        self._modes = ModeSelection(objects, self._axis, clock)
+        self._machine = StateMachine(objects, self._axis, self._begin_mode, self.causes)
+        self._modes = ModeSelection(objects, self._axis, clock, self.causes)
         self._following = Dwell()
         self._word = 0
         self._idle = True
@@ -194,7 +194,7 @@ class Drive:
             self.block(now=now)
         if fault is Fault.STO:
             self.set_voltage(False, now, fault=False)
-        else:
+        elif fault.value.code:  # others change what it does with later commands only
             self.raise_fault(fault.value.code, now, at_once=fault.value.at_once)
 
     def clear(self, fault: Fault, now: float | None = None) -> None:
@@ -360,6 +360,8 @@ class Drive:
 
     def _on_mode(self, now: float) -> None:
         self._move(now)
+        if Fault.MODE_HELD_UNDER_HALT in self.causes and self._word & HALT:
+            return
         if not self._modes.select():
             return
         if self._machine.operating:

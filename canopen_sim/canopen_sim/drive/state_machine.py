@@ -4,15 +4,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 from enum import Enum
 from functools import partial
 from typing import TypeVar
 
 from arm_canopen.standard.datatypes import Value
 from arm_canopen.standard.drive import DriveState as State
+from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.sdo_abort import AbortCode
 
+from ..fault import Fault
 from ..objects.object_store import Integer, refusal
 from .axis import Axis
 from .objects import DriveObjects
@@ -52,7 +54,11 @@ class StateMachine:
     """
 
     def __init__(
-        self, objects: DriveObjects, axis: Axis, enabled: Callable[[float], None]
+        self,
+        objects: DriveObjects,
+        axis: Axis,
+        enabled: Callable[[float], None],
+        causes: Container[Fault] = (),
     ) -> None:
         """Begin in Not ready to switch on.
 
@@ -60,12 +66,14 @@ class StateMachine:
             objects: Objects of the drive.
             axis: What it moves.
             enabled: Called with the time when operation is enabled, also again.
+            causes: What the drive does wrong, at any time.
         """
         self.state = State.NOT_READY_TO_SWITCH_ON
         self.voltage = True
         self._objects = objects
         self._axis = axis
         self._enabled = enabled
+        self._causes = causes
         self._word = 0
         self._pending: Transition | None = None
         stops = (StopOption.DISABLE, StopOption.SLOW_DOWN)
@@ -189,6 +197,8 @@ class StateMachine:
         match transition.number:
             case 3 | 4 if not self.voltage:
                 return False
+            case 4 if self._without_mode and Fault.MODE_REQUIRED in self._causes:
+                return False
             case 4:
                 self._axis.power_on(self._objects.slow_down)
                 return self._enable(now)
@@ -207,6 +217,10 @@ class StateMachine:
             case _:
                 self.state = transition.target
         return True
+
+    @property
+    def _without_mode(self) -> bool:
+        return self._objects.mode_display.value == OperationMode.NO_MODE
 
     def _enable(self, now: float) -> bool:
         self.state = State.OPERATION_ENABLED

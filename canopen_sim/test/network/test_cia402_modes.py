@@ -32,6 +32,7 @@ from arm_canopen.config.model.drive import DriveConfig, RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.fault import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
@@ -534,6 +535,134 @@ def modes_sent(net: VirtualNetwork, *, mapped: bool, since: float = 0.0) -> set[
         return {data[2] for data in net.frames(0x200 + NODE_ID, since=since)}
     requests = net.frames(0x600 + NODE_ID, since=since)
     return {data[4] for data in requests if data[:3] == b'\x2f\x60\x60'}
+
+
+def deviating(*faults: Fault, **scales: Any) -> VirtualNetwork:
+    """Return a booted network whose drive deviates from the standard."""
+    net = VirtualNetwork(bus_config(full_drive(scales=scales)))
+    for fault in faults:
+        net.devices[JOINT].faults.inject(FaultInjection(fault), net.now)
+    net.boot()
+    return net
+
+
+@pytest.mark.parametrize('command', ['init', 'enable', 'recover', 'home'])
+@pytest.mark.parametrize('quirks', ['', 'no_mode_zero'])
+def test_a_drive_that_is_not_enabled_without_a_mode_gets_that_of_bus_yml(
+    command: str, quirks: str
+) -> None:
+    """First, at once where the quirk is named; it moves nothing, stays selected, and is said."""
+    faults = (Fault.MODE_REQUIRED, Fault.MODE_ZERO_REFUSED)
+    net = deviating(*faults, quirks=quirks, position_mode=8, velocity_mode=3)
+    if command == 'home':
+        commands = net.commands[JOINT]
+        answer = net.result(commands.run('home', commands.home(35)))
+    else:
+        answer = net.do(JOINT, command)
+    assert 'Operation enabled' in answer
+    assert net.drives[JOINT].objects.mode_display == OperationMode.CYCLIC_POSITION
+    assert motor(net) == pytest.approx(0.0, abs=1e-3)
+    reported = [
+        text for text in net.reported(Severity.WARNING) if '`quirks: no_mode_zero`' in text
+    ]
+    assert len(reported) == (not quirks), net.story()
+    net.commands[JOINT].set_target(0.3)
+    net.run(1.5)
+    assert motor(net) == pytest.approx(0.3, abs=1e-3)
+    net.do(JOINT, 'disable')
+    net.do(JOINT, command if command != 'home' else 'init')
+    assert len([text for text in net.reported(Severity.WARNING) if 'quirks' in text]) == len(
+        reported
+    )
+
+
+def test_a_homing_that_takes_too_long_names_the_key_of_bus_yml() -> None:
+    """The motor stops, and 10 s are no fact of nature."""
+    net = booted(scales={'homing_timeout': 0.5})
+    commands = net.commands[JOINT]
+    running = commands.run('home', commands.home(17))
+    with pytest.raises(DriveError, match=r'homing 17 within 0\.5 s .raise homing_timeout_seconds'):
+        net.result(running)
+    net.run(0.5)
+    stood = motor(net)
+    net.run(0.5)
+    assert motor(net) == stood
+
+
+def test_without_a_mode_in_bus_yml_the_message_says_what_helps() -> None:
+    """The drive stays in Switched on; a mode that is selected before lets it enable."""
+    net = deviating(Fault.MODE_REQUIRED)
+    with pytest.raises(DriveError, match=r'0x6061 is 0.*Select one before, or name position_mode'):
+        net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    assert 'Operation enabled' in net.do(JOINT, 'enable')
+
+
+@pytest.mark.parametrize('selected', [8, 1, None])
+@pytest.mark.parametrize('command', ['home', 'init'])
+def test_homing_does_not_leave_a_drive_without_mode_zero_in_mode_6(
+    command: str, selected: int | None
+) -> None:
+    """It returns to the mode of before: the one selected, or the one that it showed by itself."""
+    config = full_drive(
+        sdo_writes=(*MOTION_WRITES, sdo_write(0x6098, 0, 35)), scales={'quirks': 'no_mode_zero'}
+    )
+    has = with_defaults(drive_dictionary(), {(0x6060, 0): 3, (0x6061, 0): 3}).for_node(NODE_ID)
+    net = VirtualNetwork(bus_config(config), dictionaries={JOINT: has})
+    net.devices[JOINT].faults.inject(FaultInjection(Fault.MODE_ZERO_REFUSED), net.now)
+    net.boot()
+    if selected is not None:
+        net.select(JOINT, OperationMode(selected))
+    assert 'homed by method 35' in net.do(JOINT, command)
+    assert net.drives[JOINT].objects.mode_display == (selected or 3)
+    net.commands[JOINT].set_target(0.2)
+    net.run(0.3)
+    assert motor(net) > 0.02
+
+
+@pytest.mark.parametrize('before', [1, 2, 3, 6, 7, 8, 9])
+def test_a_drive_that_ignores_its_mode_under_halt_is_switched_at_rest(before: int) -> None:
+    """Bit 8 is taken back where it stands, no old target comes back; that is reported once."""
+    net = deviating(Fault.MODE_HELD_UNDER_HALT)
+    mode, other = OperationMode(before), OperationMode.CYCLIC_POSITION
+    if other is mode:
+        other = OperationMode.PROFILE_POSITION
+    net.do(JOINT, 'init')
+    for _ in range(2):
+        net.select(JOINT, mode)
+        if mode is not OperationMode.HOMING:
+            net.commands[JOINT].set_target(target_of(mode))
+            net.run(0.4)
+            assert abs(speed(net)) > 0.1
+        net.do(JOINT, 'halt', preempt=True)
+        stood = motor(net)
+        net.select(JOINT, other)
+        net.run(0.5)
+        assert motor(net) == pytest.approx(stood, abs=2e-3)
+        net.commands[JOINT].set_target(0.0)
+        net.run(2.0)
+    reported = [text for text in net.reported(Severity.WARNING) if 'ignores 0x6060' in text]
+    assert len(reported) <= 1, net.story()
+    assert bool(reported) is (mode in (1, 2, 3, 6) or other == 1)
+
+
+@pytest.mark.parametrize('mode', TORQUES, ids=by_name)
+def test_a_halted_torque_is_not_let_go_to_switch_the_mode(mode: OperationMode) -> None:
+    """Such a drive stays halted in its mode, and the message says what helps."""
+    net = deviating(Fault.MODE_HELD_UNDER_HALT)
+    enable(net, mode)
+    net.commands[JOINT].set_target(200.0)
+    net.run(0.5)
+    net.do(JOINT, 'halt', preempt=True)
+    with pytest.raises(DriveError, match=r'halted .bit 8.*disable it, select the mode'):
+        net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    assert net.drives[JOINT].control.halted
+    stood = motor(net)
+    net.run(1.0)
+    assert motor(net) == pytest.approx(stood, abs=2e-3)
+    net.do(JOINT, 'disable')
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    net.do(JOINT, 'enable')
 
 
 @pytest.mark.parametrize('every', [1, 2, 3, 4])

@@ -33,6 +33,8 @@ from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.drive.drive import Drive as SimulatedDrive
+from canopen_sim.fault import Fault as Deviation
+from canopen_sim.fault import FaultInjection
 
 pytestmark = pytest.mark.slow
 
@@ -77,9 +79,15 @@ def target_of(mode: OperationMode) -> float:
 class Arm:
     """Two drives and their master."""
 
-    def __init__(self, heartbeat_timeout: float = 0.3) -> None:
-        """Boot them; both sides watch each other's heartbeat, with this consumer time in [s]."""
+    def __init__(self, heartbeat_timeout: float = 0.3, *deviations: Deviation) -> None:
+        """Boot them.
+
+        Args:
+            heartbeat_timeout: Consumer time of both sides in [s].
+            *deviations: How the first drive deviates from the standard.
+        """
         watching = {
+            'scales': {'position_mode': int(OperationMode.CYCLIC_POSITION)},
             'heartbeat_consumer': True,
             'heartbeat_timeout': heartbeat_timeout,
             'sdo_writes': (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE))),
@@ -94,6 +102,9 @@ class Arm:
                 cycle_period=CYCLE,
             )
         )
+        for deviation in deviations:
+            injection = FaultInjection(deviation)
+            self.net.devices[FAULTY].faults.inject(injection, self.net.now)
         self.net.boot()
 
     def simulated(self, name: str = FAULTY) -> SimulatedDrive:
@@ -407,6 +418,36 @@ def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
     arm.net.commands[FAULTY].set_target(-0.2)
     arm.net.run(2.0)
     assert arm.motor(FAULTY) == pytest.approx(-0.2, abs=0.01)
+
+
+DEVIATIONS = {
+    'no state without a mode': (Deviation.MODE_REQUIRED, Deviation.MODE_ZERO_REFUSED),
+    'no mode under halt': (Deviation.MODE_HELD_UNDER_HALT,),
+}
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('deviations', DEVIATIONS.values(), ids=DEVIATIONS)
+def test_a_drive_that_deviates_is_used_as_any_other(
+    deviations: tuple[Deviation, ...], mode: OperationMode
+) -> None:
+    """It is enabled, moves in each mode, stops, and is switched; what is odd is reported once."""
+    arm = Arm(0.3, *deviations)
+    arm.move(mode)
+    arm.stop(FAULTY, mode)
+    if mode in TORQUE_MODES:
+        arm.net.do(FAULTY, 'disable')
+    for other in (OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION):
+        arm.net.select(FAULTY, other)
+        arm.net.do(FAULTY, 'enable')
+        arm.stands(FAULTY)
+        assert_accepts_targets(arm, other)
+    commands = arm.net.commands[FAULTY]
+    assert 'homed' in arm.net.result(commands.run('home', commands.home(35)))
+    assert_accepts_targets(arm, OperationMode.CYCLIC_POSITION)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    warnings = [event.text for event in arm.net.events if event.severity is Severity.WARNING]
+    assert len(warnings) == len(set(warnings))
 
 
 TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
+
 from arm_canopen.standard.datatypes import Value
 from arm_canopen.standard.sdo_abort import AbortCode
 
+from ...fault import Fault
 from ...objects.object_store import refusal
 from ..axis import Axis
 from ..objects import DriveObjects
@@ -44,8 +47,11 @@ class ModeSelection:
         current: The selected mode.
     """
 
-    def __init__(self, objects: DriveObjects, axis: Axis, clock: SyncClock) -> None:
+    def __init__(
+        self, objects: DriveObjects, axis: Axis, clock: SyncClock, causes: Container[Fault] = ()
+    ) -> None:
         self._objects = objects
+        self._causes = causes
         self._modes: dict[int, Mode] = {m.number: m(objects, axis, clock) for m in MODES}
         self.current = self._modes[NoMode.number]
         objects.mode.check = self._check
@@ -73,7 +79,7 @@ class ModeSelection:
 
     def _supports(self, number: int) -> bool:
         mode = self._modes.get(number)
-        if mode is None:
+        if mode is None or (not number and Fault.MODE_ZERO_REFUSED in self._causes):
             return False
         bit = mode.number.support_bit
         return not bit or bool(bit & self._objects.supported_modes.value)
