@@ -12,6 +12,7 @@ from ..config.model import NodeConfig
 from ..exceptions import CodecError, SdoError
 from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat, RESETS
 from ..standard.objects import Index
+from .bus_sender import Send
 from .drop_backoff import DropBackoff
 from .emergency_log import EmergencyLog
 from .events import Event, EventKind, Report, Severity
@@ -64,6 +65,7 @@ class RemoteNode:
         pdos: Whether its TPDOs come.
         on_boot_up: Called when it has restarted.
         on_lost: Its drivers, which stop; each gets the reason.
+        on_gone: Called when it was lost by itself; what an NMT command does to it is no loss.
         on_failed: Its drivers, which stop because a step of the cycle failed for this device; each
             gets the error, and the RPDO that cannot be sent for it, if it is one.
         on_dropped_out: Called when it has to be booted again, though it did not restart, with the
@@ -75,7 +77,7 @@ class RemoteNode:
         config: NodeConfig,
         scheduler: Scheduler,
         sync: SyncRound,
-        send: Callable[[Frame], None],
+        send: Send,
         report: Report,
     ) -> None:
         """Build the device from its configuration.
@@ -110,6 +112,7 @@ class RemoteNode:
         self.pdos = PdoWatch(self.image.tpdos, self.report)
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
+        self.on_gone: Callable[[], None] = lambda: None
         self.on_failed: list[Callable[[Exception, SentRpdo | None], None]] = []
         self._failed = False
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
@@ -191,7 +194,7 @@ class RemoteNode:
         """
         missing = self.life.overdue(now)
         if missing:
-            self._gone(missing)
+            self.lost(missing)
             return True
         if self.operational:
             self.pdos.look(now)
@@ -214,19 +217,25 @@ class RemoteNode:
     def restarted(self) -> None:
         """It sent a boot-up message: it is another one than before."""
         if self.online:
-            self._gone('restarted: a boot-up message came while it was operational')
+            self.lost('restarted: a boot-up message came while it was operational')
         else:
             self.offline('the device restarted')
         self.sdo.restarted()
 
-    def lost(self, reason: str, severity: Severity = Severity.ERROR) -> None:
+    def lost(self, reason: str) -> None:
         """The device is gone: forget its values, and stop its drivers."""
+        severity = Severity.ERROR
+        if self._being_reset and self._commanded is not None:
+            reason = f'restarts, by the NMT command {self._commanded.name}'
+            severity = Severity.INFO
         self.report(EventKind.HEARTBEAT_LOST, severity, reason)
         self.loss = reason
         self.nmt_state = None
         self.online = False
         self._stop_drivers(reason)  # first, so that nobody sends new SDOs when these end
         self.offline(reason)
+        if severity is Severity.ERROR:
+            self.on_gone()
 
     def offline(self, reason: str) -> None:
         """Stop talking to the device until it is booted again."""
@@ -268,14 +277,6 @@ class RemoteNode:
     def _drops_text(self) -> str:
         drops = self._backoff.drops
         return f', as it has done so {drops} times in a row' if drops > 1 else ''
-
-    def _gone(self, reason: str) -> None:
-        """It is gone by itself, unless it was reset."""
-        if self._being_reset and self._commanded is not None:
-            text = f'restarts, by the NMT command {self._commanded.name}'
-            self.lost(text, Severity.INFO)
-        else:
-            self.lost(reason)
 
     def _dropped_out(self, state: NmtState, now: float) -> bool:
         followed = now - self._commanded_at > START_TIME

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from ..config.model.master import MasterConfig
 from ..standard.nmt import ALL_NODES, NmtCommand
@@ -49,7 +50,7 @@ class Startup:
         self.complete = not self._missing()
         for node in nodes:
             if node.config.mandatory:
-                node.on_lost.append(lambda reason, node=node: self._lost(node))  # type: ignore[misc]
+                node.on_gone = partial(self._lost, node)
 
     async def watch(self) -> None:
         """Say it when mandatory devices are not there within `boot_time`."""
@@ -99,9 +100,9 @@ class Startup:
         together = self._config.start_all_nodes and len(self._waiting) == len(self._nodes)
         waiting, self._waiting = self._waiting, {}
 
-        def admit(_: Promise[None] | None) -> None:
+        def admit(sent: Promise[None] | None) -> None:
             for promise in waiting.values():
-                promise.resolve(together)
+                promise.resolve(together and (sent is None or sent.error is None))
 
         if together and self._config.start_nodes:
             self._send_nmt(NmtCommand.START, ALL_NODES).when_done(admit)
@@ -114,15 +115,19 @@ class Startup:
         if self._config.reset_all_nodes:
             self.complete = False
             self._report_error(f'{node.name} is mandatory and lost: all devices are reset')
-            self._send_nmt(NmtCommand.RESET_NODE, ALL_NODES)
+            self._send_nmt(NmtCommand.RESET_NODE, ALL_NODES).when_done(self._look)
         elif self._config.stop_all_nodes:
             self._report_error(
                 f'{node.name} is mandatory and lost: all devices are stopped; start them by '
                 'NMT when it is back'
             )
-            self._send_nmt(NmtCommand.STOP, ALL_NODES)
+            self._send_nmt(NmtCommand.STOP, ALL_NODES).when_done(self._look)
         else:
             self._report_error(f'{node.name} is mandatory and lost; the others go on without it')
+
+    def _look(self, sent: Promise[None]) -> None:
+        if sent.error is not None:
+            self._report_error(str(sent.error))
 
     def _report_error(self, text: str) -> None:
         self._report(Event(EventKind.BOOT_FAILED, Severity.ERROR, '', text))

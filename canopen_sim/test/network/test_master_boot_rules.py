@@ -19,6 +19,7 @@ from scripted_device import (
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
+from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import CanopenError
 from arm_canopen.master.events import Severity
@@ -238,6 +239,29 @@ def test_the_loss_of_a_mandatory_device(
     network.net.run(0.6)
     assert any(message in text for text in network.net.reported(Severity.ERROR))
     assert other.commands[:1] == ([] if command is None else [command])
+
+
+@pytest.mark.parametrize('master', [{'reset_all_nodes': True}, {'stop_all_nodes': True}])
+@pytest.mark.parametrize(
+    'command', [PRE_OPERATIONAL, STOP, RESET_NODE, RESET_COMMUNICATION], ids=hex
+)
+@pytest.mark.parametrize('ours', [True, False], ids=['our_service', 'other_tool'])
+def test_a_commanded_state_of_a_mandatory_device_is_no_loss(
+    master: dict[str, bool], command: int, *, ours: bool
+) -> None:
+    """Whoever commanded it wants the others to go on."""
+    network = Network(*two(), **master)
+    network.start(2.0)
+    other = network.devices['other']
+    other.commands.clear()
+    if ours:
+        network.net.network.send_nmt(NmtCommand(command), NODE_ID)
+    else:
+        network.net.send_as('tool', Frame(0x000, bytes((command, NODE_ID))))
+    network.net.run(2.0)
+    assert network.devices[NODE].commands.count(command) >= 1
+    assert other.commands == []
+    assert not any('mandatory and lost' in text for text in network.net.reported())
 
 
 def test_a_master_that_shall_not_start_waits_for_its_command() -> None:
