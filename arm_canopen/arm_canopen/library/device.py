@@ -106,10 +106,10 @@ class CanopenDevice:
         return self._thread.call(lambda: node_status(self._device, time.monotonic())).result()
 
     def send_nmt(self, command: NmtCommand) -> None:
-        """Send an NMT command to the device; return when it is on the bus.
+        """Send an NMT command to the device; return when the bus has taken it.
 
         Raises:
-            BusError: The master has ended.
+            BusError: The bus has not taken it, or the master has ended.
         """
         network, node_id = self._thread.network, self._device.config.node_id
         self._thread.run(lambda: network.send_nmt(command, node_id)).result()

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.identity import Identity
-from ..exceptions import BootError, SdoAbortError, SdoError, SdoTimeoutError
+from ..exceptions import BootError, BusError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
 from .boot_fault import BootFault
@@ -48,7 +48,7 @@ class BootProcess:
         send_nmt: SendNmt,
         startup: Startup,
         *,
-        request_state: Callable[[int], None],
+        request_state: Callable[[int], object],
     ) -> None:
         """Take what is needed of the network.
 
@@ -104,7 +104,7 @@ class BootProcess:
                 await self._take_over()
             else:
                 await self._boot()
-        except (BootError, SdoError) as error:
+        except (BootError, BusError, SdoError) as error:
             self._fail(str(error))
             return False
         return True

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 
-from ..can.frame import Frame
 from ..config.model import BusConfig
 from ..exceptions import SdoError
 from .boot import BootProcess
+from .bus_sender import Send
 from .guarding import guarding_request
 from .nmt_sender import SendNmt
 from .remote_node import RemoteNode
@@ -28,7 +28,7 @@ class BootManager:
         scheduler: Scheduler,
         startup: Startup,
         *,
-        send: Callable[[Frame], None],
+        send: Send,
         send_nmt: SendNmt,
     ) -> None:
         """Listen to the devices; nothing is booted before :meth:`start`.

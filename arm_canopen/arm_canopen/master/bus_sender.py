@@ -5,10 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 from ..can.frame import Frame
 from ..exceptions import BusError
 from .events import Event, EventKind, Report, Severity
+
+Send: TypeAlias = Callable[[Frame], BusError | None]
+"""Hands a frame to the bus; returns why the bus has not taken it, None when it has."""
 
 
 class BusSender:
@@ -25,15 +29,16 @@ class BusSender:
         self._report = report
         self._failed = False
 
-    def send(self, frame: Frame) -> None:
-        """Send a frame."""
+    def send(self, frame: Frame) -> BusError | None:
+        """Send a frame; return why the bus has not taken it."""
         try:
             self._send(frame)
         except BusError as error:
             if not self._failed:
                 self._failed = True
                 self._report(Event(EventKind.BUS, Severity.ERROR, '', str(error)))
-        else:
-            if self._failed:
-                self._failed = False
-                self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
+            return error
+        if self._failed:
+            self._failed = False
+            self._report(Event(EventKind.BUS, Severity.INFO, '', 'the bus takes frames again'))
+        return None

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from ..can.frame import Frame
 from ..standard.cob_id import CobId
+from .bus_sender import Send
 
 TOGGLE = 0x80  # bit of an answer that changes with each
 
@@ -20,9 +19,7 @@ def guarding_request(node_id: int) -> Frame:
 class Guarding:
     """Requests the state of one device, again and again, and counts the missing answers."""
 
-    def __init__(
-        self, node_id: int, guard_time: float, retry_factor: int, send: Callable[[Frame], None]
-    ) -> None:
+    def __init__(self, node_id: int, guard_time: float, retry_factor: int, send: Send) -> None:
         """Prepare; nothing is sent before :meth:`start`.
 
         Args:

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import math
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
 from ..standard.nmt import NmtState
+from .bus_sender import Send
 from .guarding import Guarding
 
 
@@ -22,7 +22,7 @@ class LifeSigns:
             before it is started again.
     """
 
-    def __init__(self, config: NodeConfig, send: Callable[[Frame], None]) -> None:
+    def __init__(self, config: NodeConfig, send: Send) -> None:
         """Prepare; nobody is supervised before :meth:`start`.
 
         Args:

@@ -8,7 +8,7 @@ a function. See ``runner.py`` for the thread that does so on a real bus.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from traceback import walk_tb
 from typing import TypeAlias
@@ -258,17 +258,19 @@ class Network:
         A master that is not operational sends neither SYNC nor RPDOs.
 
         Returns:
-            Done when the command has left; abandoned before, it does not leave.
+            Done when the bus has taken the command, rejected with a BusError when it has not;
+            abandoned before, it does not leave.
         """
         if node_id == self.config.master.node_id:
             self._set_state(command)
             return completed()
         if node_id == ALL_NODES and not self._broadcasts:
-            sent = completed()
-            for node in self.nodes.values():
-                sent = self._nmt.send(command, node.config.node_id)
-            return sent
+            each = [self._nmt.send(command, n.config.node_id) for n in self.nodes.values()]
+            return self.scheduler.spawn(self._all(each))
         return self._nmt.send(command, node_id)
+
+    async def _all(self, sent: Sequence[Promise[None]]) -> None:
+        await self.scheduler.gather(sent)
 
     def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
         """Send an object by the RPDOs that carry it.
@@ -277,20 +279,24 @@ class Network:
         of a drive in every cycle anyway.
 
         Raises:
-            CanopenError: The device or the master is not operational, or no RPDO carries it.
+            CanopenError: The device or the master is not operational, no RPDO carries it, or the
+                bus does not take it.
         """
         if not node.online or self.state is not NmtState.OPERATIONAL:
             what = node.name if not node.online else 'the master'
             raise CanopenError(f'{what} is not operational, so no RPDO is sent')
+        before = node.image.commanded(index, subindex)
         outputs = node.image.store(index, subindex, value)
         if not outputs:
             raise CanopenError(f'{object_address(index, subindex)} is in no RPDO of {node.name}')
         for output in outputs:
             if output.cyclic or output.synchronous:
                 output.due = True
+            elif (refusal := self.send(output.frame())) is not None:
+                node.image.store(index, subindex, before or 0)  # none may leave with another one
+                raise refusal
             else:
                 output.left(self.scheduler.now)
-                self.send(output.frame())
 
     def _set_state(self, command: NmtCommand) -> None:
         before = self.state

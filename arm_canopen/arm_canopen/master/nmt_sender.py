@@ -9,25 +9,30 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from ..can.frame import Frame
+from ..exceptions import BusError
 from ..standard.cob_id import CobId
-from ..standard.nmt import nmt_frame, NmtCommand
+from ..standard.nmt import ALL_NODES, nmt_frame, NmtCommand
+from .bus_sender import Send
 from .scheduler import Promise, Scheduler
 
 SendNmt: TypeAlias = Callable[[NmtCommand, int], Promise[None]]
-"""Sends a command to a node id, or to all with 0; the promise is resolved when it has left."""
+"""Sends a command to a node id, or to all with 0; the promise is resolved when it has left,
+rejected with a BusError when the bus has not taken it."""
+REPEAT_AFTER = 0.01  # [s] before a command that the bus refused is sent again
+PATIENCE = 0.5  # [s] in which the bus has to take a command; it would come too late then
 
 
 class NmtSender:
     """Sends NMT commands; with an inhibit time those that come too early wait in order.
 
-    A command counts as sent when its frame leaves, not when it is queued. One whose promise was
-    abandoned meanwhile does not leave any more.
+    A command counts as sent when the bus has taken its frame. One whose promise was abandoned
+    meanwhile does not leave any more.
     """
 
     def __init__(
         self,
         scheduler: Scheduler,
-        send: Callable[[Frame], None],
+        send: Send,
         inhibit_time: float,
         on_sent: Callable[[NmtCommand, int], None],
     ) -> None:
@@ -56,15 +61,26 @@ class NmtSender:
 
     async def _empty(self) -> None:
         self._busy = True
+        refused_since: float | None = None
         try:
             while self._waiting:
                 command, node_id, sent = self._waiting.popleft()
                 if sent.done:
                     continue  # withdrawn
-                self._on_sent(command, node_id)
-                self._send(Frame(CobId.NMT, nmt_frame(command, node_id)))
-                sent.resolve(None)
-                if self._inhibit_time > 0.0:
-                    await self._scheduler.timer(self._inhibit_time)
+                refusal = self._send(Frame(CobId.NMT, nmt_frame(command, node_id)))
+                if refusal is None:
+                    refused_since = None
+                    self._on_sent(command, node_id)
+                    sent.resolve(None)
+                    if self._inhibit_time > 0.0:
+                        await self._scheduler.timer(self._inhibit_time)
+                    continue
+                refused_since = refused_since or self._scheduler.now
+                if self._scheduler.now - refused_since < PATIENCE:
+                    self._waiting.appendleft((command, node_id, sent))
+                    await self._scheduler.timer(REPEAT_AFTER)
+                    continue
+                where = 'all nodes' if node_id == ALL_NODES else f'node {node_id}'
+                sent.reject(BusError(f'NMT {command.name} to {where} was not sent: {refusal}'))
         finally:
             self._busy = False

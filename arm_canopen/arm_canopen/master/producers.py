@@ -12,6 +12,7 @@ from ..can.frame import Frame
 from ..standard.cob_id import CobId
 from ..standard.nmt import NmtState
 from ..standard.time_of_day import encode_time_of_day
+from .bus_sender import Send
 
 WallClock: TypeAlias = Callable[[], datetime]
 
@@ -44,7 +45,7 @@ class Periodic:
 class HeartbeatProducer:
     """The master's heartbeat, sent with the set-points, so that it ends when they do."""
 
-    def __init__(self, node_id: int, period: float, send: Callable[[Frame], None]) -> None:
+    def __init__(self, node_id: int, period: float, send: Send) -> None:
         """Take node id, period in [s] and the way to the bus."""
         self._can_id = CobId.HEARTBEAT + node_id
         self._periodic = Periodic(period)
@@ -64,9 +65,7 @@ class HeartbeatProducer:
 class TimeProducer:
     """TIME, the time of day for all devices (CiA 301, 7.2.6)."""
 
-    def __init__(
-        self, can_id: int, period: float, wall_clock: WallClock, send: Callable[[Frame], None]
-    ) -> None:
+    def __init__(self, can_id: int, period: float, wall_clock: WallClock, send: Send) -> None:
         """Take what is needed.
 
         Args:

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from functools import partial
 import math
 
-from ..can.frame import Frame
 from ..config.model import NodeConfig
 from ..config.model.tpdo_freshness import PERIODS_MISSED, STALE_AFTER
 from ..exceptions import CodecError, DriveError, SdoError
@@ -17,6 +16,7 @@ from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import find_object
 from ..standard.objects import is_controlword
 from .background_objects import BackgroundReader, SdoWriter
+from .bus_sender import Send
 from .events import EventKind, Severity
 from .process_image import Limits, limits_of, ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
@@ -42,7 +42,7 @@ class RemoteObjects:
         config: NodeConfig,
         scheduler: Scheduler,
         sync: SyncRound,
-        send: Callable[[Frame], None],
+        send: Send,
         *,
         report: ReportOfDevice,
         is_online: Callable[[], bool],

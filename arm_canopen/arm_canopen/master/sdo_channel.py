@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
-from ..exceptions import CodecError, SdoAbortError, SdoTimeoutError
+from ..exceptions import BusError, CodecError, SdoAbortError, SdoTimeoutError
 from ..standard.cob_id import CobId
 from ..standard.dictionary import object_address
 from ..standard.sdo import (
@@ -22,6 +22,7 @@ from ..standard.sdo import (
     UploadResponse,
 )
 from ..standard.sdo_abort import abort_text, AbortCode
+from .bus_sender import Send
 from .scheduler import Promise, Scheduler
 
 T = TypeVar('T')
@@ -60,9 +61,7 @@ class SdoChannel:
         address: The object of the present transfer.
     """
 
-    def __init__(
-        self, node_id: int, name: str, scheduler: Scheduler, send: Callable[[Frame], None]
-    ) -> None:
+    def __init__(self, node_id: int, name: str, scheduler: Scheduler, send: Send) -> None:
         """Take the way to the bus.
 
         Args:
@@ -127,9 +126,9 @@ class SdoChannel:
         """The device has restarted, so it owes no answer any more."""
         self._pending_replies = []
 
-    def send(self, data: bytes) -> None:
-        """Send a frame that is not answered."""
-        self._send(Frame(self._request_id, data))
+    def send(self, data: bytes) -> BusError | None:
+        """Send a frame that is not answered; return why the bus has not taken it."""
+        return self._send(Frame(self._request_id, data))
 
     async def exchange(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool = False
@@ -160,25 +159,29 @@ class SdoChannel:
         self._match, self._strays, sent = match, 0, 0
         promise: Promise[T | Abort] = Promise()
         self._answered = promise
-        begin = self._scheduler.now
+        begin, refusal = self._scheduler.now, None
         for end in _ends_of_waits(timeout, repeat=repeat):
             left = begin + end - self._scheduler.now
             if left <= 0.0:  # time went by in one leap
                 continue
             if question is not None:
-                self.send(question)
-            sent += 1
+                refusal = self.send(question)
+            sent += refusal is None
             try:
                 answer = await self._scheduler.wait(promise, left)
             except TimeoutError:
                 continue
-            self.counters.repeated += sent - 1
+            self.counters.repeated += max(0, sent - 1)
             self._pending_replies = [self.address] * (sent - 1)
             return answer
         self._answered = None
         self._await_late_replies(sent)
         self.counters.timed_out += 1
         self._send_abort(AbortCode.TIMED_OUT)
+        if refusal is not None and not sent:
+            raise SdoTimeoutError(
+                f'the SDO for {_place(self.address)} of {self._title} was not sent: {refusal}'
+            )
         raise SdoTimeoutError(self._silence(self.address, timeout))
 
     def refuse(self, code: AbortCode, detail: str = '') -> SdoAbortError:

@@ -23,6 +23,7 @@ from ..standard.sdo import (
     UploadSegmentRequest,
 )
 from ..standard.sdo_abort import AbortCode
+from .bus_sender import Send
 from .scheduler import Promise, Scheduler, Task
 from .sdo_block_client import read_blocks, write_blocks
 from .sdo_channel import response, SdoChannel, SdoCounters
@@ -45,9 +46,7 @@ class SdoClient:
             the promise of its end.
     """
 
-    def __init__(
-        self, node_id: int, name: str, scheduler: Scheduler, send: Callable[[Frame], None]
-    ) -> None:
+    def __init__(self, node_id: int, name: str, scheduler: Scheduler, send: Send) -> None:
         """Take the way to the bus; arguments as of :class:`SdoChannel`."""
         self.node_id = node_id
         self.on_download: list[DownloadHook] = []

@@ -10,9 +10,10 @@ from drive_samples import bus_config, drive_config
 import pytest
 from virtual_network import Sent, START, VirtualNetwork
 
+from arm_canopen.exceptions import BusError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen.standard.nmt import NmtCommand, NmtState
 
 pytestmark = pytest.mark.slow
 
@@ -132,10 +133,42 @@ def test_a_defect_at_one_command_keeps_back_no_other(
     net.allows_defects = True
     net.boot()
     with monkeypatch.context() as patch:
-        patch.setattr(net.network._nmt, '_on_sent', None)
+        patch.setattr(net.network._nmt, '_send', None)
         net.network.send_nmt(NmtCommand.STOP, 2)
         net.run(0.2)
     assert sent_at(net, NmtCommand.STOP, 2) == []
     net.network.send_nmt(NmtCommand.STOP, 3)
     net.run(0.2)
     assert len(sent_at(net, NmtCommand.STOP, 3)) == 1
+
+
+@pytest.mark.parametrize('inhibit_time', [0.0, 0.05])
+def test_a_command_that_the_bus_refuses_leaves_as_soon_as_the_bus_takes_it(
+    inhibit_time: float,
+) -> None:
+    """It is not done before, keeps its place, and counts as commanded when it has left."""
+    net = seven_drives(inhibit_time)
+    net.boot()
+    net.run(0.5)
+    net.wire.refuses = 'the transmit queue is full'
+    stop, start = (net.network.send_nmt(c, 2) for c in (NmtCommand.STOP, NmtCommand.START))
+    net.run(0.2)
+    assert not stop.done
+    assert net.network.nodes['joint2'].wanted is NmtState.OPERATIONAL
+    net.wire.refuses = ''
+    net.result(start)
+    last_two = [sent.frame.data[0] for sent in nmt_commands(net)[-2:]]
+    assert last_two == [NmtCommand.STOP, NmtCommand.START]
+
+
+def test_a_command_that_the_bus_never_takes_is_answered_so() -> None:
+    """It does not leave later, when nobody expects it any more."""
+    net = seven_drives(0.0)
+    net.boot()
+    before = len(nmt_commands(net))
+    net.wire.refuses = 'the transmit queue is full'
+    with pytest.raises(BusError, match='NMT STOP to node 2 was not sent: the transmit queue is'):
+        net.result(net.network.send_nmt(NmtCommand.STOP, 2))
+    net.wire.refuses = ''
+    net.run(0.05)
+    assert len(nmt_commands(net)) == before

@@ -23,7 +23,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.exceptions import CanopenError, CodecError
+from arm_canopen.exceptions import BusError, CanopenError, CodecError
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 from canopen_sim.fault import Fault, FaultInjection
@@ -222,6 +222,19 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
     begin = net.now
     net.run(0.2)
     assert set(speeds(net, since=begin)) == {3_000}
+
+
+def test_a_value_that_the_bus_refuses_is_not_sent_later() -> None:
+    """Its publisher hears of it, and the next value of another object leaves without it."""
+    net = booted()
+    publish(net, OUTPUTS, 0x01)
+    net.wire.refuses = 'the transmit queue is full'
+    with pytest.raises(BusError, match='transmit queue'):
+        publish(net, OUTPUTS, 0x02)
+    net.wire.refuses = ''
+    publish(net, MASK, 0x03)
+    net.run(0.2)
+    assert (read(net, OUTPUTS), read(net, MASK)) == (0x01, 0x03)
 
 
 def test_a_write_that_waits_in_the_queue_changes_no_rpdo_yet() -> None:

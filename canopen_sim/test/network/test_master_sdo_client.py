@@ -15,7 +15,7 @@ import pytest
 from sdo_byte_server import NO_OBJECT, SdoByteServer
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen.exceptions import BusError, SdoAbortError, SdoError, SdoTimeoutError
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.master.sdo_client import SdoClient
 from arm_canopen.standard.datatypes import DataType
@@ -34,6 +34,7 @@ class Line:
 
     Attributes:
         sent: Requests that nobody has answered yet.
+        refusal: Why the bus takes no frames; None while it does.
     """
 
     def __init__(self) -> None:
@@ -42,12 +43,15 @@ class Line:
         self.defects: list[BaseException] = []
         self.scheduler.on_defect = self.defects.append
         self.sent: list[bytes] = []
+        self.refusal: BusError | None = None
         self.client = SdoClient(NODE, 'joint1', self.scheduler, self._take)
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame) -> BusError | None:
         assert frame.can_id == REQUEST
         assert len(frame.data) == 8
-        self.sent.append(frame.data)
+        if self.refusal is None:
+            self.sent.append(frame.data)
+        return self.refusal
 
     def receive(self, answer: bytes | str) -> None:
         """Let the client receive a frame, given as bytes or as hexadecimal text."""
@@ -272,6 +276,19 @@ def test_silence_ends_in_a_time_out_that_is_reported_to_the_server() -> None:
         promise.result()
     line.expect(ABORTED.format(place='01 20 00'))
     assert line.client.counters.timed_out == 1
+
+
+def test_a_request_that_the_bus_refuses_is_no_silence_of_the_device() -> None:
+    """The error says so, and no answer is awaited that could be taken for a later one."""
+    line = Line()
+    line.refusal = BusError('the transmit queue is full')
+    promise = write(line, b'\x01', 0x1018, 1)
+    line.pass_time(TIMEOUT)
+    with pytest.raises(SdoTimeoutError, match='was not sent: the transmit queue is full'):
+        promise.result()
+    line.refusal = None
+    read(line)
+    line.expect('40 18 10 01 00 00 00 00')
 
 
 def test_the_time_out_counts_for_each_answer() -> None:
