@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import json
 from pathlib import Path
 import shutil
@@ -25,7 +25,7 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.srv import GetMotionPlan, GetPlanningScene
 from processes import executable, RunningProcess
-from rclpy.action.server import ActionServer
+from rclpy.action.server import ActionServer, CancelResponse
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
@@ -99,6 +99,7 @@ class MoveGroupRig:
         process: move_group.
         positions: Where the joints are in [rad], by name.
         followed: Goals of controllers so far.
+        held: Goals that wait until the test calls their execute().
     """
 
     def __init__(
@@ -113,6 +114,7 @@ class MoveGroupRig:
         """
         self.positions = dict(positions or zip(JOINTS, READY, strict=True))
         self.followed: list[Any] = []
+        self.held: list[Any] = []
         self._published = 0.0
         self.client = RosClient(isolation.domain_id)
         node = self.client.node
@@ -149,16 +151,25 @@ class MoveGroupRig:
             self.client.spin_for(0.02)  # joint states are published
         raise TimeoutError('move_group does not receive where the robot is')
 
-    def serve_arm(self, name: str) -> Any:
-        """Offer a trajectory controller."""
+    def _serve(
+        self, kind: Any, name: str, follow: Callable[[Any], Any], *, holds: bool
+    ) -> ActionServer:
+        accept = self.held.append if holds else lambda handle: handle.execute()
         return ActionServer(  # type: ignore[no-untyped-call]
             self.client.node,
-            FollowJointTrajectory,
-            f'/{name}/follow_joint_trajectory',
-            self._follow,
+            kind,
+            name,
+            follow,
+            handle_accepted_callback=accept,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
-    def serve_gripper(self, name: str, joint: str) -> Any:
+    def serve_arm(self, name: str, *, holds: bool = False) -> Any:
+        """Offer a trajectory controller; one that holds leaves its goals in :attr:`held`."""
+        action = f'/{name}/follow_joint_trajectory'
+        return self._serve(FollowJointTrajectory, action, self._follow, holds=holds)
+
+    def serve_gripper(self, name: str, joint: str, *, holds: bool = False) -> Any:
         """Offer a gripper of one joint."""
 
         def grip(handle: Any) -> GripperCommand.Result:
@@ -167,11 +178,12 @@ class MoveGroupRig:
             handle.succeed()
             return GripperCommand.Result(reached_goal=True)
 
-        return ActionServer(  # type: ignore[no-untyped-call]
-            self.client.node, GripperCommand, f'/{name}/gripper_cmd', grip
-        )
+        return self._serve(GripperCommand, f'/{name}/gripper_cmd', grip, holds=holds)
 
     def _follow(self, handle: Any) -> FollowJointTrajectory.Result:
+        if handle.is_cancel_requested:
+            handle.canceled()
+            return FollowJointTrajectory.Result()
         trajectory = handle.request.trajectory
         self.followed.append(handle.request)
         end = trajectory.points[-1].positions

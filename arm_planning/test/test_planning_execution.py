@@ -110,6 +110,9 @@ class Bench:
         """Stand in for the node."""
         self.watch = callback
 
+    def create_subscription(self, *_: object, **__: object) -> None:
+        """Stand in for the node."""
+
     def resolve_topic_name(self, name: str) -> str:
         """Stand in for the node."""
         return f'/{name}'

@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Pose as PoseMessage
 from isolation import Isolation, reserve
 from move_group_rig import (
@@ -23,7 +24,7 @@ from move_group_rig import (
     pose_goal,
     READY,
 )
-from moveit_msgs.action import ExecuteTrajectory
+from moveit_msgs.action import ExecuteTrajectory, MoveGroup
 from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import GetPlannerParams, GetPositionFK, QueryPlannerInterfaces
 from processes import executable, RunningProcess
@@ -270,6 +271,53 @@ def test_the_gripper_of_the_package_is_moved(panda: MoveGroupRig) -> None:
     _status, result = panda.move(action_goal(motion_request(apart, 'hand')))
     assert result.error_code.val == MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS
     assert 'panda_finger_joint1 contradict' in result.error_code.message
+    server.destroy()
+
+
+def held(rig: MoveGroupRig, goal: Any, group: str) -> tuple[Any, float]:
+    """Have a controller begin with a goal; return its result to come, and how long it may last.
+
+    The controller keeps it until the test has it go on.
+    """
+    rig.held.clear()
+    request = motion_request(goal, group)
+    allowed = 1.2 * duration(rig.plan(request)) + 0.5  # moveit_controllers.yaml
+    handle = rig.send(MoveGroup, '/move_action', action_goal(request))
+    result = handle.get_result_async()
+    rig.client.spin_until(lambda: bool(rig.held) or result.done(), 60.0, 'goal of a controller')
+    assert not result.done(), result.result().result.error_code
+    return result, allowed
+
+
+def test_a_gripper_takes_the_time_that_it_needs(panda: MoveGroupRig) -> None:
+    """It closes until it stalls, and a cancel would end its grip."""
+    server = panda.serve_gripper('panda_hand_controller', 'panda_finger_joint1', holds=True)
+    result, allowed = held(panda, joint_goal([0.02], ['panda_finger_joint1']), 'hand')
+    panda.client.spin_for(allowed + 1.0)
+    assert not panda.held[0].is_cancel_requested
+    panda.held[0].execute()
+    panda.client.spin_until(result.done, 60.0, 'result')
+    assert result.result().result.error_code.val == MoveItErrorCodes.SUCCESS
+    server.destroy()
+
+
+def test_a_speed_override_gives_an_execution_more_time(panda: MoveGroupRig) -> None:
+    """Paused it waits; at full speed again, a controller that does not go on is too slow."""
+    server = panda.serve_arm('panda_arm_controller', holds=True)
+    topic = '/panda_arm_controller/controller_state'
+    states = panda.client.node.create_publisher(JointTrajectoryControllerState, topic, 10)
+    state = JointTrajectoryControllerState(speed_scaling_factor=0.0)
+    timer = panda.client.node.create_timer(0.02, lambda: states.publish(state))
+    panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
+    result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+    panda.client.spin_for(allowed + 1.0)
+    assert not panda.held[0].is_cancel_requested
+    state.speed_scaling_factor = 1.0
+    panda.client.spin_until(lambda: panda.held[0].is_cancel_requested, 60.0, 'cancel')
+    panda.held[0].execute()
+    panda.client.spin_until(result.done, 60.0, 'result')
+    assert result.result().result.error_code.val == MoveItErrorCodes.TIMED_OUT
+    panda.client.node.destroy_timer(timer)
     server.destroy()
 
 

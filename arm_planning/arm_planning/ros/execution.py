@@ -9,14 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 import math
 import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
+from control_msgs.msg import JointTrajectoryControllerState
 from rclpy.action.client import ActionClient
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 from arm_model.ros import seconds
@@ -24,7 +28,7 @@ from arm_trajectory import GoalCode
 from node_runner import ServerMatch
 
 from ..exceptions import PlanningCode, PlanningError
-from .controllers import Controller
+from .controllers import Controller, FOLLOW
 from .joint_trajectory import check_trajectory, from_start, part_of
 
 WATCH_PERIOD = 0.05
@@ -35,6 +39,9 @@ STOP_TIMEOUT = 5.0
 
 FINDING_TIMEOUT = 5.0
 """Time in [s] in which actions of controllers must be found: who has just started knows none."""
+
+STATE_TIMEOUT = 1.0
+"""Age at which the speed override of a controller counts no more in [s]."""
 
 FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
 """Answers to a cancel of controllers that do not follow the goal any more."""
@@ -128,6 +135,17 @@ class TrajectoryExecution:
             for name, each in controllers.items()
         }
         self._matches: dict[str, ServerMatch] = {}
+        self._states: dict[str, tuple[float, bytes]] = {}
+        self._timed = {name for name, each in controllers.items() if each.kind is FOLLOW}
+        for name in self._timed:
+            node.create_subscription(
+                JointTrajectoryControllerState,
+                f'{name}/controller_state',
+                partial(self._note_state, name),
+                qos_profile_sensor_data,
+                raw=True,  # of many only the latest is read, and only while something moves
+            )
+        self._watched = time.monotonic()
         self.stops = 0
         self._running: list[Execution] = []
         self._find_out: Callable[[Execution], None] | None = None
@@ -389,15 +407,42 @@ class TrajectoryExecution:
             execution.is_over = True
             execution.done(*(execution.ending or (PlanningCode.SUCCESS, '')))
 
+    def _note_state(self, name: str, message: bytes) -> None:
+        self._states[name] = time.monotonic(), message
+
+    def _speed(self, name: str) -> float:
+        """Return the speed override of a controller: 0 in a pause, 1 where it is unknown."""
+        at, message = self._states.get(name, (-math.inf, b''))
+        if time.monotonic() - at > STATE_TIMEOUT:
+            return 1.0
+        state = deserialize_message(message, JointTrajectoryControllerState)
+        return min(max(float(state.speed_scaling_factor), 0.0), 1.0)
+
+    def _is_overdue(self, execution: Execution, passed: float) -> bool:
+        """Whether an execution takes too long; what a speed override costs does not count.
+
+        How long a gripper takes is its own affair: it ends when it stalls.
+
+        Args:
+            execution: The execution.
+            passed: Time since this was last asked in [s].
+        """
+        if execution.ending is None:
+            timed = self._timed & execution.waits_for
+            if not timed:
+                return False
+            execution.deadline += passed * (1.0 - min(map(self._speed, timed)))
+        return time.monotonic() > execution.deadline
+
     def _watch(self) -> None:
-        now = time.monotonic()
+        before, self._watched = self._watched, time.monotonic()
         for name in self._clients:
             self._is_found(name)
         for execution in list(self._running):
             if execution.held:
                 self._look_again(execution)
                 continue
-            if now <= execution.deadline:
+            if not self._is_overdue(execution, self._watched - before):
                 continue
             if execution.ending is None:
                 allowed = execution.deadline - execution.begin
