@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 import time
@@ -98,8 +98,7 @@ class Planner:
         scene = self._model.scene if scene is None else scene
         self._refuse(request)
         if request.planner_id in PLANNER_IDS:
-            with self._start_first(request.start, scene):
-                plan = self._industrial.plan(request, scene)
+            plan = self._industrial.plan(request, self._checked_in(scene))
         else:
             plan = self._free_motion(request, scene, began + request.timeout)
         return replace(plan, planning_time=self._clock() - began)
@@ -119,19 +118,8 @@ class Planner:
         """
         began = self._clock()
         scene = self._model.scene if scene is None else scene
-        with self._start_first(items[0].request.start if items else None, scene):
-            plan = self._industrial.plan_sequence(items, scene, first)
+        plan = self._industrial.plan_sequence(items, self._checked_in(scene), first)
         return replace(plan, planning_time=self._clock() - began)
-
-    @contextmanager
-    def _start_first(self, start: Array | None, scene: PlanningScene) -> Iterator[None]:
-        """Say of a motion that is not valid that its start is not, where that is the reason."""
-        try:
-            yield
-        except PlanningError as error:
-            if error.code is PlanningCode.INVALID_MOTION_PLAN and start is not None:
-                _require(self._checked_in(scene).state(start), 'start', _START_CODES)
-            raise
 
     def ik(
         self,
@@ -204,7 +192,7 @@ class Planner:
 
         check = self._checked_in(scene)
         start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
-        _require(check.state(start), 'start', _START_CODES)
+        check.refuse_start(start)
         constraints = None
         if request.constraints is not None:
             constraints = ConstraintCheck(self._model, request.constraints)
@@ -278,12 +266,12 @@ class Planner:
         """Return the states at a goal itself, which are valid."""
         if isinstance(goal, JointGoal):
             state = self._state(goal.positions, 'goal', PlanningCode.INVALID_GOAL_CONSTRAINTS)
-            _require(check.state(state), 'goal', _GOAL_CODES)
+            _require_goal(check.state(state))
             return [state]
         states = self.ik(goal.pose, start, link=goal.link, scene=check.scene, count=IK_SOLUTIONS)
         valid = [state for state in states if check.state(state) is None]
         if not valid:
-            _require(check.state(states[0]), 'goal', _GOAL_CODES)
+            _require_goal(check.state(states[0]))
         return valid[:IK_SOLUTIONS]
 
     def _tolerated(
@@ -375,18 +363,13 @@ def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningErro
     )
 
 
-def _require(
-    violation: Violation | None, what: str, codes: tuple[PlanningCode, PlanningCode]
-) -> None:
-    """Raise what is wrong with a start or a goal: a limit, or a contact."""
+def _require_goal(violation: Violation | None) -> None:
+    """Raise what is wrong with a goal: a limit, or a contact."""
     if violation is not None:
-        code = codes[violation.contact is not None]
-        remedy = _START_REMEDY if code is PlanningCode.START_STATE_IN_COLLISION else ''
-        raise PlanningError(code, f'{what}: {violation.reason}{remedy}')
+        code = _GOAL_CODES[violation.contact is not None]
+        raise PlanningError(code, f'goal: {violation.reason}')
 
 
-_START_CODES = (PlanningCode.START_STATE_INVALID, PlanningCode.START_STATE_IN_COLLISION)
-_START_REMEDY = '; jog the arm clear of it, or change the scene: remove, attach or allow it'
 _GOAL_CODES = (PlanningCode.GOAL_STATE_INVALID, PlanningCode.GOAL_IN_COLLISION)
 _NOT_EXACTLY = (
     *_GOAL_CODES,

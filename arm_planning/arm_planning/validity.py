@@ -25,6 +25,8 @@ import numpy as np
 from arm_model import Array, Clearances, Contact, JointLimits, PlanningScene
 from arm_trajectory import Path
 
+from .exceptions import PlanningCode, PlanningError
+
 MARGIN = 1e-3
 """Distance that every pair keeps in [m] where a path is measured."""
 
@@ -152,8 +154,36 @@ class ValidityCheck:
         for segment in np.flatnonzero(outside.any(axis=1)).tolist():
             time = float(path.starts[segment])
             return self._beyond(lower[segment], upper[segment], time)
-        found = self._near_time(path, control)
+        return self.contact(path)
+
+    def contact(self, path: Path) -> Violation | None:
+        """Return where a pair comes nearer on a path than it may; None for nowhere.
+
+        Args:
+            path: The path.
+        """
+        found = self._near_time(path, _control_values(path))
         return None if found is None else self._near(path.at(found).position, found)
+
+    def refuse_start(self, start: Array) -> None:
+        """Refuse to begin where the arm may not be.
+
+        Args:
+            start: Joint positions in [rad] (n).
+
+        Raises:
+            PlanningError: A joint is beyond its limits, or something is in contact.
+        """
+        violation = self.state(start)
+        if violation is None:
+            return
+        if violation.contact is None:
+            raise PlanningError(PlanningCode.START_STATE_INVALID, f'start: {violation.reason}')
+        raise PlanningError(
+            PlanningCode.START_STATE_IN_COLLISION,
+            f'start: {violation.reason}; jog the arm clear of it, or change the scene: remove,'
+            ' attach or allow it',
+        )
 
     def _near_time(self, path: Path, control: Array) -> float | None:
         """Return a time at which a pair is nearer than it may be; None where none is.

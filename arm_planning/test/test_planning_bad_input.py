@@ -197,6 +197,10 @@ def bad_rest() -> Iterator[Refusal]:
     bad_goal = CODE.INVALID_GOAL_CONSTRAINTS
     folded = with_start(FOLDED)
     yield 'start in contact', folded, CODE.START_STATE_IN_COLLISION, 'panda_link0 touches'
+    touching = [a + 0.45 * (b - a) for a, b in zip(FOLDED, READY, strict=True)]  # 2.3 mm deep
+    parting = with_start(touching)
+    parting.planner_id, parting.goal_constraints = 'PTP', [joint_goal(READY)]
+    yield 'PTP out of contact', parting, CODE.START_STATE_IN_COLLISION, 'panda_link0 touches'
     outside = with_start([4.0, *READY[1:]])
     yield 'start beyond a limit', outside, CODE.START_STATE_INVALID, 'panda_joint1'
     bad_state = CODE.INVALID_ROBOT_STATE

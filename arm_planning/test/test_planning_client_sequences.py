@@ -35,6 +35,7 @@ from moveit_msgs.msg import (
     CollisionObject,
     DisplayTrajectory,
     MotionPlanRequest,
+    MotionSequenceItem,
     MoveItErrorCodes,
     PlanningScene,
     PlanningSceneComponents,
@@ -44,6 +45,7 @@ from moveit_msgs.srv import (
     ApplyPlanningScene,
     GetCartesianPath,
     GetMotionPlan,
+    GetMotionSequence,
     GetPlanningScene,
     GetPositionFK,
     GetPositionIK,
@@ -56,7 +58,8 @@ from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 
-from arm_model import combined, Pose
+from arm_model import combined, frozen, inverse, Pose
+from arm_planning import Planner
 from arm_planning.ros.geometry import pose_message, pose_of
 from node_runner import LATCHED
 
@@ -524,3 +527,26 @@ def test_names_and_types_are_moveits(rig: MoveGroupRig) -> None:
     rig.client.spin_until(lambda: NAMES.items() <= found().items(), 30.0, 'all names')
     sequence = rig.client.action(MoveGroupSequence, '/sequence_move_group')
     rig.client.spin_until(sequence.server_is_ready, 20.0, 'the action of sequences')
+
+
+def test_items_of_a_sequence_begin_where_the_one_before_ends(rig: MoveGroupRig) -> None:
+    """Joints that a goal leaves out, and poses in the frame of the hand."""
+    lifted = PoseMessage(position=Point(z=-0.05), orientation=Quaternion(w=1.0))
+    goals = [
+        joint_goal([0.4], JOINTS[:1]),
+        joint_goal([0.2], JOINTS[-1:]),
+        pose_goal(lifted, HAND, HAND),
+    ]
+    asked = GetMotionSequence.Request()
+    asked.request.items = [
+        MotionSequenceItem(req=motion_request(goal, planner_id=kind))
+        for goal, kind in zip(goals, ('PTP', 'PTP', 'LIN'), strict=True)
+    ]
+    answer = rig.client.call(GetMotionSequence, '/plan_sequence_path', asked).response
+    assert answer.error_code.val == SUCCESS, answer.error_code
+    end = answer.planned_trajectories[0].joint_trajectory.points[-1].positions
+    before = frozen([0.4, *READY[1:-1], 0.2])
+    fk = Planner(panda().model('panda_arm')).fk
+    up = combined(inverse(fk(before, HAND)), fk(frozen(end), HAND))
+    assert up.position == pytest.approx([0.0, 0.0, -0.05], abs=1e-3)
+    assert up.rotation == pytest.approx(np.eye(3), abs=1e-2)

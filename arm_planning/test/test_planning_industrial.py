@@ -27,6 +27,7 @@ from arm_planning import (
     PlanningCode,
     PlanningError,
     PoseGoal,
+    ValidityCheck,
 )
 from arm_planning.curves import arc_around, arc_through, Curve, Line
 from arm_planning.ik.link_kinematics import LinkKinematics
@@ -262,12 +263,12 @@ def test_contact_on_the_way_names_pair_and_place() -> None:
     name = 'gp110'
     way = np.array([0.0, -0.6, 0.0])
     ball = CollisionObject('ball', Sphere(0.03), pose=moved(name, 0.5 * way))
-    scene = robot(name).scene.with_object(ball)
+    check = ValidityCheck(robot(name).limits, robot(name).scene.with_object(ball))
     for kind in ('LIN', 'PTP'):
-        with pytest.raises(PlanningError, match=r'ball.* would touch \d+%.* at \(') as refused:
-            planner(name).plan(request(name, kind, moved(name, way)), scene)
+        with pytest.raises(PlanningError, match=r'touches ball.* \d+% .* at \(') as refused:
+            planner(name).plan(request(name, kind, moved(name, way)), check)
         assert refused.value.code is PlanningCode.INVALID_MOTION_PLAN
-    assert planner(name).plan(request(name, 'LIN', moved(name, -0.5 * way)), scene)
+    assert planner(name).plan(request(name, 'LIN', moved(name, -0.5 * way)), check)
 
 
 def test_a_second_goal_is_taken_when_the_first_is_refused() -> None:
@@ -348,9 +349,9 @@ def test_blends_stay_in_their_spheres(name: str, kinds: str) -> None:
 def test_a_sequence_heeds_path_constraints(radius: float) -> None:
     """Those of one motion count for it alone, or for all that are blended with it."""
     motions = items('prbt', 'PPP', radius)
-    ends = [motions[0].request.start]
+    ends = [motions[0].at(None).start]
     for motion in motions:
-        only = replace(motion.request, start=ends[-1])
+        only = replace(motion.at(None), start=ends[-1])
         ends.append(planner('prbt').plan(only).path.end.position)
     joint = int(np.abs(ends[1] - ends[0]).argmax())
     name, (began, ended) = robot('prbt').joints[joint], (ends[0][joint], ends[1][joint])
@@ -360,7 +361,7 @@ def test_a_sequence_heeds_path_constraints(radius: float) -> None:
         """Plan with a constraint of one motion."""
         constraints = PathConstraints({name: (lower, upper)})
         motion = motions[number]
-        limited = replace(motion, request=replace(motion.request, constraints=constraints))
+        limited = replace(motion, request=replace(motion.at(None), constraints=constraints))
         changed = [*motions[:number], limited, *motions[number + 1 :]]
         return planner('prbt').plan_sequence(changed)
 

@@ -9,8 +9,8 @@ import time
 
 import numpy as np
 
-from arm_model import Array, checked, JointLimits, PlanningScene, Pose, RobotModel
-from arm_trajectory import farthest_beyond, Path, PathCheck
+from arm_model import Array, checked, JointLimits, Pose, RobotModel
+from arm_trajectory import farthest_beyond, Path
 
 from ..constraints import ConstraintCheck
 from ..curves import arc_around, arc_through, Curve, Line
@@ -27,6 +27,7 @@ from ..requests import (
     MotionRequest,
     PoseGoal,
 )
+from ..validity import ValidityCheck
 from .following import curve_path
 from .limits import CartesianLimits, check_scaling, scaled
 from .ptp import ptp_path
@@ -68,20 +69,20 @@ class IndustrialPlanner:
         self._limits = CartesianLimits() if limits is None else limits
         self._solvers: dict[str, IkSolver] = {}
 
-    def plan(self, request: MotionRequest, scene: PlanningScene | None = None) -> MotionPlan:
+    def plan(self, request: MotionRequest, check: ValidityCheck | None = None) -> MotionPlan:
         """Return the motion of a request.
 
         Args:
             request: Its planner is PTP, LIN or CIRC.
-            scene: Where it must be free of contact; None does not check.
+            check: Finds contact in a scene; None does not look.
 
         Raises:
             PlanningError: There is none; the message says why and where.
         """
-        start = self._start(request)
+        start = self._start(request, check)
         problems: list[PlanningError] = []
         for goal in request.goals:
-            plan = self._tried(request, start, goal, scene)
+            plan = self._tried(request, start, goal, check)
             if isinstance(plan, MotionPlan):
                 return plan
             problems.append(plan)
@@ -95,17 +96,17 @@ class IndustrialPlanner:
         raise PlanningError(problems[0].code, reasons) from problems[0]
 
     def _tried(
-        self, request: MotionRequest, start: Array, goal: Goal, scene: PlanningScene | None
+        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck | None
     ) -> MotionPlan | PlanningError:
         """Return the motion to a goal, or why there is none."""
         try:
-            full, link = self._full(request, start, goal, scene)
-            return self._finished(full, (request,), link, scene)
+            full, link = self._full(request, start, goal, check)
+            return self._finished(full, (request,), link, check)
         except PlanningError as error:
             return error
 
     def plan_sequence(
-        self, items: Sequence[SequenceItem], scene: PlanningScene | None = None, first: int = 0
+        self, items: Sequence[SequenceItem], check: ValidityCheck | None = None, first: int = 0
     ) -> MotionPlan:
         """Return one motion through a sequence, with stops where a blend radius is 0.
 
@@ -114,31 +115,34 @@ class IndustrialPlanner:
 
         Args:
             items: The motions; each has one goal, and begins where the one before ends.
-            scene: Where it must be free of contact; None does not check.
+            check: Finds contact in a scene; None does not look.
             first: Number of the first item, for messages.
 
         Raises:
             PlanningError: A motion is refused, or a blend; the message names the item.
         """
         check_radii([item.blend_radius for item in items])
-        start = self._start(items[0].request)
+        start: Array | None = None
         plans: list[MotionPlan] = []
         group: list[tuple[MotionRequest, FullSpeedPath, LinkKinematics, float]] = []
         for number, item in enumerate(items, first):
-            full, link = self._item(number, item.request, start, scene)
-            group.append((item.request, full, link, item.blend_radius))
+            request = item.at(start)
+            if start is None:
+                start = self._start(request, check)
+            full, link = self._item(number, request, start, check)
+            group.append((request, full, link, item.blend_radius))
             start = full.path.end.position
             if item.blend_radius == 0.0:
-                plans.append(self._group(group, number + 1 - len(group), scene))
+                plans.append(self._group(group, number + 1 - len(group), check))
                 group = []
         path = plans[0].path
         for plan in plans[1:]:
             path = path.followed_by(plan.path.segments)
         notes = tuple(note for plan in plans for note in plan.notes)
-        return MotionPlan(path, items[-1].request.planner_id, notes)
+        return MotionPlan(path, request.planner_id, notes)
 
     def _item(
-        self, number: int, request: MotionRequest, start: Array, scene: PlanningScene | None
+        self, number: int, request: MotionRequest, start: Array, check: ValidityCheck | None
     ) -> tuple[FullSpeedPath, LinkKinematics]:
         """Return the path of an item at full speed, and the link that it moves."""
         if len(request.goals) != 1:
@@ -147,7 +151,7 @@ class IndustrialPlanner:
                 f'sequence: item {number} has {len(request.goals)} goals; give one',
             )
         try:
-            return self._full(request, start, request.goals[0], scene)
+            return self._full(request, start, request.goals[0], check)
         except PlanningError as error:
             raise PlanningError(error.code, f'sequence: item {number}: {error}') from error
 
@@ -155,7 +159,7 @@ class IndustrialPlanner:
         self,
         group: Sequence[tuple[MotionRequest, FullSpeedPath, LinkKinematics, float]],
         first: int,
-        scene: PlanningScene | None,
+        check: ValidityCheck | None,
     ) -> MotionPlan:
         """Return the motion of items without a stop between them."""
         requests, parts, links, radii = zip(*group, strict=True)
@@ -167,13 +171,13 @@ class IndustrialPlanner:
                 f' ({", ".join(each.link for each in links)}); blend motions of one link',
             )
         if len(parts) == 1:
-            return self._finished(parts[0], requests, link, scene)
+            return self._finished(parts[0], requests, link, check)
         corners = [link.pose(part.path.end.position).position for part in parts]
         check_overlap(radii, corners, first)
-        return self._finished(joined(parts, radii, link, first), requests, link, scene)
+        return self._finished(joined(parts, radii, link, first), requests, link, check)
 
     def _full(
-        self, request: MotionRequest, start: Array, goal: Goal, scene: PlanningScene | None
+        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck | None
     ) -> tuple[FullSpeedPath, LinkKinematics]:
         """Return the path at full speed to a goal, and the link that it moves.
 
@@ -185,7 +189,7 @@ class IndustrialPlanner:
         joints = scaled(self._model.limits, *factors)
         solver = self._solver(goal.link if isinstance(goal, PoseGoal) else '')
         if request.planner_id == PTP:
-            end = self._joints(goal, start, solver, scene)
+            end = self._joints(goal, start, solver, check)
             return ptp_path(start, end, joints), solver.link
         if request.planner_id not in PLANNER_IDS:
             raise PlanningError(
@@ -225,11 +229,11 @@ class IndustrialPlanner:
         return _arc(begin, request.via, end)
 
     def _joints(
-        self, goal: Goal, start: Array, solver: IkSolver, scene: PlanningScene | None
+        self, goal: Goal, start: Array, solver: IkSolver, check: ValidityCheck | None
     ) -> Array:
         if isinstance(goal, JointGoal):
             return self._checked(goal.positions, 'goal')
-        return solver.solve(goal.pose, start, scene)[0]
+        return solver.solve(goal.pose, start, None if check is None else check.scene)[0]
 
     def _ends_at(self, full: FullSpeedPath, goal: JointGoal, name: str) -> FullSpeedPath:
         """Compare the end of a line with the joints of its goal: only the pose leads there."""
@@ -254,7 +258,7 @@ class IndustrialPlanner:
         full: FullSpeedPath,
         requests: Sequence[MotionRequest],
         link: LinkKinematics,
-        scene: PlanningScene | None,
+        check: ValidityCheck | None,
     ) -> MotionPlan:
         """Return the motion with its times, checked."""
         limits = scaled(
@@ -268,7 +272,8 @@ class IndustrialPlanner:
             path, slowed = speed_limited(path, limited, request.max_cartesian_speed)
             notes = (*notes, *slowed)
         self._check_range(path, limits, requests[-1].planner_id)
-        self._check_contact(path, scene, link, requests[-1].planner_id)
+        if check is not None:
+            _check_contact(path, check, link, requests[-1].planner_id)
         self._check_constraints(path, requests)
         return MotionPlan(path, requests[-1].planner_id, notes)
 
@@ -284,21 +289,6 @@ class IndustrialPlanner:
                 f'{name}: {limits.names[joint]} would be at {beyond.position:.4f} at'
                 f' {beyond.time:.2f} s, beyond its limits {limits.lower[joint]:.4f}..'
                 f'{limits.upper[joint]:.4f}',
-            )
-
-    def _check_contact(
-        self, path: Path, scene: PlanningScene | None, link: LinkKinematics, name: str
-    ) -> None:
-        if scene is None:
-            return
-        contact = PathCheck(scene).contact(path.positions, path.duration)
-        if contact is not None:
-            x, y, z = link.pose(path.at(contact.time).position).position
-            raise PlanningError(
-                PlanningCode.INVALID_MOTION_PLAN,
-                f'{name}: {contact.links[0]} and {contact.links[1]} would touch'
-                f' {contact.time / path.duration:.0%} of the time into it, with {link.link} at'
-                f' ({x:.3f}, {y:.3f}, {z:.3f})',
             )
 
     def _check_constraints(self, path: Path, requests: Sequence[MotionRequest]) -> None:
@@ -319,9 +309,11 @@ class IndustrialPlanner:
                     f' way: {broken.reason}; {remedy}',
                 )
 
-    def _start(self, request: MotionRequest) -> Array:
+    def _start(self, request: MotionRequest, check: ValidityCheck | None) -> Array:
         start = checked(request.start, len(self._model), 'start')
         self._refuse_beyond(start, 'start', PlanningCode.START_STATE_INVALID)
+        if check is not None:
+            check.refuse_start(start)
         return start
 
     def _checked(self, positions: Array, what: str) -> Array:
@@ -345,6 +337,17 @@ class IndustrialPlanner:
         if name not in self._solvers:
             self._solvers[name] = IkSolver(self._model, name, self._clock)
         return self._solvers[name]
+
+
+def _check_contact(path: Path, check: ValidityCheck, link: LinkKinematics, name: str) -> None:
+    near = check.contact(path)
+    if near is not None:
+        x, y, z = link.pose(near.positions).position
+        raise PlanningError(
+            PlanningCode.INVALID_MOTION_PLAN,
+            f'{name}: {near.reason}, {near.time / path.duration:.0%} of the time into it, with'
+            f' {link.link} at ({x:.3f}, {y:.3f}, {z:.3f})',
+        )
 
 
 def _arc(begin: Pose, via: CircPoint | None, end: Pose) -> Curve:

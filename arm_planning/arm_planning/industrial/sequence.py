@@ -10,7 +10,7 @@ measured.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -45,12 +45,23 @@ class SequenceItem:
     """A motion of a sequence.
 
     Attributes:
-        request: The motion; the start counts for the first one alone.
+        request: The motion, whose start counts for the first one alone; or what makes it of the
+            joint positions in [rad] (n) at which it begins, for the first one of None.
         blend_radius: Radius about its goal in which the next motion may begin, in [m]; 0 stops.
     """
 
-    request: MotionRequest
+    request: MotionRequest | Callable[[Array | None], MotionRequest]
     blend_radius: float = 0.0
+
+    def at(self, start: Array | None) -> MotionRequest:
+        """Return the motion.
+
+        Args:
+            start: Where it begins in [rad] (n); None for the first one.
+        """
+        if isinstance(self.request, MotionRequest):
+            return self.request
+        return self.request(start)
 
 
 def check_radii(radii: Sequence[float]) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 import time
 from typing import Any
@@ -215,9 +216,9 @@ class PlanningThread:
         notes: list[str] = []
         for run in runs:
             model, planner = self._planners.at(run.group, positions)
-            read = RequestReader(model, snapshot, positions, self._settings)
+            read = partial(_read_item, partial(self._reader, model, snapshot, positions))
             items = [
-                SequenceItem(_read_item(read, number, item.req), item.blend_radius)
+                SequenceItem(partial(read, number, item.req), item.blend_radius)
                 for number, item in enumerate(run.items, run.first)
             ]
             plan = planner.plan_sequence(items, scene_for(snapshot, model.scene), run.first)
@@ -231,6 +232,15 @@ class PlanningThread:
             time.monotonic() - begin,
             notes,
         )
+
+    def _reader(
+        self, model: RobotModel, snapshot: SceneSnapshot, positions: Array, start: Array | None
+    ) -> RequestReader:
+        """Return what reads an item that begins at a start of its group, if there is one."""
+        if start is not None:
+            places = dict(zip(model.joints, start.tolist(), strict=True))
+            positions = self._moved(positions, places)
+        return RequestReader(model, snapshot, positions, self._settings)
 
     def _serve_sequence(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
         work = self.prepare_sequence(request.request.items)
@@ -288,9 +298,15 @@ def _changed(
     return apply_scene(snapshot, diff, positions)
 
 
-def _read_item(read: RequestReader, number: int, message: Any) -> MotionRequest:  # noqa: ANN401
+def _read_item(
+    reader: Callable[[Array | None], RequestReader],
+    number: int,
+    message: Any,  # noqa: ANN401
+    start: Array | None,
+) -> MotionRequest:
+    """Return an item of a sequence; what it leaves out is as where the item before ends."""
     try:
-        return read.request(message)
+        return reader(start).request(message)
     except PlanningError as error:
         raise PlanningError(error.code, f'sequence: item {number}: {error}') from error
 
