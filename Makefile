@@ -13,6 +13,8 @@ ROBOT ?= panda
 # 1: demos without the page on which the robot is seen
 NO_VIEW ?=
 export NO_VIEW
+# compilers at the same time; without it one a core, and one for each GiB of memory at most
+JOBS ?=
 # of the training: what is learned, and for how long
 TASK ?= walk
 MINUTES ?= 30
@@ -20,6 +22,7 @@ MINUTES ?= 30
 ARGS ?=
 
 WORKSPACE = cd tools && $(or $(PYTHON),python3) -m workspace $(if $(PYTHON),--python $(PYTHON))
+BUILD = $(WORKSPACE) build $(if $(JOBS),--jobs $(JOBS))
 IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 # some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
@@ -47,31 +50,31 @@ help:
 	@echo 'make distclean  remove the environment too'
 
 demo: system
-	@$(WORKSPACE) build arm_bringup
+	@$(BUILD) arm_bringup
 	@$(IN_ENVIRONMENT) ros2 run arm_bringup demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 demo-quad: system
-	@$(WORKSPACE) build quad_bringup
+	@$(BUILD) quad_bringup
 	@$(IN_ENVIRONMENT) ros2 run quad_bringup demo $(if $(DURATION),--duration $(DURATION))
 
 demo-arm: system
-	@$(WORKSPACE) build arm_bringup arm_servo
+	@$(BUILD) arm_bringup arm_servo
 	@$(IN_ENVIRONMENT) ros2 run arm_bringup motion_demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 demo-plan: system
-	@$(WORKSPACE) build arm_bringup arm_servo arm_planning
+	@$(BUILD) arm_bringup arm_servo arm_planning
 	@$(IN_ENVIRONMENT) ros2 run arm_bringup plan_demo $(ROBOT) $(if $(DURATION),--duration $(DURATION))
 
 test: system
-	@$(WORKSPACE) build --dev
+	@$(BUILD) --dev
 	@$(PYTEST) $(ARGS)
 
 check: lint
-	@$(WORKSPACE) build --dev
+	@$(BUILD) --dev
 	@$(PYTEST) -q -m 'not scenario and not slow' $(ARGS)
 
 build: system
-	@$(WORKSPACE) build
+	@$(BUILD)
 
 lint: system
 	@$(WORKSPACE) lint
@@ -80,21 +83,21 @@ docs: system
 	@$(WORKSPACE) docs
 
 bench: system
-	@$(WORKSPACE) build --dev
+	@$(BUILD) --dev
 	@$(IN_ENVIRONMENT) tools/bench
 
 train: system
-	@$(WORKSPACE) build --with training quad_controller
+	@$(BUILD) --with training quad_controller
 	@$(IN_ENVIRONMENT) nice python quad_controller/training/train.py --task $(TASK) --minutes $(MINUTES) \
 	  $(if $(SEED),--seed $(SEED))
 
 chaos: system
-	@$(WORKSPACE) build --dev
+	@$(BUILD) --dev
 	@$(IN_ENVIRONMENT) python tests/chaos.py \
 	  $(if $(DURATION),--duration $(DURATION)) $(if $(SEED),--seed $(SEED))
 
 soak: system
-	@$(WORKSPACE) build --dev
+	@$(BUILD) --dev
 	@$(IN_ENVIRONMENT) python tests/soak.py $(if $(DURATION),--duration $(DURATION))
 
 setup: system

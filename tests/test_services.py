@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Services of compose.yaml and systemd units start, are ready and end in order, by their own lines.
+"""Services of compose.yaml and systemd units start, are ready and end in order.
 
-Without Docker and systemd: the same commands by the same entry point, beside a `ros2` whose `run` does
-what ROS from apt does with signals.
+Without Docker and systemd: their own commands by their entry point, beside a `ros2` whose `run`
+treats signals as that of ROS from apt.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ import time
 from typing import Any
 
 from isolation import Isolation
-import psutil
 from processes import executable, RunningProcess
+import psutil
 import pytest
 import yaml
 
@@ -62,8 +62,6 @@ def workspace(tmp_path: Path) -> Path:
     (apt / 'ros2').chmod(0o755)
     (folder / 'env.sh').write_text(f'. {ROOT}/env.sh\nPATH={apt}:$PATH\n')
     return folder
-
-
 
 
 def interpolated(text: str) -> str:

@@ -4,13 +4,17 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+import os
 from pathlib import Path
 import shutil
+import sys
+from typing import Any
 
 from fake_programs import FakeRunner
 import pytest
 
-from workspace.environment import choose_python, DOCS, Environment
+from workspace.build import Builder
+from workspace.environment import choose_python, DOCS, Environment, uv_settings
 from workspace.errors import (
     ForeignFolderError,
     NetworkError,
@@ -20,6 +24,7 @@ from workspace.errors import (
 from workspace.interpreter import Interpreter, probe
 from workspace.layout import Layout
 from workspace.plan import carry_out, plan, Target
+from workspace.process import Runner
 from workspace.state import EnvironmentState, read_state
 from workspace.underlay import Underlay, UnderlayKind
 
@@ -286,6 +291,59 @@ def test_an_upgraded_interpreter_makes_the_environment_new(
     name.unlink()
     name.symlink_to(new)
     assert mine.base != before
+
+
+def test_the_python_of_a_system_ros_comes_before_one_on_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Conda's lacks what apt installed for Ubuntu's of the same version."""
+    running = probe('python3')
+    (tmp_path / 'lib' / running.name / 'site-packages' / 'rclpy').mkdir(parents=True)
+    own, other = tmp_path / 'bin' / running.name, tmp_path / 'conda' / running.name
+    for path in (own, other):
+        path.parent.mkdir()
+        path.write_text(f'#!/bin/sh\nexec {running.path} "$@"\n')
+        path.chmod(0o755)
+    monkeypatch.setenv('PATH', f'{other.parent}:/usr/bin:/bin')
+    system = Underlay(UnderlayKind.SYSTEM, tmp_path)
+    assert system.python == str(own)
+    own.unlink()
+    assert system.python in {f'/usr/bin/{running.name}', running.name}
+
+
+@pytest.mark.parametrize(('jobs', 'limit'), [(1, 1), (2, 2), (3, 3), (16, 16)])
+def test_compilers_of_all_packages_are_limited_together(
+    jobs: int,
+    limit: int,
+    environment: Environment,
+    runner: Runner,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Workers of colcon times jobs of make; on a small computer each takes much of its memory."""
+    seen: list[int] = []
+
+    def run(_runner: Runner, _what: str, arguments: list[str], **options: Any) -> None:
+        workers = int(arguments[arguments.index('--parallel-workers') + 1])
+        seen.append(workers * int(options['extra']['MAKEFLAGS'].removeprefix('-j')))
+
+    monkeypatch.setattr(Runner, 'run', run)
+    builder = Builder(environment.layout, 'base', UnderlayKind.WHEELS, jobs)
+    builder.build(runner, {}, [])
+    assert seen
+    assert max(seen) <= limit
+
+
+def test_uv_gets_the_index_of_pip(tmp_path: Path) -> None:
+    """From pip.conf or PIP_INDEX_URL, of which the latter counts; uv's own setting wins."""
+    config = tmp_path / 'pip.conf'
+    config.write_text('[global]\nindex-url = https://mirror.invalid/simple\n')
+    environ = {'PIP_CONFIG_FILE': str(config), 'PATH': os.environ['PATH']}
+    python = Path(sys.executable)
+    key = 'UV_DEFAULT_INDEX'
+    assert uv_settings(environ, python)[key] == 'https://mirror.invalid/simple'
+    named = environ | {'PIP_INDEX_URL': 'https://other.invalid/simple'}
+    assert uv_settings(named, python)[key] == 'https://other.invalid/simple'
+    assert key not in uv_settings(named | {key: 'https://own.invalid'}, python)
 
 
 def test_system_ros_decides_on_the_python(tmp_path: Path) -> None:

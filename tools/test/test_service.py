@@ -41,7 +41,7 @@ def test_a_unit_is_well_formed(unit: Path) -> None:
 
 @pytest.mark.parametrize('unit', UNITS, ids=lambda unit: str(unit.name))
 def test_starts_that_fail_come_to_their_limit(unit: Path) -> None:
-    """Also when each attempt takes as long as it may: drives may be off, or hang when they stop."""
+    """Also when each attempt takes as long as it may, as with drives that are off."""
     parser = read(unit)
     service = parser['Service']
     attempt = sum(int(service[key]) for key in ('TimeoutStartSec', 'TimeoutStopSec', 'RestartSec'))

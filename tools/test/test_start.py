@@ -57,6 +57,17 @@ def test_another_interpreter_is_found_by_its_name(
     assert start._another() == str(works)
 
 
+@pytest.mark.parametrize(('platform', 'words'), [('darwin', 'Apple silicon'), ('win32', 'WSL2')])
+def test_other_systems_are_refused_in_one_sentence(
+    platform: str, words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before anything is imported that they lack."""
+    start = importlib.import_module('workspace.__main__')
+    monkeypatch.setattr(sys, 'platform', platform)
+    assert start._start() == 1
+    assert words in capsys.readouterr().err
+
+
 def test_wrong_python_is_an_error_without_traceback() -> None:
     """`make PYTHON=nothing` ends with words and exit code 1."""
     done = workspace('--python', '/nonexistent/python', 'missing')

@@ -46,6 +46,13 @@ def _better_interpreter() -> str:
 
 def _start() -> int:
     """Run the set-up here, or in the Python that fits it."""
+    if not sys.platform.startswith('linux'):
+        sys.stderr.write('error: ROS 2 Jazzy has no packages for %s.\n' % sys.platform)  # noqa: UP031
+        sys.stderr.write(
+            '  Run this in Ubuntu 24.04: on Windows in WSL2, on a Mac in a virtual machine,\n'
+            '  which on Apple silicon (arm64) needs ros-jazzy-ros-base from apt.\n'
+        )
+        return 1
     other = _better_interpreter()
     if other:
         os.execv(other, [other, '-m', 'workspace', *sys.argv[1:]])  # noqa: S606

@@ -17,8 +17,15 @@ from .process import Runner
 from .state import fingerprint, write_atomically
 from .underlay import UnderlayKind
 
+PACKAGES_AT_A_TIME = 2
 STAMP = '.workspace-fingerprint'
 _NEWS = ('Starting >>>', 'Finished <<<', 'Failed')
+
+
+def default_jobs() -> int:
+    """Return a compiler a core, and not more than one for each GiB of memory."""
+    memory = os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') // 2**30
+    return max(1, min(len(os.sched_getaffinity(0)), memory))
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +36,13 @@ class Builder:
         layout: Where things are.
         base: Fingerprint of the environment that the packages are built in.
         kind: Where ROS comes from.
+        jobs: Greatest number of compilers at the same time.
     """
 
     layout: Layout
     base: str
     kind: UnderlayKind
+    jobs: int
 
     @property
     def cmake_arguments(self) -> list[str]:
@@ -127,7 +136,7 @@ class Builder:
         return result.is_file() and result.read_text(encoding='utf-8').strip() == '0'
 
     def _colcon(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
-        workers = os.cpu_count() or 1
+        workers = min(self.jobs, PACKAGES_AT_A_TIME)
         folders = [package.folder for package in packages.values()]
         colcon: list[str | Path] = [self.layout.venv_python, '-m', 'colcon']
         colcon += ['--log-base', self.layout.log, 'build', '--symlink-install']
@@ -141,5 +150,5 @@ class Builder:
             ['bash', '-c', '. "$0" && exec "$@"', setup, *colcon],
             show=lambda line: line.startswith(_NEWS),
             # without it colcon adds a load limit, and on a busy machine compiles one by one
-            extra={'MAKEFLAGS': f'-j{workers}'},
+            extra={'MAKEFLAGS': f'-j{max(1, self.jobs // workers)}'},
         )

@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 
+from .build import default_jobs
 from .environment import choose_python, DOCS, Environment
 from .errors import WorkspaceError
 from .interpreter import Interpreter, probe
@@ -41,6 +42,9 @@ def _parser() -> argparse.ArgumentParser:
         metavar='NAME',
         help='what requirements/NAME.txt pins, too',
     )
+    build.add_argument(
+        '--jobs', type=int, default=default_jobs(), help='compilers at the same time (%(default)s)'
+    )
     build.add_argument('packages', nargs='*', help='with what they need; none means all')
     commands.add_parser('lint', help='make the environment and check the code')
     commands.add_parser('docs', help='make the environment and build the manual')
@@ -59,7 +63,10 @@ def _environment(layout: Layout, python: str) -> Environment:
 def _target(options: argparse.Namespace) -> Target:
     if options.command == 'build':
         return Target(
-            dev=options.dev, packages=tuple(options.packages), extras=tuple(options.extras)
+            dev=options.dev,
+            packages=tuple(options.packages),
+            extras=tuple(options.extras),
+            jobs=max(1, options.jobs),
         )
     if options.command == 'docs':
         return Target(build=False, extras=(DOCS,))

@@ -4,17 +4,19 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 import shutil
+import subprocess
 
 from . import shell, wheels
 from .errors import ForeignFolderError, NetworkError, StepFailedError
 from .interpreter import Interpreter, probe
 from .layout import Layout
-from .process import Argument, Runner
+from .process import Argument, clean_environment, Runner
 from .state import EnvironmentState, fingerprint, fingerprint_files, read_state, write_state
 from .system import check
 from .underlay import Underlay, UnderlayKind
@@ -151,7 +153,12 @@ class Environment:
         uv += ['--build-constraints', self.requirements, *options]
         for path in requirements:
             uv += ['-r', path]
-        runner.run('The Python packages', uv, show=lambda line: line.lstrip().startswith(_NEWS))
+        runner.run(
+            'The Python packages',
+            uv,
+            show=lambda line: line.lstrip().startswith(_NEWS),
+            extra=uv_settings(runner.environ, python),
+        )
 
     def _finish(self, runner: Runner) -> None:
         libraries = []
@@ -176,6 +183,41 @@ class Environment:
             raise
         held = {**(before.additions if before is not None else {}), **additions}
         write_state(self.layout.state, EnvironmentState(self.base, held, self.python))
+
+
+# what uv calls a setting of pip
+_UV_VARIABLES = {
+    'index-url': 'UV_DEFAULT_INDEX',
+    'extra-index-url': 'UV_INDEX',
+    'trusted-host': 'UV_INSECURE_HOST',
+    'cert': 'SSL_CERT_FILE',
+}
+
+
+def uv_settings(environ: Mapping[str, str], python: Path) -> dict[str, str]:
+    """Translate pip's index and certificate (pip.conf, PIP_INDEX_URL) for uv, which reads neither.
+
+    Args:
+        environ: Variables that uv has its own settings in; those count.
+        python: An interpreter with pip.
+    """
+    command: list[Argument] = [python, '-m', 'pip', 'config', 'list']
+    clean = clean_environment(environ)
+    try:
+        done = subprocess.run(command, env=clean, capture_output=True, text=True, check=False)
+    except OSError:  # the step that follows reports an interpreter that does not start
+        return {}
+    found: dict[str, str] = {}
+    for section in ('global', 'install', ':env:'):  # the later one counts
+        for line in done.stdout.splitlines():
+            where, _, rest = line.partition('.')
+            key, _, value = rest.partition('=')
+            variable = _UV_VARIABLES.get(key) if where == section else None
+            if variable is not None and variable not in environ:
+                found[variable] = ' '.join(ast.literal_eval(value).split())
+    if 'UV_INDEX' in found:  # pip takes the version that is wanted from whichever index has it
+        found['UV_INDEX_STRATEGY'] = environ.get('UV_INDEX_STRATEGY', 'unsafe-best-match')
+    return found
 
 
 def _purpose(name: str) -> str:
@@ -214,8 +256,7 @@ def choose_python(
     """
     if named:
         return probe(named)
-    wanted = underlay.python_name
     kept = Path(state.python) if state is not None else None
-    if kept is not None and kept.exists() and wanted in {None, kept.resolve().name}:
+    if kept is not None and kept.exists() and underlay.python_name in {None, kept.resolve().name}:
         return str(kept)
-    return probe(wanted or running)
+    return probe(underlay.python or running)

@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import time
 
-from .build import Builder
+from .build import Builder, default_jobs
 from .environment import DEV, DOCS, Environment, Step
 from .errors import UnknownPackageError
 from .packages import find_packages, needed_packages
@@ -25,12 +25,14 @@ class Target:
         build: Whether any package.
         packages: Which ones; none means all.
         extras: Requirements files besides, which no package needs by itself.
+        jobs: Greatest number of compilers at the same time.
     """
 
     dev: bool = False
     build: bool = True
     packages: tuple[str, ...] = ()
     extras: tuple[str, ...] = ()
+    jobs: int = field(default_factory=default_jobs)
 
 
 def plan(environment: Environment, target: Target) -> list[Step]:
@@ -54,7 +56,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
     steps = environment.steps(read_state(layout.state), [*names, *target.extras])
     if not target.build:
         return steps
-    builder = Builder(layout, environment.base, environment.underlay.kind)
+    builder = Builder(layout, environment.base, environment.underlay.kind, target.jobs)
     stale = builder.stale(builder.fingerprints(packages))
     wanted = needed_packages(found, (), environment.underlay)
     gone = [name for name in builder.leftovers(wanted) if name not in stale]

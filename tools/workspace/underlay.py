@@ -53,6 +53,18 @@ class Underlay:
                 return match.group()
         return None
 
+    @property
+    def python(self) -> str | None:
+        """That Python, by its path beside its ROS or in /usr/bin, else by its name.
+
+        One that conda or pyenv put first on PATH lacks the Python packages that apt installed.
+        """
+        name = self.python_name
+        if name is None:
+            return None
+        places = (self.prefix / 'bin' / name, Path('/usr/bin') / name)
+        return next((str(path) for path in places if path.exists()), name)
+
 
 def find_underlay(environ: Mapping[str, str], venv: Path) -> Underlay:
     """Take the system's ROS when it is there, else the wheels.
