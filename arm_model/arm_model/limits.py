@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from urdf_reader import Joint, JointKind, JointRange, KinematicTree
+from urdf_reader import Joint, JointKind, KinematicTree
 import yaml
 
 from .arrays import Array, frozen, Mask
@@ -198,7 +198,7 @@ def _row(joint: Joint, table: Mapping[str, Any], defaults: dict[str, list[str]])
             f'joint {name}: max_velocity {velocity:g} is wider than the description'
             f' ({span.velocity:g}); a limits file may only narrow'
         )
-    lower, upper = _span(name, entry, span)
+    lower, upper = _span(joint, entry)
     acceleration = _positive(name, entry, 'acceleration') or default(
         f'no max_acceleration in the limits file, so {DEFAULT_ACCELERATION:g} {unit}/s2',
         DEFAULT_ACCELERATION,
@@ -223,14 +223,17 @@ def _positive(name: str, entry: Mapping[str, Any], kind: str) -> float:
     return _number(name, entry, key, least=0.0)
 
 
-def _span(name: str, entry: Mapping[str, Any], span: JointRange) -> tuple[float, float]:
+def _span(joint: Joint, entry: Mapping[str, Any]) -> tuple[float, float]:
+    """Return the range of a joint; a limits file comes before soft limits of the description."""
+    name = joint.name
     if not entry.get('has_position_limits', 'max_position' in entry):
-        return span.lower, span.upper
+        return joint.range.lower, joint.range.upper
     lower, upper = (_number(name, entry, key) for key in KEYS['position'])
-    if lower < span.lower - ROUNDING_TOLERANCE or upper > span.upper + ROUNDING_TOLERANCE:
+    least, most = joint.stops
+    if lower < least - ROUNDING_TOLERANCE or upper > most + ROUNDING_TOLERANCE:
         raise LimitsError(
             f'joint {name}: positions {lower:g}..{upper:g} are wider than the description'
-            f' ({span.lower:g}..{span.upper:g}); a limits file may only narrow'
+            f' ({least:g}..{most:g}); a limits file may only narrow'
         )
     if lower >= upper:
         raise LimitsError(

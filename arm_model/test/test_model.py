@@ -157,6 +157,29 @@ def test_a_wheel_beside_the_arm_needs_no_limits() -> None:
     assert 'left' in model.frames
 
 
+@pytest.mark.parametrize(
+    ('soft', 'entry', 'wanted'),
+    [
+        ('soft_lower_limit="-1" soft_upper_limit="3"', {}, (-1.0, 2.0)),
+        (
+            'soft_lower_limit="-1" soft_upper_limit="1"',
+            {'min_position': -1.5, 'max_position': 1.5},
+            (-1.5, 1.5),
+        ),
+        ('', {}, (-2.0, 2.0)),
+    ],
+)
+def test_soft_limits_narrow_a_joint(
+    soft: str, entry: dict[str, float], wanted: tuple[float, float]
+) -> None:
+    """As in MoveIt: a limits file comes before them; some controllers have gains alone."""
+    urdf, srdf, limits = chain_texts('zyy')
+    stop = '<limit lower="-2" upper="2" velocity="2" effort="1"/>'
+    urdf = urdf.replace(stop, f'{stop}<safety_controller k_velocity="20" {soft}/>', 1)
+    model = RobotModel(urdf, srdf, {**limits, 'j1': {**limits['j1'], **entry}})
+    assert (model.limits.lower[0], model.limits.upper[0]) == wanted
+
+
 Broken = Callable[[str, str, dict[str, Any]], tuple[str, str, dict[str, Any]]]
 
 BROKEN: dict[str, tuple[Broken, str]] = {

@@ -17,11 +17,13 @@ from isolation import reserve
 from move_group_rig import (
     action_goal,
     joint_goal,
+    JOINTS,
     motion_request,
     MoveGroupRig,
     panda_parameters,
     pose_goal,
     READY,
+    robots,
 )
 from moveit_msgs.msg import (
     CollisionObject,
@@ -41,6 +43,7 @@ from moveit_msgs.srv import (
 )
 from planning_messages import box, pose_at, tetrahedron
 import pytest
+from urdf_reader import expand_xacro
 
 from arm_planning import PlanningCode
 
@@ -188,6 +191,8 @@ def bad_goals() -> Iterator[Refusal]:
     yield 'out of reach', motion_request(far), CODE.NO_IK_SOLUTION, 'reach'
     beyond = joint_goal([3.5, *READY[1:]])
     yield 'beyond a limit', motion_request(beyond), CODE.GOAL_STATE_INVALID, 'panda_joint1'
+    stopped = joint_goal([*READY[:6], 2.7])
+    yield 'beyond a soft limit', motion_request(stopped), CODE.GOAL_STATE_INVALID, '-2.5.*2.5'
     folded = motion_request(joint_goal(FOLDED))
     yield 'goal in contact', folded, CODE.GOAL_IN_COLLISION, 'panda_link0 touches'
 
@@ -237,7 +242,13 @@ BAD = {name: rest for name, *rest in (*bad_goals(), *bad_rest())}
 @pytest.fixture(name='rig', scope='module')
 def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
     """Start move_group."""
-    path = panda_parameters(tmp_path_factory.mktemp('robot'))
+    urdf = expand_xacro(robots() / 'panda' / 'panda.urdf.xacro')
+    lifted = f'<child link="{JOINTS[6].replace("joint", "link")}"/>'
+    assert urdf.count(lifted) == 1
+    soft = '<safety_controller k_velocity="20" soft_lower_limit="-2.5" soft_upper_limit="2.5"/>'
+    path = panda_parameters(
+        tmp_path_factory.mktemp('robot'), robot_description=urdf.replace(lifted, lifted + soft)
+    )
     with (
         reserve() as isolation,
         MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,

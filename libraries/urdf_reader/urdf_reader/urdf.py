@@ -93,6 +93,7 @@ class Joint:
         axis: Unit vector in the child's frame.
         mimic: What it follows, if it does.
         limit: Attributes of ``<limit>`` as they are written, if there is one.
+        soft: Soft limits of ``<safety_controller>`` in [rad], if it has both.
     """
 
     name: str
@@ -103,6 +104,7 @@ class Joint:
     axis: Vector
     mimic: Mimic | None = None
     limit: Mapping[str, str] | None = None
+    soft: tuple[float, float] | None = None
 
     @property
     def independent(self) -> bool:
@@ -112,6 +114,8 @@ class Joint:
     @property
     def range(self) -> JointRange:
         """How far and how fast it moves; velocity 0 where the description gives none.
+
+        Soft limits narrow it, as in MoveIt.
 
         Raises:
             DescriptionError: It has no ``<limit>`` although it is neither continuous nor fixed,
@@ -127,11 +131,20 @@ class Joint:
             velocity = float(self.limit['velocity'])
             if self.kind is JointKind.CONTINUOUS:
                 return JointRange(self.name, -math.inf, math.inf, velocity)
-            lower, upper = (float(self.limit.get(key, 0)) for key in ('lower', 'upper'))
+            lower, upper = self.stops
         except (KeyError, ValueError) as error:
             raise DescriptionError(f'joint {self.name}: <limit> is not usable: {error}') from error
+        if self.soft is not None and max(lower, self.soft[0]) < min(upper, self.soft[1]):
+            lower, upper = max(lower, self.soft[0]), min(upper, self.soft[1])
         unit = 'm' if self.kind is JointKind.PRISMATIC else 'rad'
         return JointRange(self.name, lower, upper, velocity, unit)
+
+    @property
+    def stops(self) -> tuple[float, float]:
+        """Least and greatest position in [rad] of ``<limit>``."""
+        if self.limit is None or self.kind is JointKind.CONTINUOUS:
+            return -math.inf, math.inf
+        return float(self.limit.get('lower', 0)), float(self.limit.get('upper', 0))
 
 
 Color: TypeAlias = tuple[float, float, float, float]
@@ -369,7 +382,20 @@ def _joint(element: ET.Element) -> Joint:
     origin, limit = _origin(element, f'joint {name}'), element.find('limit')
     limits = None if limit is None else dict(limit.attrib)
     mimic = _mimic(element, name) if kind in MOVABLE else None  # some are fixed by a type only
-    return Joint(name, kind, parent, child, origin, axis, mimic, limits)
+    return Joint(name, kind, parent, child, origin, axis, mimic, limits, _soft(element, name))
+
+
+def _soft(element: ET.Element, joint: str) -> tuple[float, float] | None:
+    """Return the soft limits of a joint, if it has both: some controllers have gains alone."""
+    safety = element.find('safety_controller')
+    if safety is None or not {'soft_lower_limit', 'soft_upper_limit'} <= set(safety.attrib):
+        return None
+    try:
+        return float(safety.attrib['soft_lower_limit']), float(safety.attrib['soft_upper_limit'])
+    except ValueError as error:
+        raise DescriptionError(
+            f'joint {joint}: <safety_controller> is not usable: {error}'
+        ) from error
 
 
 def _link_of(element: ET.Element, end: str, joint: str) -> str:
