@@ -65,7 +65,7 @@ def see_feet(url: str) -> None:
 
 
 def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> None:
-    """Two robots, two pages; the end of one is a warning; the other ends with its bring-up."""
+    """Two robots, two pages; one that is killed comes back; both end with their bring-ups."""
     arm = ['panda', '--simulate', '--namespace', 'left', '--can', isolation.bus]
     with (
         start(isolation, 'arm_bringup', 'bringup', *arm) as left,
@@ -81,8 +81,12 @@ def test_each_robot_has_a_page_and_goes_on_without_it(isolation: Isolation) -> N
         assert not [path for robot in (left, dog) for path in memory_of_dds(robot)]
         see_feet(urls[1])
         (viewer,) = viewers_below(left)
+        seen = sum(line.endswith(urls[0]) for line in left.lines)
         viewer.kill()
-        left.wait_for('warning: viewer was killed by SIGKILL; going on without it', 20.0)
+        left.wait_for('warning: viewer was killed by SIGKILL; it is started again in 1 s', 20.0)
+        left.wait_for(f'{urls[0]}$', STARTING, seen + 1)
+        with urlopen(urls[0], timeout=20.0) as page:  # noqa: S310  # it begins with http
+            assert b'robot-stop' in page.read()
         assert left.stop(60.0) == 0, left.output
         assert is_open(urls[1])
         assert dog.stop(60.0) == 0, dog.output

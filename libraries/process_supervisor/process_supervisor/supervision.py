@@ -22,6 +22,10 @@ ECHO_TIME = 0.5
 """An interrupt this soon after another one in [s] is its echo: a key that bounces, or a signal to
 a process and to its group."""
 
+RESTART_DELAYS = (1.0, 5.0, 30.0)
+"""Times in [s] from the end of a process that is not required to its next start: of the first
+ends one each, then the last one; from the first again when it ran for longer than the last."""
+
 GOOD_ENDS = (0, -Signals.SIGINT, -Signals.SIGTERM)
 """Return codes of a process that ended as it should when it was stopped."""
 
@@ -86,11 +90,16 @@ class _Child:
     ready: bool = False
     reported: bool = False
     running: bool = False
+    started: float = -math.inf
+    ends: int = 0
+    restart: float = math.inf
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
 
 
 class Supervision:
     """Starts processes at once, waits until all are ready, stops all when a required one ends.
+
+    Another one that ends after it was ready is started again.
 
     Attributes:
         phase: What it is doing.
@@ -159,15 +168,21 @@ class Supervision:
         self._enter(Phase.STARTING)
         self._begun = now
         for name, child in self._children.items():
-            child.deadline = now + child.spec.ready_timeout
-            try:
-                self._start(child.spec)
-            except StartError as error:
-                self._fail(name, f'{name} cannot be started: {error}', now)
+            if why := self._run(child, now):
+                self._fail(name, f'{name} {why}', now)
                 return
-            child.running = True
-            child.ready = not child.spec.notifies_ready
         self._check_ready(now)
+
+    def _run(self, child: _Child, now: float) -> str:
+        """Start a process; return why that is not possible, empty when it runs."""
+        child.deadline, child.restart = now + child.spec.ready_timeout, math.inf
+        try:
+            self._start(child.spec)
+        except StartError as error:
+            return f'cannot be started: {error}'
+        child.running, child.reported, child.started = True, False, now
+        child.ready = not child.spec.notifies_ready
+        return ''
 
     def line(self, name: str, text: str) -> None:
         """Take in a line of output.
@@ -224,10 +239,25 @@ class Supervision:
         elif child.spec.required:
             early = '' if child.ready else ' before it was ready'
             self._fail(name, f'{name} {how}{early}', now)
+        elif child.ready:
+            if now - child.started > RESTART_DELAYS[-1]:
+                child.ends = 0
+            self._plan_restart(child, how, now)
         else:
             child.ready = True
             self._go_on_without(name, f'{name} {how}')
             self._check_ready(now)
+
+    def _plan_restart(self, child: _Child, how: str, now: float) -> None:
+        delay = RESTART_DELAYS[min(child.ends, len(RESTART_DELAYS) - 1)]
+        child.ends, child.restart = child.ends + 1, now + delay
+        text = f'{child.spec.name} {how}; it is started again in {delay:g} s'
+        self._notify(Notice(Severity.WARNING, text, child.spec.name))
+
+    def _restart_ended(self, now: float) -> None:
+        for child in self._children.values():
+            if now >= child.restart and (why := self._run(child, now)):
+                self._plan_restart(child, why, now)
 
     def interrupt(self, now: float) -> None:
         """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once.
@@ -270,6 +300,7 @@ class Supervision:
             now: Steady time in [s].
         """
         if self.phase in {Phase.STARTING, Phase.RUNNING}:
+            self._restart_ended(now)
             self._check_deadlines(now)
         elif self.phase is Phase.STOPPING:
             self._advance_stop(now)
@@ -280,8 +311,9 @@ class Supervision:
             return self._stopping.next_deadline()
         if self.phase not in {Phase.STARTING, Phase.RUNNING}:
             return None
-        late = self._late_ones()
-        deadline = min((self._children[name].deadline for name in late), default=math.inf)
+        deadlines = [self._children[name].deadline for name in self._late_ones()]
+        deadlines += [child.restart for child in self._children.values()]
+        deadline = min(deadlines, default=math.inf)
         return None if math.isinf(deadline) else deadline
 
     def _check_deadlines(self, now: float) -> None:

@@ -259,9 +259,39 @@ def test_what_is_not_awaited_keeps_nobody_waiting() -> None:
         Severity.INFO, 'seen at http://localhost', 'viewer', lasting=True
     )
     bench.supervision.exited('viewer', 1, 3.0)
-    gone = 'viewer ended with exit code 1; going on without it'
+    gone = 'viewer ended with exit code 1; it is started again in 1 s'
     assert bench.notices[-1] == Notice(Severity.WARNING, gone, 'viewer')
     assert bench.supervision.phase is Phase.RUNNING
+
+
+def test_an_optional_process_that_ends_is_started_again() -> None:
+    """Ever later while it ends soon; what it says of itself is said again; not while all stops."""
+    bench = Bench(MASTER, spec('viewer', required=False, awaited=False))
+    bench.supervision.ready('master', 0.0)
+    now = 0.0
+    for count, delay in enumerate([1.0, 5.0, 30.0, 30.0], 2):
+        bench.supervision.ready('viewer', now, 'seen')
+        assert bench.notices[-1].text == 'seen'
+        bench.supervision.exited('viewer', -9, now)
+        again = f'viewer was killed by SIGKILL; it is started again in {delay:g} s'
+        assert bench.notices[-1] == Notice(Severity.WARNING, again, 'viewer')
+        now += delay
+        assert bench.supervision.next_deadline() == now
+        bench.supervision.advance(now - 0.1)
+        assert bench.started.count('viewer') == count - 1
+        bench.supervision.advance(now)
+        assert bench.started.count('viewer') == count
+        assert bench.supervision.running == ('master', 'viewer')
+    bench.supervision.ready('viewer', now)
+    bench.supervision.exited('viewer', -9, now + 31.0)
+    assert bench.notices[-1].text.endswith('again in 1 s'), 'it ran for long'
+    bench.missing = 'viewer'
+    bench.supervision.advance(now + 32.0)
+    cannot = 'viewer cannot be started: no such file; it is started again in 5 s'
+    assert bench.notices[-1].text == cannot
+    bench.supervision.interrupt(now + 33.0)
+    bench.supervision.advance(now + 100.0)
+    assert bench.supervision.running == ('master',)
 
 
 def test_what_is_not_awaited_and_late_is_reported_once_and_may_still_come() -> None:
