@@ -90,6 +90,9 @@ class Fault(Enum):
     STO = _of_drive('safe torque off: no torque, and no fault', 0, at_once=True, lasting=True)
     MODE_REQUIRED = _of_drive('refuses Operation enabled without a mode', 0, lasting=True)
     MODE_ZERO_REFUSED = _of_drive('refuses mode 0 in 0x6060', 0, lasting=True)
+    ARRIVED_WHEN_DISABLED = _of_drive(
+        'shows bits 10 and 12 in 0x6041 where it is not enabled', 0, lasting=True
+    )
     MODE_HELD_UNDER_HALT = _of_drive('ignores 0x6060 while it is halted', 0, lasting=True)
 
     @property

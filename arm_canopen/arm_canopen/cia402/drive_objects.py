@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..master.process_image import SentRpdo, Writer
 from ..master.remote_node import RemoteNode
 from ..standard.drive import drive_state, DriveState, OperationMode
@@ -99,6 +101,11 @@ class DriveObjects:
         if self._mode.value is None:
             return False
         return not any(source.stale(now) for source in self._sources)
+
+    def statusword_came(self, since: float) -> bool:
+        """Return whether 0x6041 has come since a time in [s]; one that comes on change has."""
+        source = self._statusword.source
+        return source.timestamp > since or source.stale_after == math.inf
 
     @property
     def timestamp(self) -> float:

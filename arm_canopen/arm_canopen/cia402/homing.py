@@ -10,7 +10,7 @@ from enum import Enum
 from ..exceptions import CodecError, DriveError, SdoError
 from ..master.events import EventKind, Severity
 from ..master.scheduler import Promise
-from ..standard.drive import OperationMode, Statusword
+from ..standard.drive import DriveState, OperationMode, Statusword
 from ..standard.objects import Index
 from .drive import Drive
 from .modes import Homing
@@ -93,14 +93,17 @@ async def _run(steps: DriveSequences, homing: Homing, what: str) -> None:
     homing.started = True
     try:
         await steps.pause(HOMING_START)
+        since = steps.now
         await steps.until(
-            lambda: _is_over(steps),
+            lambda: _is_cut(steps) or _is_over(steps, since),
             steps.drive.config.homing_timeout,
             what,
             'raise homing_timeout_seconds in bus.yml where the way takes longer',
         )
     finally:
         homing.started = False
+    if _is_cut(steps):
+        raise steps.refused('was cut off while it homed, and is not homed')
 
 
 async def _stored_method(steps: DriveSequences) -> int:
@@ -142,8 +145,17 @@ async def _choose(steps: DriveSequences, method: int | None, stored: int) -> int
     return method
 
 
-def _is_over(steps: DriveSequences) -> bool:
-    word = steps.drive.objects.statusword
+def _is_cut(steps: DriveSequences) -> bool:
+    """Whether it is not enabled any more: its homing bits mean nothing then."""
+    return steps.drive.objects.state is not DriveState.OPERATION_ENABLED
+
+
+def _is_over(steps: DriveSequences, since: float) -> bool:
+    """Whether bits that came since a time in [s] show that it has ended."""
+    objects = steps.drive.objects  # the view of the last cycle is older than its bits
+    if not (objects.fresh(steps.now) and objects.statusword_came(since)):
+        return False
+    word = objects.statusword
     if word & Statusword.HOMING_ERROR:
         return True
     done = Statusword.HOMING_ATTAINED

@@ -47,6 +47,11 @@ class DriveSequences:
         self._keeps_mode_under_halt = False
         self._scheduler = scheduler
 
+    @property
+    def now(self) -> float:
+        """Steady time in [s]."""
+        return self._scheduler.now
+
     async def ready(self, *, to_stop: bool = False) -> None:
         """Wait for state and parameters of a drive that has just come up.
 
@@ -397,7 +402,7 @@ class DriveSequences:
     def _is_hopeless(self) -> bool:
         drive = self.drive
         faulted = drive.view.state in FAULTY and not drive.resetting
-        return not drive.node.online or faulted or drive.stop.running
+        return not drive.node.operational or faulted or drive.stop.running
 
     def require_no_fault(self) -> None:
         """Refuse to go on with a drive that is faulted."""

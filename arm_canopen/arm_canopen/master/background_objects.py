@@ -25,17 +25,18 @@ class BackgroundReader:
     Attributes:
         value: The value, None while unknown.
         timestamp: Steady time of its last answer in [s].
+        stale_after: Age in [s] from which the value is too old to act on.
     """
 
     def __init__(self, stale_after: float) -> None:
         """Start unknown.
 
         Args:
-            stale_after: Age in [s] from which the value is too old to act on.
+            stale_after: See above.
         """
         self.value: Number | None = None
         self.timestamp = 0.0
-        self._stale_after = stale_after
+        self.stale_after = stale_after
 
     @property
     def source(self) -> Source:
@@ -44,7 +45,7 @@ class BackgroundReader:
 
     def stale(self, now: float) -> bool:
         """Return whether it is unknown, or too old to act on, at a steady time in [s]."""
-        return self.value is None or now - self.timestamp > self._stale_after
+        return self.value is None or now - self.timestamp > self.stale_after
 
 
 class WritableObjects(Protocol):

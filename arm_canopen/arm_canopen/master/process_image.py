@@ -221,9 +221,12 @@ class Source(Protocol):
 
     Attributes:
         timestamp: Steady time at which they came last in [s].
+        stale_after: Age in [s] from which they are too old to act on; infinite where they come on
+            change only.
     """
 
     timestamp: float
+    stale_after: float
 
     def stale(self, now: float) -> bool:
         """Return whether they are unknown, or too old to act on, at a steady time in [s]."""

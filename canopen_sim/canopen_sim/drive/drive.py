@@ -41,6 +41,7 @@ VOLTAGE_ENABLED = int(Statusword.VOLTAGE_ENABLED)
 REMOTE = int(Statusword.REMOTE)
 INTERNAL_LIMIT = int(Statusword.INTERNAL_LIMIT)
 FOLLOWING_ERROR = int(Statusword.FOLLOWING_ERROR)
+HOMED = int(Statusword.TARGET_REACHED | Statusword.HOMING_ATTAINED)
 
 
 class Drive:
@@ -417,6 +418,8 @@ class Drive:
                 word = word & ~TARGET_REACHED | (TARGET_REACHED if self._axis.settled else 0)
         elif state is State.QUICK_STOP_ACTIVE and self._axis.settled:
             word |= TARGET_REACHED
+        elif Fault.ARRIVED_WHEN_DISABLED in self.causes:
+            word |= HOMED
         return word
 
     def _schedule(self, now: float) -> None:

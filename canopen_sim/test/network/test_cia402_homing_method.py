@@ -1,8 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which homing method is used, and what a homing by another one leaves behind."""
+"""Which homing method is used, what a homing leaves behind, and that it succeeds only if seen."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from drive_samples import bus_config, drive_config, sdo_write
 import pytest
@@ -11,6 +13,8 @@ from virtual_network import VirtualNetwork
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
+from arm_canopen.standard.nmt import NmtCommand
+from canopen_sim.fault import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
@@ -89,3 +93,36 @@ def test_a_method_that_cannot_be_put_back_is_reported() -> None:
     net.run_until(
         lambda: any('35 was not put back' in text for text in net.reported(Severity.WARNING))
     )
+
+
+@pytest.mark.parametrize('bits', [True, False], ids=['old bits', 'no bits'])
+@pytest.mark.parametrize('end', ['sto', 'nmt'])
+def test_a_homing_that_was_cut_off_has_not_succeeded(end: str, *, bits: bool) -> None:
+    """The answer comes at once, whatever bits 10 and 12 show, and `~/enable` is free again."""
+    net = network(35)
+    device = net.devices[JOINT]
+    if bits:
+        device.faults.inject(FaultInjection(Fault.ARRIVED_WHEN_DISABLED), net.now)
+    task = begin(net, 1)
+    net.run(0.5)
+    if end == 'sto':
+        device.faults.inject(FaultInjection(Fault.STO), net.now)
+    else:
+        net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, 2)
+    with pytest.raises(DriveError, match='was cut off while it homed, and is not homed'):
+        net.result(task, 0.5)
+    device.faults.end(net.now, Fault.STO)
+    net.network.send_nmt(NmtCommand.START, 2)
+    net.run(0.1)
+    net.do(JOINT, 'enable')
+
+
+def test_bits_of_an_earlier_homing_do_not_count() -> None:
+    """The statusword that shows them may be old: its TPDO answers each fortieth SYNC."""
+    slow = drive_config(JOINT, 2, sdo_writes=(sdo_write(METHOD, 0, 37),))
+    state = replace(slow.tpdos[0], transmission=40)
+    net = VirtualNetwork(bus_config(replace(slow, tpdos=(state, *slow.tpdos[1:]))))
+    net.boot()
+    assert 'homed' in net.result(begin(net, 37))
+    with pytest.raises(DriveError, match='failed to home by method 99'):
+        net.result(begin(net, 99))
