@@ -535,7 +535,7 @@ class Observer:
         """Check all states that have come."""
         robot = panda()
         home = robot.positions({})
-        scene = apply_object(SceneSnapshot.of(robot.scene), visitor, home).scene
+        scene = apply_object(SceneSnapshot(robot.scene), visitor, home).scene
         clearances = Clearances(scene)
         for state in self._states:
             places = dict(zip(state.name, state.position, strict=True))

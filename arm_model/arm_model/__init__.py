@@ -32,7 +32,6 @@ from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.default_collisions import with_default_collisions
 from .scene.objects import AttachedBody, CollisionObject
 from .scene.octomap import octomap_boxes, OCTOMAP_NAME
-from .scene.padding import padded
 from .scene.planning_scene import PlanningScene
 from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
 from .start_poses import pose_quality, start_pose
@@ -88,7 +87,6 @@ __all__ = [
     'merge_limits',
     'names_of',
     'octomap_boxes',
-    'padded',
     'pose_quality',
     'rotation_of',
     'sample_link_pairs',

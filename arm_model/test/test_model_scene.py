@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import astuple
 from itertools import product
 import math
 
@@ -26,7 +27,6 @@ from arm_model import (
     Cone,
     Cylinder,
     Mesh,
-    padded,
     PlacedShape,
     Plane,
     PlanningScene,
@@ -274,6 +274,11 @@ def test_what_may_touch_follows_the_rules_of_moveit(
             ),
             "no link 'finger'",
         ),
+        (lambda scene: scene.with_contents(padding={'link_1': -0.1}), 'link_1: padding -0.1'),
+        (lambda scene: scene.with_contents(padding={'link_1': math.nan}), 'link_1: padding nan'),
+        (lambda scene: scene.with_contents(scale={'link_1': 0.0}), 'scale 0: .* positive'),
+        (lambda scene: scene.with_contents(scale={'link_1': math.inf}), 'finite'),
+        (lambda scene: scene.with_contents(padding={'hand': 0.1}), "no link 'hand'"),
         (lambda _: CollisionObject('', Sphere(0.1)), 'needs a name'),
         (lambda _: CollisionObject('x', Box(0.1, -0.1, 0.1)), 'must be positive'),
         (lambda _: CollisionObject('x', Sphere(math.nan)), 'must be positive'),
@@ -370,30 +375,31 @@ def test_a_mimic_joint_follows() -> None:
         assert (np.abs(near.gradient) <= scene.distance_rate_bounds[near.pair] + 1e-9).all()
 
 
-@pytest.mark.slow
-@given(shape=SHAPES, padding=st.floats(0.0, 0.1), scale=st.floats(1.0, 2.0))
-def test_a_padded_shape_holds_the_scaled_one(shape: Shape, padding: float, scale: float) -> None:
-    """From each of its sides it comes nearer, by the padding at most."""
-    solid, thick = CollisionObject('o', shape), CollisionObject('o', padded(shape, padding, scale))
-    scaled = CollisionObject('o', padded(shape, 0.0, scale))
-    places = np.array([0.3, -0.4, 0.2, 0.1])
-    near, far, middle = (
-        min(distances(MODEL.scene.without_objects().with_object(each.at(AWAY)), places).values())
-        for each in (thick, solid, scaled)
-    )
-    assert near <= middle + STEP <= far + 2 * STEP
-
-
-@pytest.mark.parametrize('numbers', [(-0.1, 1.0), (0.0, 0.0), (math.nan, 1.0), (0.0, math.inf)])
-def test_a_padding_that_is_none_is_refused(numbers: tuple[float, float]) -> None:
-    """Shrinking a shape below itself is no safety."""
-    with pytest.raises(SceneError, match='padding'):
-        padded(Box(0.1, 0.1, 0.1), *numbers)
-
-
-def test_a_plane_is_padded_along_its_normal() -> None:
-    """What is solid grows."""
-    assert padded(Plane(offset=-0.1), 0.02) == Plane(offset=-0.1 + 0.02)
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, POSES, st.floats(0.0, 0.1), st.floats(0.5, 2.0))
+def test_padding_is_the_same_in_every_direction_and_for_the_world_only(
+    shape: Shape, pose: Pose, padding: float, scale: float
+) -> None:
+    """A link, and what it carries, is nearer to objects by exactly the padding, whatever it is."""
+    thing, mark = CollisionObject('thing', shape), CollisionObject('mark', Sphere(0.01), pose=AWAY)
+    at = np.array([0.3, -0.4, 0.2, 0.1])
+    scene = MODEL.scene.with_object(mark).with_attached(AttachedBody(thing.at(pose), 'link_4'))
+    bare = distances(scene, at)
+    thick = distances(scene.with_contents(padding={'link_4': padding}), at)
+    assert thick.keys() == bare.keys()
+    for pair, distance in bare.items():
+        nearer = padding if 'mark' in pair and {'link_4', 'thing'} & {*pair} else 0.0
+        assert thick[pair] == pytest.approx(distance - nearer, abs=1e-5), pair
+    if isinstance(shape, Mesh):
+        middle = shape.points.mean(axis=0)
+        large: Shape = Mesh(middle + scale * (shape.points - middle))
+    else:
+        large = type(shape)(*(scale * length for length in astuple(shape)))
+    scaled = CollisionObject('thing', large, pose=pose)
+    larger = scene.with_contents(scale={'link_4': scale})
+    by_hand = MODEL.scene.with_object(mark).with_attached(AttachedBody(scaled, 'link_4'))
+    name = next(pair for pair in bare if {'mark', 'thing'} <= {*pair})
+    assert distances(larger, at)[name] == pytest.approx(distances(by_hand, at)[name], abs=1e-5)
 
 
 def test_several_parts_are_replaced_in_one_step() -> None:
@@ -422,6 +428,8 @@ def test_scenes_are_the_same_by_what_is_in_them() -> None:
         scene().without('held'),
         scene().with_object(CUP),
         scene().allowing('box', 'link_4'),
+        scene().with_contents(padding={'link_4': 0.01}),
+        scene().with_contents(scale={'link_4': 1.1}),
         left.scene,
     ):
         assert not scene().is_same(other)

@@ -57,7 +57,7 @@ def snapshot() -> SceneSnapshot:
     forward = Pose(np.eye(3), np.array([0.25, 0.0, 0.0]))
     bar = CollisionObject('bar', PlacedShape(Box(0.4, 0.02, 0.02), forward))
     links = frozenset({'right_1_link', 'right_2_link', 'torso_link'})
-    return SceneSnapshot.of(robot().scene.with_attached(AttachedBody(bar, 'right_2_link', links)))
+    return SceneSnapshot(robot().scene.with_attached(AttachedBody(bar, 'right_2_link', links)))
 
 
 @cache

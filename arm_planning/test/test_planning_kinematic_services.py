@@ -31,7 +31,7 @@ from arm_planning.ros.scene_snapshot import SceneSnapshot
 MODEL = panda().model('panda_arm')
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 PLACES = panda().positions(dict(zip(MODEL.joints, READY, strict=True)))
-SCENE = SceneSnapshot.of(panda().scene)
+SCENE = SceneSnapshot(panda().scene)
 KINEMATICS = GroupKinematics(panda())
 TIP = MODEL.kinematics.link_pose('panda_link8', frozen(READY))
 

@@ -27,7 +27,7 @@ from arm_planning.ros.scene_snapshot import SceneSnapshot
 MODEL = panda().model('panda_arm')
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 PLACES = panda().positions(dict(zip(MODEL.joints, READY, strict=True)))
-READER = RequestReader(MODEL, SceneSnapshot.of(panda().scene), PLACES)
+READER = RequestReader(MODEL, SceneSnapshot(panda().scene), PLACES)
 TIP = 'panda_link8'
 
 

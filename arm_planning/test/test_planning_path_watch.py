@@ -29,7 +29,7 @@ READY = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
 TURN = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 GOAL = TrajectoryGoal(MODEL.joints, [GoalPoint(4.0, READY + TURN)])
 PATH = build_path(GOAL, MODEL.limits, RobotState.at_rest(READY), GoalRules()).path
-EMPTY = SceneSnapshot.of(panda().scene)
+EMPTY = SceneSnapshot(panda().scene)
 
 
 def places(arm: Array) -> Array:

@@ -46,7 +46,7 @@ from arm_planning.ros.scene_snapshot import SceneSnapshot
 READY = panda().positions(
     dict(zip(panda().joints, [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785], strict=False))
 )
-EMPTY = SceneSnapshot.of(panda().scene)
+EMPTY = SceneSnapshot(panda().scene)
 NAMES = ['table', 'cup', 'panda_link1', 'panda_link5', 'tool']
 TIP = 'panda_link8'
 

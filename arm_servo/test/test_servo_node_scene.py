@@ -9,12 +9,13 @@ import math
 
 from geometry_msgs.msg import Point, Pose
 from model_robots import table, texts
-from moveit_msgs.msg import CollisionObject, PlanningScene, PlanningSceneWorld
+from moveit_msgs.msg import CollisionObject, LinkPadding, PlanningScene, PlanningSceneWorld
+import pytest
 from servo_drives import Drives
 from servo_scenes import Listener
 from shape_msgs.msg import SolidPrimitive
 
-from arm_model import RobotModel
+from arm_model import Clearances, RobotModel
 
 
 def message(name: str, frame: str = '') -> PlanningScene:
@@ -58,6 +59,25 @@ def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
     assert objects(drives) == {'box'}
     assert "'cup': no frame 'nowhere'" in listener.errors[0]
     assert 'the scene before counts' in listener.errors[0]
+
+
+def test_padding_of_a_scene_counts_for_the_arm() -> None:
+    """A link is nearer to an object by it, as in the planner; the next scene takes it back."""
+    drives = started(arm())
+    listener = Listener(drives)
+    near = []
+    for padding in (0.0, 0.05, 0.0):
+        scene = message('box')
+        scene.link_padding = [LinkPadding(link_name='panda_link7', padding=padding)] * bool(
+            padding
+        )
+        listener.take(scene)
+        listener.run()
+        counted, at = drives.gateway.model.scene, drives.gateway.snapshot.reference
+        assert at is not None
+        found = Clearances(counted).least(at.position, math.inf)
+        near.append(found[counted.pairs.index(('panda_link7', 'box'))])
+    assert near[0] == near[2] == pytest.approx(near[1] + 0.05, abs=1e-6)
 
 
 def test_an_arm_that_nobody_knows_withholds_no_scene_from_others() -> None:

@@ -8,7 +8,7 @@ as in MoveIt: what a link takes up, a message may remove from the world besides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,8 +77,8 @@ def apply_planning_scene(
     """Return a scene with what a message has in the place of what it replaces.
 
     A whole scene replaces objects and attached bodies, a diff (``is_diff``) changes those that it
-    names. A matrix without names leaves what may touch as it is. Joints in the message count
-    nowhere. Padding and scale are not read. An octomap is the object ``<octomap>``, made of boxes.
+    names; so do padding and scale. A matrix without names leaves what may touch as it is. Joints
+    in the message count nowhere. An octomap is the object ``<octomap>``, made of boxes.
 
     Args:
         scene: The scene before.
@@ -106,7 +106,13 @@ def apply_planning_scene(
     for thing in message.world.collision_objects:
         draft.apply(thing)
     draft.apply_octomap(message.world.octomap)
-    return draft.scene(_merged(scene, message.allowed_collision_matrix))
+    padding = {each.link_name: each.padding for each in message.link_padding}
+    scale = {each.link_name: each.scale for each in message.link_scale}
+    return draft.scene(
+        _merged(scene, message.allowed_collision_matrix),
+        padding if is_whole else {**scene.padding, **padding},
+        scale if is_whole else {**scene.scale, **scale},
+    )
 
 
 def apply_collision_object(
@@ -229,10 +235,19 @@ class _Draft:
         """Begin with a scene."""
         return cls(scene, positions, frame_of, dict(scene.objects), dict(scene.attached_bodies))
 
-    def scene(self, allowed: AllowedCollisionMatrix | None = None) -> PlanningScene:
+    def scene(
+        self,
+        allowed: AllowedCollisionMatrix | None = None,
+        padding: Mapping[str, float] | None = None,
+        scale: Mapping[str, float] | None = None,
+    ) -> PlanningScene:
         """Return the scene that was made."""
         return self.before.with_contents(
-            objects=self.objects, attached_bodies=self.attached, allowed=allowed
+            objects=self.objects,
+            attached_bodies=self.attached,
+            allowed=allowed,
+            padding=padding,
+            scale=scale,
         )
 
     def apply_octomap(self, message: OctomapWithPose) -> None:

@@ -4,48 +4,43 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import astuple
+from functools import lru_cache
 
-from ..arrays import Array
+from ..arrays import Native
 from ..exceptions import SceneError
-from .shapes import Box, Capsule, Mesh, Plane, Shape, Sphere
+from .shapes import Mesh, native, Plane, Shape
 
 
-def padded(shape: Shape, padding: float, scale: float = 1.0) -> Shape:
-    """Return a shape that is scaled about its middle, and then thicker on every side.
+@lru_cache(maxsize=1024)
+def padded(shape: Shape, padding: float, scale: float = 1.0) -> Native:
+    """Return a shape of coal that is scaled about its middle, then padded in every direction.
 
     Args:
         shape: The shape.
-        padding: How much thicker on each side in [m].
+        padding: How far it reaches beyond its surface in [m].
         scale: Factor of its lengths; a plane has none.
 
     Raises:
-        SceneError: The padding is negative, the scale is not positive, or one is not finite.
+        SceneError: The shape is not usable.
     """
-    if not (0.0 <= padding < np.inf and 0.0 < scale < np.inf):
+    solid = native(_scaled(shape, scale))
+    solid.setSweptSphereRadius(padding)
+    solid.computeLocalAABB()
+    return solid
+
+
+def check_padding(link: str, padding: float, scale: float) -> None:
+    """Refuse a padding that is negative, a scale that is not positive, and what is not finite."""
+    if not (0.0 <= padding < float('inf') and 0.0 < scale < float('inf')):
         raise SceneError(
-            f'padding {padding:g} m and scale {scale:g}: the padding must be 0 or more, the scale'
-            ' positive, both finite'
+            f'{link}: padding {padding:g} m and scale {scale:g}: the padding must be 0 or more,'
+            ' the scale positive, both finite'
         )
-    match shape:
-        case Box(x, y, z):
-            return Box(*(scale * edge + 2.0 * padding for edge in (x, y, z)))
-        case Sphere(radius):
-            return Sphere(scale * radius + padding)
-        case Capsule(radius, length):
-            return Capsule(scale * radius + padding, scale * length)
-        case Plane(normal, offset):
-            return Plane(normal, offset + padding)
-        case Mesh():
-            return Mesh(_outward(shape.points, padding, scale))
-        case _:  # a cylinder or a cone
-            return type(shape)(scale * shape.radius + padding, scale * shape.length + 2 * padding)
 
 
-def _outward(points: Array, padding: float, scale: float) -> Array:
-    """Return corners that are moved away from their middle."""
-    middle = points.mean(axis=0)
-    arms = points - middle
-    lengths = np.linalg.norm(arms, axis=1, keepdims=True)
-    moved: Array = middle + arms * (scale + padding / lengths)
-    return moved
+def _scaled(shape: Shape, scale: float) -> Shape:
+    if isinstance(shape, Mesh):  # a hull of its own, also where the scale is 1
+        middle = shape.points.mean(axis=0)
+        return Mesh(middle + scale * (shape.points - middle))
+    return shape if isinstance(shape, Plane) else type(shape)(*(scale * e for e in astuple(shape)))

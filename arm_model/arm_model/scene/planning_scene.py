@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import combinations, product
 from types import MappingProxyType
@@ -20,6 +20,7 @@ from ..pose import combined, inverse, Pose
 from .allowed_collisions import AllowedCollisionMatrix
 from .objects import AttachedBody, CollisionObject
 from .octomap import OCTOMAP_NAME
+from .padding import check_padding, padded
 from .shapes import native, PlacedShape
 
 
@@ -32,12 +33,19 @@ class _Body:
         link: The link that carries it; empty for an object of the world.
         joint: Number of the joint that moves it; 0 for what stands still.
         attached: The attached body that it is part of.
+        padded: Whether it counts against the world only, with its padding, or without that against
+            the robot only; None for both.
     """
 
     name: str
     link: str
     joint: int
     attached: AttachedBody | None = None
+    padded: bool | None = None
+
+    def counts_against(self, other: _Body) -> bool:
+        """Whether it is to be looked at beside the other."""
+        return self.padded is None or self.padded is not bool(other.link)
 
     def may_touch(self, other: _Body) -> bool:
         """Whether an attached body may touch the other because of its links."""
@@ -61,6 +69,9 @@ class PlanningScene:
         allowed: Pairs that may touch.
         objects: Objects of the world by name.
         attached_bodies: Attached bodies by name.
+        padding: How much thicker links and what is attached to them count against objects of the
+            world in [m], by link; against each other they do not, as in MoveIt.
+        scale: The same of factors of their lengths.
         geometry: All shapes and their pairs, for pinocchio.
         pairs: Names of the link or object of each pair of shapes that is checked (k).
         relative_motion_sign: Sense in which each column of the kinematics moves the second shape
@@ -76,6 +87,9 @@ class PlanningScene:
         allowed: AllowedCollisionMatrix,
         objects: Iterable[CollisionObject] = (),
         attached_bodies: Iterable[AttachedBody] = (),
+        *,
+        padding: Mapping[str, float] | None = None,
+        scale: Mapping[str, float] | None = None,
     ) -> None:
         """Put a scene together; :attr:`RobotModel.scene` is the first one.
 
@@ -85,15 +99,19 @@ class PlanningScene:
             allowed: Pairs that may touch.
             objects: Objects of the world.
             attached_bodies: Objects that move with a link.
+            padding: By link in [m].
+            scale: By link.
 
         Raises:
-            SceneError: Two things have one name, or a link is unknown.
+            SceneError: Two things have one name, a link is unknown, or a padding or scale is none.
         """
         self.kinematics, self.link_shapes, self.allowed = kinematics, link_shapes, allowed
         self.objects = MappingProxyType({each.name: each for each in objects})
         self.attached_bodies = MappingProxyType(
             {each.object.name: each for each in attached_bodies}
         )
+        self.padding = MappingProxyType(dict(padding or {}))
+        self.scale = MappingProxyType(dict(scale or {}))
         self._refuse_names()
         self.geometry = pin.GeometryModel()
         bodies = self._bodies()
@@ -124,6 +142,7 @@ class PlanningScene:
             and self.kinematics.others == other.kinematics.others
             and self.link_shapes == other.link_shapes
             and self.allowed == other.allowed
+            and (self.padding, self.scale) == (other.padding, other.scale)
             and self.objects.keys() == other.objects.keys()
             and self.attached_bodies.keys() == other.attached_bodies.keys()
             and all(thing.is_same(other.objects[name]) for name, thing in self.objects.items())
@@ -241,7 +260,8 @@ class PlanningScene:
         objects: Mapping[str, CollisionObject] | None = None,
         attached_bodies: Mapping[str, AttachedBody] | None = None,
         allowed: AllowedCollisionMatrix | None = None,
-        link_shapes: Mapping[str, Sequence[PlacedShape]] | None = None,
+        padding: Mapping[str, float] | None = None,
+        scale: Mapping[str, float] | None = None,
     ) -> PlanningScene:
         """Return the scene with several parts replaced in one step; None keeps a part.
 
@@ -252,10 +272,11 @@ class PlanningScene:
             objects: Objects of the world by name.
             attached_bodies: Attached bodies by name.
             allowed: Pairs that may touch.
-            link_shapes: Shapes of each link, such as padded ones.
+            padding: By link in [m].
+            scale: By link.
 
         Raises:
-            SceneError: Two things have one name, or a link is unknown.
+            SceneError: Two things have one name, a link is unknown, or a padding or scale is none.
         """
         objects = self.objects if objects is None else objects
         attached_bodies = self.attached_bodies if attached_bodies is None else attached_bodies
@@ -264,10 +285,12 @@ class PlanningScene:
             allowed = allowed if name == OCTOMAP_NAME else allowed.without(name)
         return PlanningScene(
             self.kinematics,
-            self.link_shapes if link_shapes is None else link_shapes,
+            self.link_shapes,
             allowed,
             objects.values(),
             attached_bodies.values(),
+            padding=self.padding if padding is None else padding,
+            scale=self.scale if scale is None else scale,
         )
 
     def with_others(self, kinematics: Kinematics) -> PlanningScene:
@@ -284,6 +307,8 @@ class PlanningScene:
             self.allowed,
             self.objects.values(),
             self.attached_bodies.values(),
+            padding=self.padding,
+            scale=self.scale,
         )
 
     def between(self, groups: Sequence[Sequence[str]]) -> PlanningScene:
@@ -363,6 +388,11 @@ class PlanningScene:
                     f'object {name!r} is in the world and attached to {body.link}'
                 )
             self._check_links(name, body.link, *body.touch_links)
+        for link in {**self.padding, **self.scale}:
+            if link not in self.kinematics.frames:
+                known = ', '.join(self.kinematics.frames)
+                raise LinkNameError(f'link_padding, link_scale: no link {link!r}; links: {known}')
+            check_padding(link, self.padding.get(link, 0.0), self.scale.get(link, 1.0))
 
     def _check_links(self, name: str, *links: str) -> None:
         for link in links:
@@ -376,31 +406,50 @@ class PlanningScene:
         bodies: list[_Body] = []
         for link, shapes in self.link_shapes.items():
             body = _Body(link, link, self.kinematics.parent_joint(link))
-            bodies += [self._placed(body, shape, pin.SE3.Identity()) for shape in shapes]
+            bodies += self._carried(body, shapes, pin.SE3.Identity())
         for name, thing in self.objects.items():
-            body = _Body(name, '', 0)
-            bodies += [self._placed(body, shape, _se3(thing.pose)) for shape in thing.shapes]
+            body, place = _Body(name, '', 0), _se3(thing.pose)
+            bodies += [
+                self._placed(body, each, place, native(each.shape)) for each in thing.shapes
+            ]
         for name, attached in self.attached_bodies.items():
             thing = attached.object
             body = _Body(
                 name, attached.link, self.kinematics.parent_joint(attached.link), attached
             )
-            bodies += [self._placed(body, shape, _se3(thing.pose)) for shape in thing.shapes]
+            bodies += self._carried(body, thing.shapes, _se3(thing.pose))
         return bodies
 
-    def _placed(self, body: _Body, placed: PlacedShape, place: Native) -> _Body:
+    def _carried(
+        self, body: _Body, shapes: Sequence[PlacedShape], place: Native
+    ) -> Sequence[_Body]:
+        """Put in the shapes of what a link carries; padded ones once more, for the world."""
+        padding, scale = self.padding.get(body.link, 0.0), self.scale.get(body.link, 1.0)
+        if (padding, scale) == (0.0, 1.0):
+            return [self._placed(body, each, place, native(each.shape)) for each in shapes]
+        bare, thick = replace(body, padded=False), replace(body, padded=True)
+        return [
+            *(self._placed(bare, each, place, native(each.shape)) for each in shapes),
+            *(
+                self._placed(thick, each, place, padded(each.shape, padding, scale))
+                for each in shapes
+            ),
+        ]
+
+    def _placed(self, body: _Body, placed: PlacedShape, place: Native, solid: Native) -> _Body:
         """Put a shape of a body into the geometry, at a place in its link or in the world."""
         model = self.kinematics.native
         frame_id = self.kinematics.frames[body.link] if body.link else 0
         in_joint = model.frames[frame_id].placement * place * _se3(placed.pose)
         name = f'{body.name}_{self.geometry.ngeoms}'
-        solid = native(placed.shape)
         self.geometry.addGeometryObject(
             pin.GeometryObject(name, body.joint, frame_id, in_joint, solid)
         )
         return body
 
     def _checks(self, first: _Body, second: _Body) -> bool:
+        if not (first.counts_against(second) and second.counts_against(first)):
+            return False
         if first.may_touch(second) or second.may_touch(first):
             return False
         if not self.kinematics.moves(first.joint, second.joint):

@@ -3,7 +3,7 @@
 """Changes of the shared scene by MoveIt's messages: a message counts as a whole or not at all.
 
 :mod:`arm_model.ros` reads what may collide; here are the parts that collisions do not need, frames
-of objects, padding and scale, and the codes of refusals.
+of objects, and the codes of refusals.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-import math
 from typing import Any
 
 from moveit_msgs.msg import CollisionObject as ObjectMessage
@@ -24,8 +23,6 @@ from arm_model import (
     combined,
     LinkNameError,
     ObjectNameError,
-    padded,
-    PlacedShape,
     PlanningScene,
     Pose,
     SceneError,
@@ -66,7 +63,6 @@ def apply_scene(
         fixed_frames=_fixed(before, message.fixed_frame_transforms, positions),
     )
     before = replace(before, octomap=_octomap(before, message.world.octomap, positions))
-    before = _padded(before, message.link_padding, message.link_scale)
     bodies = message.robot_state.attached_collision_objects
     _check_meshes([*message.world.collision_objects, *(each.object for each in bodies)])
     with _refused():
@@ -141,7 +137,8 @@ def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningSc
         objects=whole.objects,
         attached_bodies=whole.attached_bodies,
         allowed=AllowedCollisionMatrix(entries, whole.allowed.defaults),
-        link_shapes=whole.link_shapes,
+        padding=whole.padding,
+        scale=whole.scale,
     )
 
 
@@ -216,10 +213,7 @@ def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
 
 def _without_settings(snapshot: SceneSnapshot) -> SceneSnapshot:
     """Return a scene without what a whole scene replaces besides its objects."""
-    scene = snapshot.scene.with_contents(link_shapes=snapshot.link_shapes)
-    return replace(
-        snapshot, scene=scene, colors={}, padding={}, scale={}, fixed_frames={}, octomap=None
-    )
+    return replace(snapshot, colors={}, fixed_frames={}, octomap=None)
 
 
 def _octomap(snapshot: SceneSnapshot, message: Any, positions: Array) -> Any:  # noqa: ANN401
@@ -244,43 +238,3 @@ def _fixed(
         pose = placement(xyz(place.translation), xyzw(place.rotation), f'frame {name!r}')
         found[name] = combined(frame_of(each.header.frame_id), pose)
     return found
-
-
-def _padded(
-    snapshot: SceneSnapshot, padding: Iterable[Any], scale: Iterable[Any]
-) -> SceneSnapshot:
-    margins, factors = dict(snapshot.padding), dict(snapshot.scale)
-    for each in padding:
-        _check_factor(snapshot, each.link_name, 'link_padding', each.padding, each.padding >= 0.0)
-        margins[each.link_name] = each.padding
-    for each in scale:
-        _check_factor(snapshot, each.link_name, 'link_scale', each.scale, each.scale > 0.0)
-        factors[each.link_name] = each.scale
-    if (margins, factors) == (snapshot.padding, snapshot.scale):
-        return snapshot
-    shapes = {
-        link: [
-            PlacedShape(
-                padded(one.shape, margins.get(link, 0.0), factors.get(link, 1.0)), one.pose
-            )
-            for one in placed
-        ]
-        for link, placed in snapshot.link_shapes.items()
-    }
-    scene = snapshot.scene.with_contents(link_shapes=shapes)
-    return replace(snapshot, scene=scene, padding=margins, scale=factors)
-
-
-def _check_factor(
-    snapshot: SceneSnapshot, link: str, what: str, value: float, usable: bool
-) -> None:
-    links = snapshot.scene.kinematics.frames
-    if link not in links:
-        raise PlanningError(
-            PlanningCode.INVALID_LINK_NAME, f'{what}: no link {link!r}; links: {", ".join(links)}'
-        )
-    if not (usable and math.isfinite(value)):
-        raise PlanningError(
-            PlanningCode.FAILURE,
-            f'{what} of {link} is {value:g}: a padding is 0 or more, a scale positive',
-        )

@@ -74,12 +74,12 @@ def scene_message(
         message.allowed_collision_matrix = matrix_message(snapshot.scene.allowed)
     if components & has.LINK_PADDING_AND_SCALING:
         message.link_padding = [
-            LinkPadding(link_name=link, padding=snapshot.padding.get(link, 0.0))
-            for link in snapshot.link_shapes
+            LinkPadding(link_name=link, padding=snapshot.scene.padding.get(link, 0.0))
+            for link in snapshot.scene.link_shapes
         ]
         message.link_scale = [
-            LinkScale(link_name=link, scale=snapshot.scale.get(link, 1.0))
-            for link in snapshot.link_shapes
+            LinkScale(link_name=link, scale=snapshot.scene.scale.get(link, 1.0))
+            for link in snapshot.scene.link_shapes
         ]
     if components & has.OBJECT_COLORS:
         message.object_colors = _colors(snapshot.colors)

@@ -64,8 +64,11 @@ class SceneMonitor:
         """
         self.robot = robot
         frames = TfFrames(node, robot.kinematics, frame_prefix)
-        self.snapshot = SceneSnapshot.of(
-            robot.scene, f'{robot.name} scene', robot.world_frames, frames.pose
+        self.snapshot = SceneSnapshot(
+            robot.scene,
+            name=f'{robot.name} scene',
+            world_frames=robot.world_frames,
+            outer_frames=frames.pose,
         )
         self._node = node
         self._places: dict[str, float] = {}

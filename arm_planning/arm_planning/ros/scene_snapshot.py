@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from arm_model import Array, combined, ORIGIN, PlacedShape, PlanningScene, Pose
+from arm_model import Array, combined, ORIGIN, PlanningScene, Pose
 
 from ..exceptions import PlanningCode, PlanningError
 
@@ -54,14 +54,11 @@ class SceneSnapshot:
 
     Attributes:
         scene: What may collide: all joints of the robot move.
-        link_shapes: Shapes of the links without padding and scale.
         version: How many changes were made before.
         name: Its name.
         details: Of objects of the world and attached ones, by name.
         attached_details: Of attached bodies, by name.
         colors: Red, green, blue and opacity, by object.
-        padding: By link in [m].
-        scale: By link.
         fixed_frames: Frames that clients named, in the root link.
         octomap: The octomap_msgs/OctomapWithPose in the root link; None for none.
         world_frames: Names of the world in which the root link stands.
@@ -69,42 +66,15 @@ class SceneSnapshot:
     """
 
     scene: PlanningScene
-    link_shapes: Mapping[str, Sequence[PlacedShape]]
     version: int = 0
     name: str = ''
     details: Mapping[str, ObjectDetails] = field(default_factory=dict)
     attached_details: Mapping[str, AttachedDetails] = field(default_factory=dict)
     colors: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict)
-    padding: Mapping[str, float] = field(default_factory=dict)
-    scale: Mapping[str, float] = field(default_factory=dict)
     fixed_frames: Mapping[str, Pose] = field(default_factory=dict)
     octomap: Any = None
     world_frames: Sequence[str] = ()
     outer_frames: OuterFrames | None = None
-
-    @classmethod
-    def of(
-        cls,
-        scene: PlanningScene,
-        name: str = '',
-        world_frames: Sequence[str] = (),
-        outer_frames: OuterFrames | None = None,
-    ) -> SceneSnapshot:
-        """Return the first one.
-
-        Args:
-            scene: The robot.
-            name: Its name.
-            world_frames: Names of the world in which the root link stands.
-            outer_frames: Frames of others; None for none.
-        """
-        return cls(
-            scene,
-            scene.link_shapes,
-            name=name,
-            world_frames=world_frames,
-            outer_frames=outer_frames,
-        )
 
     @property
     def root(self) -> str:
