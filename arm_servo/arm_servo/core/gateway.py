@@ -73,10 +73,16 @@ class CommandGateway:
         self._order = CommandOrder()
         self.holds = HoldToRun()
         self.stream = TrajectoryStream(clock)
-        self._motions = MotionQueue(
-            core, self._orders, self._order, worker, clock, rest=self._rest
-        )
         self._scenes = SceneExchange(core, self._orders, worker)
+        self._motions = MotionQueue(
+            core,
+            self._orders,
+            self._order,
+            worker,
+            clock,
+            rest=self._rest,
+            recheck=self._scenes.recheck,
+        )
         self._snapshot = Snapshot(0.0, None, None, 'the cycle has not begun yet')
 
     @property

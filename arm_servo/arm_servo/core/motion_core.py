@@ -285,13 +285,17 @@ class MotionCore:
         """
         return self._preparation.prepare(request, basis)
 
-    def commit(self, prepared: Prepared, now: float, elapsed: float = 0.0) -> None:
+    def commit(
+        self, prepared: Prepared, now: float, elapsed: float = 0.0, *, in_any_scene: bool = False
+    ) -> None:
         """Let a request count from now on; where a motion is off, the arm catches up smoothly.
 
         Args:
             prepared: What :meth:`prepare` returned.
             now: Steady time in [s].
             elapsed: Time since its basis in [s], by which a motion that begins later waits less.
+            in_any_scene: A motion that was prepared in an old scene begins, too. The path of a
+                trajectory is then to be checked beside the cycle, as after :meth:`use_scene`.
 
         Raises:
             StateMovedError: Another command or a stop came after a motion was prepared, or the arm
@@ -310,7 +314,7 @@ class MotionCore:
         elif isinstance(request, SpeedRequest):
             self._speed = request.speed
         elif prepared.motion is not None and prepared.basis is not None:
-            self._begin(prepared.motion, prepared.basis, elapsed)
+            self._begin(prepared.motion, prepared.basis, elapsed, in_any_scene)
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
         """Come to rest, a trajectory on its path, because something has gone wrong.
@@ -401,14 +405,17 @@ class MotionCore:
             self._changed('a jog took over')
         self._arbiter.jog(command, request.expires, request.client)
 
-    def _begin(self, motion: Motion, basis: CommandBasis, elapsed: float) -> None:
+    def _begin(
+        self, motion: Motion, basis: CommandBasis, elapsed: float, in_any_scene: bool
+    ) -> None:
         state = self.state
         if basis.sequence != self._sequence:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'{self._last_change} before this command had begun; send it again',
             )
-        if basis.scene is not self._scene:
+        is_old = basis.scene is not self._scene
+        if is_old and not in_any_scene:
             raise StateMovedError(
                 GoalCode.INVALID_GOAL,
                 f'the scene changed (version {basis.scene.version} to {self._scene.version}) while'
@@ -419,6 +426,8 @@ class MotionCore:
             self._changed('another command came')
             motion.elapse(elapsed)
             self._arbiter.follow(motion)
+            is_unchecked = is_old and self._scene.check is not None
+            self._distances.unchecked = motion if is_unchecked else None
         else:
             self._check_held()
             self._changed('another command came')

@@ -48,7 +48,7 @@ MIN_CYCLES_AHEAD = 3
 """Least cycles from the basis to the begin of a motion that is foreseen."""
 
 MAX_ATTEMPTS = 3
-"""How often a trajectory is prepared where others move the arm meanwhile."""
+"""How often a motion is prepared where others move the arm, or the scene changes, meanwhile."""
 
 REST_TIMEOUT = 1.0
 """Time in which a jogged arm must come to rest for a trajectory in [s]."""
@@ -118,6 +118,7 @@ class MotionQueue:
         clock: Callable[[], float],
         *,
         rest: Callable[[], RobotState | None],
+        recheck: Callable[[Execution], None],
     ) -> None:
         """Begin empty.
 
@@ -129,9 +130,10 @@ class MotionQueue:
             clock: Steady time, the one of the cycle.
             rest: Where the arm stands while others have its drives: from there a motion is tried
                 before the drives are taken from them. None where the arm follows.
+            recheck: Has a trajectory checked in the present scene that was prepared in an old one.
         """
         self._core, self._orders, self._order = core, orders, order
-        self._worker, self._clock, self._rest = worker, clock, rest
+        self._worker, self._clock, self._rest, self._recheck = worker, clock, rest, recheck
         self._begun: list[MotionCommand] = []  # of the cycle
         self._lock = threading.Lock()  # of the two below; held for a few instructions only
         self._waiting: deque[MotionCommand] = deque()
@@ -304,8 +306,16 @@ class MotionQueue:
 
         def begin(cycle: Cycle) -> None:
             self._order.admit(command.source, command.number, ordered, cycle)
-            self._core.commit(prepared, cycle.now, cycle.now - planned)
+            self._core.commit(
+                prepared,
+                cycle.now,
+                cycle.now - planned,
+                in_any_scene=command.attempts == 1,  # one that changes all the time holds none up
+            )
             command.motion = prepared.motion
+            is_old = prepared.basis is not None and prepared.basis.scene is not self._core.scene
+            if is_old and command.execution is not None:
+                self._recheck(command.execution)
             self._begun.append(command)
             # canceled in this moment: the order behind it stops it
             with suppress(InvalidStateError):

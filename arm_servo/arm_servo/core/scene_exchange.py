@@ -49,16 +49,22 @@ class SceneExchange:
         def take(_cycle: Cycle) -> bool:
             execution = self._core.use_scene(prepared)
             if execution is not None:
-                begin = execution.feedback.time
-                self._worker.submit(lambda: self._check(execution, begin, prepared))
+                self.recheck(execution)
             future.set_result(version)
             return True
 
         self._orders.append(take)
         return future
 
+    def recheck(self, execution: Execution) -> None:
+        """Have the rest of a path checked in the scene that counts; called in the cycle."""
+        begin, scene = execution.feedback.time, self._core.scene
+        self._worker.submit(lambda: self._check(execution, begin, scene))
+
     def _check(self, execution: Execution, begin: float, scene: PreparedScene) -> None:
         """Look for contact on the rest of a path; in the worker's thread."""
+        if scene is not self._core.scene:
+            return  # a newer one counts, in which it is checked as well
         try:
             found = None if scene.check is None else execution.contact(scene.check, begin)
             problem = found and (
