@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+import errno
 import os
+from pathlib import Path
 from time import monotonic, time
 import tty
 
@@ -18,6 +20,8 @@ from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.adapter import AdapterBus
 from arm_canopen.exceptions import BusError
 
+SLCAN_OPENING = 2.0  # [s] for which the driver of slcan sleeps
+
 
 class ScriptedDriver(can.BusABC):
     """A driver that delivers prepared messages, and refuses to send."""
@@ -25,13 +29,14 @@ class ScriptedDriver(can.BusABC):
     def __init__(self, messages: list[can.Message]) -> None:
         super().__init__('scripted')
         self.messages = messages
+        self.cause: OSError | None = None
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         return (self.messages.pop(0) if self.messages else None), True
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Refuse."""
-        raise can.CanOperationError('bus off')
+        raise can.CanOperationError('bus off') from self.cause
 
 
 @pytest.fixture
@@ -134,12 +139,19 @@ class SerialAdapter:
         """Open the line."""
         self._ours, theirs = os.openpty()
         tty.setraw(theirs)
-        self.name = f'slcan:{os.ttyname(theirs)}'
+        self.tty = os.ttyname(theirs)
+        self.name = f'slcan:{self.tty}'
         self._theirs = theirs
 
     def write(self, *lines: bytes) -> None:
         """Send lines to the computer."""
         os.write(self._ours, b''.join(line + b'\r' for line in lines))
+
+    def read(self, text: bytes) -> None:
+        """Read until a text from the computer comes."""
+        received = b''
+        while text not in received:
+            received += os.read(self._ours, 1000)
 
     def close(self) -> None:
         """Close both ends."""
@@ -192,6 +204,93 @@ def test_an_adapter_that_delivers_nothing_but_damage_is_reported(
             with suppress(BusError):
                 frames = receive(bus, 1, deadline)
         assert frames == [(0x181, b'\xaa')]
+
+
+def failure(bus: Bus) -> str:
+    """Receive once; return why that failed, or nothing."""
+    try:
+        bus.receive(0.02)
+    except BusError as error:
+        return str(error)
+    return ''
+
+
+def fails(bus: Bus, text: str, deadline: float) -> bool:
+    """Receive until that fails with a text."""
+    while monotonic() < deadline:
+        if text in failure(bus):
+            return True
+    return False
+
+
+def test_an_adapter_that_is_plugged_in_again_is_used_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Meanwhile no call waits for its driver, which takes 2 s to open it; then both ways work."""
+    plug = tmp_path / 'ttyACM0'
+    first, second = SerialAdapter(), SerialAdapter()
+    plug.symlink_to(first.tty)
+    deadline = monotonic() + 20.0
+    with open_bus(f'slcan:{plug}@500000') as bus:
+        first.close()
+        plug.unlink()
+        assert fails(bus, 'it is opened again when it is back', deadline)
+        with pytest.raises(BusError, match='went away'):
+            bus.send(Frame(1))
+        assert fails(bus, 'is it plugged in', deadline)
+        plug.symlink_to(second.tty)
+        longest, gone = 0.0, True
+        while gone and monotonic() < deadline:
+            began = monotonic()
+            gone = bool(failure(bus))
+            longest = max(longest, monotonic() - began)
+        second.write(b't1811AA')
+        assert receive(bus, 1, deadline) == [(0x181, b'\xaa')]
+        assert longest < SLCAN_OPENING
+        bus.send(Frame(0x201, b'\xbb'))
+        second.read(b't2011BB\r')
+    assert [record.message for record in caplog.records] == [f'{bus.name} is back']
+    second.close()
+
+
+@pytest.mark.parametrize('gone', [errno.ENODEV, errno.EIO])
+def test_an_adapter_whose_loss_only_sending_shows_is_opened_again(
+    gone: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Drivers as that of gs_usb receive nothing from a device that is gone, and raise nothing."""
+    opened: list[ScriptedDriver] = []
+
+    def open_driver(**given: object) -> can.BusABC:
+        opened.append(ScriptedDriver([_message(data=b'1')]))
+        opened[-1].cause = OSError(gone, os.strerror(gone)) if len(opened) == 1 else None
+        return opened[-1]
+
+    monkeypatch.setattr(can, 'Bus', open_driver)
+    with open_bus('gs_usb:0@1000000') as bus:
+        assert len(bus.receive(0.0)) == 1
+        with pytest.raises(BusError, match='bus off'):
+            bus.send(Frame(1))
+        frames: list[Frame] = []
+        deadline = monotonic() + 10.0
+        while not frames and monotonic() < deadline:
+            with suppress(BusError):
+                frames = bus.receive(0.02)
+        assert len(frames) == 1
+        with pytest.raises(BusError, match='bus off'):  # an error of the bus, not of the device
+            bus.send(Frame(1))
+        assert bus.receive(0.0) == []
+    assert len(opened) == 2
+
+
+def test_an_adapter_may_be_closed_while_it_is_gone(unplugged: AdapterBus) -> None:
+    """Whatever its opening comes to is released, too."""
+    with pytest.raises(BusError, match='went away'):
+        unplugged.receive(0.0)
+    with suppress(BusError):
+        unplugged.receive(0.0)
+    unplugged.close()
+    with pytest.raises(BusError, match='closed'):
+        unplugged.receive(0.0)
 
 
 @pytest.fixture

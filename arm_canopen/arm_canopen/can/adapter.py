@@ -4,8 +4,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future, InvalidStateError
+import contextlib
+import errno
+from functools import partial
+import logging
 import math
-from threading import Event, Lock
+from threading import Event, Lock, Thread
 from time import monotonic, time
 from typing import Any
 
@@ -19,6 +24,8 @@ _POLL = 0.02  # [s] longest time until wake() is noticed; python-can has no way 
 _BATCH_MAX = 1000  # frames; a flooded bus must not keep the caller inside receive
 _DAMAGED_MAX = 100  # messages in a row, after which the adapter counts as gone
 _WALL_CLOCK_SPAN = 1.0  # [s] stamps further from now count from something else than 1970
+_UNPLUGGED = frozenset({errno.ENODEV, errno.ENXIO, errno.EIO})
+_log = logging.getLogger(__name__)
 
 
 class AdapterBus(Bus):
@@ -40,16 +47,12 @@ class AdapterBus(Bus):
             BusError: python-can does not know the interface or cannot open it.
         """
         super().__init__(name)
-        options: dict[str, Any] = {} if bitrate is None else {'bitrate': bitrate}
-        try:
-            self._bus = can.Bus(
-                channel=channel, interface=interface, receive_own_messages=False, **options
-            )
-        except (can.CanError, NotImplementedError, OSError, ValueError, TypeError) as error:
-            raise BusError(_not_opened(name, interface, error)) from error
+        self._open = partial(_open_driver, name, interface, channel, bitrate)
+        self._bus = self._open()
         self._woken = Event()
         self._send_lock = Lock()
-        self._closed = False
+        self._closed = self._gone = False
+        self._reopening: Future[can.BusABC] | None = None
         self._last = 0.0
         self._damaged = 0
 
@@ -63,18 +66,28 @@ class AdapterBus(Bus):
         message = to_message(checked(frame))
         if self._closed:
             raise BusError(f'{self.name} is closed')
+        if self._gone:
+            self.counters.send_errors += 1
+            raise BusError(f'{self.name} went away')
         try:
             with self._send_lock:
                 self._bus.send(message)
                 self.counters.sent += 1
         except (can.CanError, OSError) as error:
             self.counters.send_errors += 1
+            self._gone = self._gone or _is_unplugged(error)  # some drivers notice it here only
             raise BusError(f'{self.name} refuses a frame: {error}') from error
 
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames; see :meth:`Bus.receive`."""
+        """Wait for frames; an adapter that went away is opened again when it is back.
+
+        Raises:
+            BusError: The adapter went away, or delivers damaged messages only.
+        """
         if self._closed:
             raise BusError(f'{self.name} is closed')
+        if self._gone:
+            self._reopen()
         try:
             message = self._wait(monotonic() + timeout) if timeout > 0.0 else self._next(0.0)
             frames = []
@@ -83,10 +96,47 @@ class AdapterBus(Bus):
                 if frame is not None:
                     frames.append(frame)
                 message = self._next(0.0) if len(frames) < _BATCH_MAX else None
+        except BusError:
+            raise
         except (can.CanError, OSError) as error:
-            raise BusError(f'{self.name} went away: {error}') from error
+            self._gone = True
+            raise BusError(
+                f'{self.name} went away: {error}; it is opened again when it is back'
+            ) from error
         self.counters.received += len(frames)
         return frames
+
+    def _reopen(self) -> None:
+        """Go on with the adapter where it is back; opening it may take a driver seconds.
+
+        Raises:
+            BusError: It is not back yet.
+        """
+        if self._reopening is None:
+            self._reopening = Future()
+            Thread(target=self._replace, args=(self._reopening,), daemon=True).start()
+        if not self._reopening.done():
+            raise BusError(f'{self.name} went away')
+        opened, self._reopening = self._reopening, None
+        with self._send_lock:
+            self._bus = opened.result()
+            self._gone = False
+        _log.warning('%s is back', self.name)  # as loud as its going was
+
+    def _replace(self, opened: Future[can.BusABC]) -> None:
+        """Release the adapter that went away, and open it anew."""
+        with contextlib.suppress(Exception):  # of a driver whose device is gone
+            self._bus.shutdown()
+        try:
+            driver = self._open()
+        except BusError as error:
+            with contextlib.suppress(InvalidStateError):
+                opened.set_exception(error)
+            return
+        try:
+            opened.set_result(driver)
+        except InvalidStateError:  # close() has cancelled it
+            driver.shutdown()
 
     def _wait(self, deadline: float) -> can.Message | None:
         message = None
@@ -152,10 +202,15 @@ class AdapterBus(Bus):
 
     def close(self) -> None:
         """Close the adapter."""
-        if not self._closed:
-            self._closed = True
-            self._woken.set()
+        if self._closed:
+            return
+        self._closed = True
+        self._woken.set()
+        opened = self._reopening
+        if opened is None:
             self._bus.shutdown()
+        elif not opened.cancel() and opened.exception() is None:
+            opened.result().shutdown()
 
 
 def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
@@ -199,6 +254,23 @@ def _steady_stamp(stamp: float) -> float:
     if math.isfinite(age) and 0.0 <= age < _WALL_CLOCK_SPAN:
         return now - age
     return now
+
+
+def _open_driver(name: str, interface: str, channel: str, bitrate: int | None) -> can.BusABC:
+    options: dict[str, Any] = {} if bitrate is None else {'bitrate': bitrate}
+    try:
+        return can.Bus(channel=channel, interface=interface, receive_own_messages=False, **options)
+    except (can.CanError, NotImplementedError, OSError, ValueError, TypeError) as error:
+        raise BusError(_not_opened(name, interface, error)) from error
+
+
+def _is_unplugged(error: BaseException | None) -> bool:
+    """Return whether an error of a driver is that of a device that is gone."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _UNPLUGGED:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _not_opened(name: str, interface: str, error: Exception) -> str:
