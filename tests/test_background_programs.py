@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Programs without a node of their own end by SIGINT as background jobs of a script, too.
 
-Shells start those with SIGINT ignored, which a program inherits.
+Shells start those with SIGINT ignored, which a program inherits. The exit code is the program's
+own: one that the signal kills, or that ends by a traceback, has another.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ IGNORING = ['env', '--ignore-signal=INT']
 
 
 @pytest.mark.parametrize(
-    ('command', 'begun'),
+    ('command', 'begun', 'code'),
     [
-        (['operator_input', 'show_gamepad', '--device', 'no such pad'], 'no gamepad yet'),
+        (['operator_input', 'show_gamepad', '--device', 'no such pad'], 'no gamepad yet', 0),
         (
             [
                 'quad_controller',
@@ -45,19 +46,24 @@ IGNORING = ['env', '--ignore-signal=INT']
                 '600',
             ],
             'order of joints',
+            INTERRUPTED,
         ),
-        (['quad_hardware', 'doctor', '--port', '/dev/null', '--duration', '300'], '.'),
+        (
+            ['quad_hardware', 'doctor', '--port', '/dev/null', '--duration', '300'],
+            '.',
+            INTERRUPTED,
+        ),
     ],
     ids=lambda each: each[1] if isinstance(each, list) else '',
 )
-def test_a_program_ends(command: list[str], begun: str, isolation: Isolation) -> None:
+def test_a_program_ends(command: list[str], begun: str, code: int, isolation: Isolation) -> None:
     """Whatever it does at that moment."""
     package, name, *arguments = command
     program = [*IGNORING, executable(package, name), *arguments]
     with RunningProcess(program, isolation.env) as process:
         process.wait_for(begun, 30.0)
         process.signal(signal.SIGINT)
-        process.wait(30.0)
+        assert process.wait(30.0) == code, process.output
 
 
 def test_a_scan_ends(isolation: Isolation) -> None:
@@ -85,7 +91,7 @@ def test_an_echo_ends(isolation: Isolation) -> None:
         client.node.create_timer(0.1, lambda: publisher.publish(String(data='here')))
         client.spin_until(lambda: 'here' in process.output, 30.0, 'echo')
         process.signal(signal.SIGINT)
-        process.wait(30.0)
+        assert process.wait(30.0) == signal.SIGINT, process.output  # as ros2cli
 
 
 def test_a_calibration_ends(isolation: Isolation, tmp_path: Path) -> None:
@@ -103,7 +109,7 @@ def test_a_calibration_ends(isolation: Isolation, tmp_path: Path) -> None:
             assert process.stdout is not None
             assert '12 joints' in process.stdout.readline()
             process.send_signal(signal.SIGINT)
-            process.wait(30.0)
+            assert process.wait(30.0) == 1  # nothing was written
         finally:
             process.kill()
             process.communicate()

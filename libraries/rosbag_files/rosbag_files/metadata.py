@@ -185,11 +185,11 @@ def _parse(information: Mapping[str, Any], path: Path) -> BagMetadata:
 def _files(information: Mapping[str, Any]) -> Sequence[BagFile]:
     paths = [str(each) for each in information['relative_file_paths']]
     listed = information.get('files')
-    if not listed:  # before version 5
+    if not listed:  # before version 5 only those of the whole recording
         start = int(information['starting_time']['nanoseconds_since_epoch'])
         duration = int(information['duration']['nanoseconds'])
         count = int(information['message_count'])
-        return [BagFile(path, start, duration, count if path == paths[0] else 0) for path in paths]
+        return [BagFile(path, start, duration, count) for path in paths]
     return [
         BagFile(
             path,

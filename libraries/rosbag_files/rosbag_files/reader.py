@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator
 import contextlib
 from dataclasses import dataclass, replace
 import heapq
+import itertools
 import os
 from pathlib import Path
 import re
@@ -97,9 +98,18 @@ class BagReader:
         """
         by_message = self.metadata.compression_mode == 'MESSAGE'
         unpack = zstandard.ZstdDecompressor().decompress if by_message else bytes
-        files = [self._file_messages(file, topics, start, unpack) for file in self.metadata.files]
         # files of a split overlap a little: a message of another topic may come late
-        yield from heapq.merge(*files, key=lambda message: message.log_time)
+        files = deque(sorted(self.metadata.files, key=lambda file: file.start))
+        current: list[tuple[int, int, BagMessage, Iterator[BagMessage]]] = []
+        numbers = itertools.count()  # of messages with the same time, the one found first
+        while files or current:
+            if files and (not current or files[0].start <= current[0][0]):
+                found = self._file_messages(files.popleft(), topics, start, unpack)
+            else:
+                _, _, message, found = heapq.heappop(current)
+                yield message
+            for message in itertools.islice(found, 1):
+                heapq.heappush(current, (message.log_time, next(numbers), message, found))
 
     def _file_messages(
         self,
@@ -121,20 +131,24 @@ class BagReader:
                 )
 
     def _with_definitions(self, metadata: BagMetadata) -> BagMetadata:
-        """Add the definitions of messages, which the files have."""
+        """Add what the files say: definitions of messages, and their own times and counts."""
         if metadata.storage != STORAGE:
             raise BagError(f"{self.folder}: storage '{metadata.storage}'; only MCAP can be read")
         definitions: dict[str, str] = {}
+        files: list[BagFile] = []
         for file in metadata.files:
             with opened(self.folder / file.path) as stream:
-                definitions |= _definitions(stream)
+                summary = _summary(stream)
+            if summary is not None:
+                definitions |= {each.name: each.data.decode() for each in summary.schemas.values()}
+            files.append(_with_statistics(file, summary))
         topics = (
             replace(
                 each, topic=replace(each.topic, definition=definitions.get(each.topic.type, ''))
             )
             for each in metadata.topics
         )
-        return replace(metadata, topics=tuple(topics))
+        return replace(metadata, files=tuple(files), topics=tuple(topics))
 
 
 def recording_files(folder: Path) -> list[Path]:
@@ -233,23 +247,27 @@ def _in_order(
 def has_index(stream: IO[bytes]) -> bool:
     """Whether the messages of a file can be found by time without reading all of it."""
     summary = _summary(stream)
-    return summary is not None and bool(summary.chunk_indexes)
+    return summary is not None and bool(summary.chunk_indexes) and bool(summary.channels)
 
 
 def _summary(stream: IO[bytes]) -> Summary | None:
     """Return what the end of a file says of it; None where that is missing or damaged."""
     if stream.seek(0, os.SEEK_END) < FOOTER_SIZE + MAGIC_SIZE:
         return None  # the library would seek to before the begin
+    stream.seek(0)  # where it expects the magic
     try:
         return make_reader(stream).get_summary()
     except _DAMAGE:
         return None
 
 
-def _definitions(stream: IO[bytes]) -> dict[str, str]:
-    summary = _summary(stream)
-    schemas = list(summary.schemas.values()) if summary else []
-    return {schema.name: schema.data.decode() for schema in schemas}
+def _with_statistics(file: BagFile, summary: Summary | None) -> BagFile:
+    """Replace times and count by those of the file: before version 5 metadata.yaml has none."""
+    found = summary.statistics if summary is not None else None
+    if found is None:
+        return file
+    start, end = found.message_start_time, found.message_end_time
+    return BagFile(file.path, start, end - start, found.message_count)
 
 
 @contextlib.contextmanager

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+import resource
 import tempfile
 
 from hypothesis import given, settings, strategies
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 import pytest
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosReliability
@@ -27,6 +29,7 @@ from rosbag_files import (
     Preset,
     WriterOptions,
 )
+from rosbag_files.reader import has_index
 
 TIMES = strategies.integers(min_value=0, max_value=2**62)
 MESSAGES = strategies.lists(
@@ -145,6 +148,63 @@ def test_messages_of_two_files_come_in_order(tmp_path: Path) -> None:
     reader = BagReader(tmp_path / 'bag')
     assert len(reader.metadata.files) == 2
     assert list(reader.messages()) == by_time(messages)
+
+
+def test_more_files_than_a_process_may_open(tmp_path: Path) -> None:
+    """A long recording is split into many; only those that overlap are open at the same time."""
+    messages = [message(number) for number in range(100)]
+    write(tmp_path / 'bag', messages, WriterOptions(max_duration=SECOND // 100))
+    reader = BagReader(tmp_path / 'bag')
+    assert len(reader.metadata.files) == 100
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with Path('/dev/null').open() as lowest:
+        free = lowest.fileno()
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (free + 20, limits[1]))
+        assert list(reader.messages()) == messages
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+def test_metadata_before_version_5(tmp_path: Path) -> None:
+    """It lists no file with its own times: the files say them."""
+    messages = [message(number) for number in range(250)]
+    write(tmp_path / 'bag', messages, WriterOptions(max_duration=SECOND))
+    path = tmp_path / 'bag' / METADATA_FILE
+    document = yaml.safe_load(path.read_text())
+    information = document['rosbag2_bagfile_information']
+    information['version'] = 4
+    del information['files']
+    path.write_text(yaml.safe_dump(document))
+    reader = BagReader(tmp_path / 'bag')
+    assert [file.count for file in reader.metadata.files] == [100, 100, 50]
+    assert list(reader.messages()) == messages
+    assert list(reader.messages(start=messages[200].log_time)) == messages[200:]
+
+
+@pytest.mark.parametrize('options', [{}, {'repeat_channels': False}, {'use_chunking': False}])
+def test_files_of_other_writers(options: dict[str, bool], tmp_path: Path) -> None:
+    """With an index, with one that names no channel, and with none; the first is read by it."""
+    path = tmp_path / 'other_0.mcap'
+    with path.open('wb') as stream:
+        writer = Writer(stream, chunk_size=100, **options)
+        writer.start('ros2')
+        schema = writer.register_schema(TEXT.type, 'ros2msg', TEXT.definition.encode())
+        channel = writer.register_channel(TEXT.name, 'cdr', schema)
+        for number in range(20):
+            each = message(number)
+            writer.add_message(channel, each.log_time, each.data, each.publish_time, each.sequence)
+        writer.finish()
+    assert list(BagReader(path).messages()) == [message(number) for number in range(20)]
+    with path.open('rb') as stream:
+        assert has_index(stream) == (not options)
+
+
+def test_definitions_of_a_finished_recording(tmp_path: Path) -> None:
+    """metadata.yaml has none; the files have."""
+    write(tmp_path / 'bag', [message(0)])
+    topics = BagReader(tmp_path / 'bag').metadata.topics
+    assert {each.topic.definition for each in topics} == {TEXT.definition, COUNT.definition}
 
 
 def test_an_existing_folder_is_not_touched(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from .finding import error, Finding, note, Severity
 from .host_checks import check_environment, check_library, check_memory
 from .port_checks import check_port
 
+INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
+
 
 def run_doctor(argv: Sequence[str]) -> int:
     """Print all findings; return 1 when one of them is an error, else 0."""
@@ -33,7 +35,10 @@ def main() -> None:
     """Entry point."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run_doctor(sys.argv[1:]))
+    try:
+        sys.exit(run_doctor(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
 
 
 def _parser() -> argparse.ArgumentParser:

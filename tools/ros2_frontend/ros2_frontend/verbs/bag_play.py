@@ -132,6 +132,7 @@ def play(args: Namespace) -> None:
             keyboard.log.info(line)
         Graph(session).settle()  # who is there already receives the first message, too
         if args.clock:
+            clock.step(reader.metadata.start + round(args.start_offset * _NANO))
             stack.enter_context(_publishing_clock(session, clock, args.clock))
         with contextlib.suppress(KeyboardInterrupt), bag_errors():
             _play_rounds(player, reader, names, args, keyboard.poll)
