@@ -94,6 +94,7 @@ class Drive:
         self._polling: Task[None] | None = None
         node.on_lost.append(self._on_lost)
         node.on_failed.append(self.fail)
+        node.lead_to_rest.append(self.lead_to_rest)
 
     def describe(self) -> str:
         """Describe the drive in a sentence."""
@@ -190,6 +191,12 @@ class Drive:
         self.control.goal = DriveState.SWITCH_ON_DISABLED
         if self.view.state in POWERED and not self.view.stands:
             self.stop.begin()
+
+    async def lead_to_rest(self, reason: str) -> None:
+        """Bring it to rest and take its power away, because its device is given up."""
+        if self.view.state in POWERED:
+            self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason)
+            await self.stop.ended()
 
     def _take_out(self, refusal: Refusal, text: str) -> None:
         """Stop and disable it; only the first cause is reported until it is enabled again."""

@@ -20,6 +20,7 @@ class LifeSigns:
         last: Steady time of the last heartbeat, or of the last answer, in [s].
         silent: It was started and has never shown one, though it is supervised; it has to show one
             before it is started again.
+        missed: How often in a row one was missing when it was due.
     """
 
     def __init__(self, config: NodeConfig, send: Send) -> None:
@@ -31,24 +32,32 @@ class LifeSigns:
         """
         self.last = 0.0
         self.silent = False
+        self.missed = 0
         self._config = config
-        self._since = 0.0
+        self._since = self._awaited_from = 0.0
         self._timeout = math.inf
         self._guarding: Guarding | None = None
         if config.uses_node_guarding:
             timing = (config.guard_time, config.retry_factor)
             self._guarding = Guarding(config.node_id, *timing, send)
 
+    @property
+    def consumer_time(self) -> float:
+        """Time in [s] after which a life sign counts as missing."""
+        config = self._config
+        return config.heartbeat_timeout or config.guard_time * config.retry_factor
+
     def start(self, now: float) -> None:
         """Supervise from a time in [s] on, from which the first sign is awaited."""
         self.last = self._since = now
         self.silent = False
+        self.missed = 0
         self._timeout = self._config.heartbeat_timeout or math.inf
-        if self._guarding is not None:
-            self._guarding.start(now)
+        self._await_next(now)
 
     def stop(self) -> None:
         """Supervise no more."""
+        self.missed = 0
         self._timeout = math.inf
         if self._guarding is not None:
             self._guarding.stop()
@@ -65,18 +74,32 @@ class LifeSigns:
         if guarding is not None and not guarding.receive(frame.data):
             return False
         self.last = frame.timestamp
+        self.missed = 0
         return True
 
     def overdue(self, now: float) -> str:
-        """Return in words what is missing at a time in [s], empty while nothing is."""
-        if now - self.last > self._timeout:
-            self.silent = self.last <= self._since
+        """Return in words what is missing at a time in [s], empty while nothing is.
+
+        What is missing is awaited again from then on.
+        """
+        if now - max(self.last, self._awaited_from) > self._timeout:
+            self._miss(now)
             return f'heartbeat lost: none within its consumer time of {self._timeout * 1000:g} ms'
         if self._guarding is not None and self._guarding.advance(now):
-            self.silent = self.last <= self._since
+            self._miss(now)
             config = self._config
             return (
                 f'lost: no answer to node guarding {config.retry_factor} times in a row, each '
                 f'{config.guard_time * 1000:g} ms apart'
             )
         return ''
+
+    def _miss(self, now: float) -> None:
+        self.silent = self.last <= self._since
+        self.missed += 1
+        self._await_next(now)
+
+    def _await_next(self, now: float) -> None:
+        self._awaited_from = now
+        if self._guarding is not None:
+            self._guarding.start(now)

@@ -38,6 +38,11 @@ class PdoWatch:
         for entry in inputs:
             entry.on_short = self._report_short
 
+    @property
+    def last(self) -> float:
+        """Steady time of the last TPDO in [s]; 0 before the first."""
+        return max((entry.timestamp for entry in self._inputs), default=0.0)
+
     def stop(self) -> None:
         """The device went away."""
         self._stopped.clear()

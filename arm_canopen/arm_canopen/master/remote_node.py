@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from enum import Enum
+from typing import Any
 
 from ..can.frame import Frame
 from ..config.model import NodeConfig
@@ -20,9 +21,10 @@ from .life_signs import LifeSigns
 from .pdo_watch import PdoWatch
 from .process_image import SentRpdo, SyncRound
 from .remote_objects import RemoteObjects
-from .scheduler import Scheduler
+from .scheduler import Promise, Scheduler
 
 START_TIME = 0.25  # [s] in which a device follows the command to start
+LIVE_SHARE = 0.5  # of the consumer time of its life signs, in which a TPDO shows that it lives
 RESET_TIME = 10.0  # [s] in which a device that was reset has sent its boot-up message
 
 
@@ -66,6 +68,8 @@ class RemoteNode:
         on_boot_up: Called when it has restarted.
         on_lost: Its drivers, which stop; each gets the reason.
         on_gone: Called when it was lost by itself; what an NMT command does to it is no loss.
+        lead_to_rest: Its drivers, which bring what moves to rest and take its power away, for a
+            reason; each returns when that has ended, well or not.
         on_failed: Its drivers, which stop because a step of the cycle failed for this device; each
             gets the error, and the RPDO that cannot be sent for it, if it is one.
         on_dropped_out: Called when it has to be booted again, though it did not restart, with the
@@ -113,6 +117,9 @@ class RemoteNode:
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
         self.on_gone: Callable[[], None] = lambda: None
+        self.lead_to_rest: list[Callable[[str], Coroutine[Promise[Any], None, None]]] = []
+        self._missing = ''  # the life sign, in words
+        self._resting: Promise[list[None]] | None = None
         self.on_failed: list[Callable[[Exception, SentRpdo | None], None]] = []
         self._failed = False
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
@@ -194,11 +201,36 @@ class RemoteNode:
         """
         missing = self.life.overdue(now)
         if missing:
-            self.lost(missing)
+            self._miss(missing, now)
+        rested = self._resting is not None and self._resting.done
+        if rested:
+            self._resting = None
+        if self.life.missed and (rested or not self._lives(now)):
+            self.lost(self._missing)
             return True
         if self.operational:
             self.pdos.look(now)
         return False
+
+    def _lives(self, now: float) -> bool:
+        """Return whether its TPDOs show that it is in operation, though a life sign is missing."""
+        recent = now - self.pdos.last <= LIVE_SHARE * self.life.consumer_time
+        return recent and self.operational and not self.life.silent
+
+    def _miss(self, missing: str, now: float) -> None:
+        """Have a device led to rest before it is lost, as its configuration would let it coast.
+
+        Only when a life sign is missing twice in a row; the TPDOs show as much.
+        """
+        self._missing = missing
+        if not self._lives(now):
+            return
+        if self.life.missed == 1:
+            text = f'{missing}, but its TPDOs come: it goes on until the next one is missing, too'
+            self.report(EventKind.HEARTBEAT_LOST, Severity.WARNING, text)
+        elif self._resting is None:
+            ends = [self._scheduler.spawn(lead(missing)) for lead in self.lead_to_rest]
+            self._resting = self._scheduler.spawn(self._scheduler.gather(ends))
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop its drivers, because a step of the cycle failed; other devices go on.
@@ -232,6 +264,7 @@ class RemoteNode:
         self.loss = reason
         self.nmt_state = None
         self.online = False
+        self._resting = None
         self._stop_drivers(reason)  # first, so that nobody sends new SDOs when these end
         self.offline(reason)
         if severity is Severity.ERROR:

@@ -44,6 +44,7 @@ SPEED = 0.5  # [rad/s]
 FAR = 0.9  # [rad]
 CYCLE = 0.02  # [s] twice the usual one: half the frames to compute
 SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
+STANDING = 0.03  # [rad/s]
 CREEP = 0.002  # [rad] that a motor without torque may still roll
 TORQUE = 200.0  # [per mille] of the rated one
 POSITION_MODES = [
@@ -106,6 +107,20 @@ class Arm:
             injection = FaultInjection(deviation)
             self.net.devices[FAULTY].faults.inject(injection, self.net.now)
         self.net.boot()
+        self.coasted = 0.0  # [rad/s] greatest speed without power of the faulty drive
+        cycle = self.net.network.on_cycle
+
+        def watch(now: float, period: float) -> None:
+            cycle(now, period)
+            device = self.net.devices.get(FAULTY)
+            if device is not None and device.drive is not None:
+                self._watch_power(device.drive)
+
+        self.net.network.on_cycle = watch
+
+    def _watch_power(self, drive: SimulatedDrive) -> None:
+        if drive.state not in {DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE}:
+            self.coasted = max(self.coasted, abs(drive.velocity) / SCALE)
 
     def simulated(self, name: str = FAULTY) -> SimulatedDrive:
         """Return the drive of a simulated device."""
@@ -205,8 +220,9 @@ def following_error(arm: Arm) -> None:
 
 
 def stop_heartbeat(arm: Arm) -> None:
-    """Lose the heartbeats of the device, and nothing else."""
+    """Lose the heartbeats of the device, and nothing else, until it is given up."""
     arm.lose(0x700 + NODE_ID)
+    arm.net.run(SETTLING)
 
 
 def stop_sdo(arm: Arm) -> None:
@@ -231,6 +247,7 @@ class Fault:
         cause: Why targets are refused meanwhile.
         emcy: Code of the EMCY that the master has received, None when it need not have one.
         witness_stops: The other drive is met, too.
+        braked: The drive keeps its power until it stands, as nothing takes that away.
         cure: Removes the cause.
         way: What brings the drive back.
     """
@@ -244,6 +261,7 @@ class Fault:
     way: Way
     emcy: int | None = None
     witness_stops: bool = False
+    braked: bool = False
 
     def __str__(self) -> str:
         """Name the row in the id of a test."""
@@ -328,6 +346,7 @@ FAULTS = (
         RefusalCause.OFFLINE,
         restore_bus,
         Way.ENABLE,
+        braked=True,
     ),
 )
 
@@ -375,6 +394,7 @@ def test_fault_in_motion(fault: Fault, mode: OperationMode) -> None:
     if fault.state is not None:
         assert arm.state() is fault.state, arm.net.story()
         arm.stands(FAULTY)
+    assert not fault.braked or arm.coasted < STANDING
     assert (arm.state(WITNESS) is not DriveState.OPERATION_ENABLED) is fault.witness_stops
 
     fault.cure(arm)
