@@ -252,6 +252,10 @@ class Device:
         self._subscribe()
         self.advance(now)
 
+    def repeat_emcy(self, period: float, now: float) -> None:
+        """Send the last EMCY again and again; 0 ends that (from the injector)."""
+        self._errors.repeat(period, now)
+
     def faults_changed(self) -> None:
         """Let frames pass through the faults of the line (from the injector)."""
         self._subscribe()

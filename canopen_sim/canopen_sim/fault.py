@@ -77,6 +77,7 @@ class Fault(Enum):
         'shows the identity of another device',
         ('device_type', 'vendor', 'product', 'revision', 'serial'),
     )
+    EMCY_FLOOD = FaultKind('sends the EMCY of its last error again and again', ('delay',))
     DISCONNECT = FaultKind('is cut off from the bus and goes on by itself', (), _EVERY_FRAME)
     POWER_OFF = FaultKind('has no power', ('position_kept',))
     REBOOT = FaultKind('restarts', ('position_kept',))

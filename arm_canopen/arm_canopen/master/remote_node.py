@@ -199,6 +199,7 @@ class RemoteNode:
         Args:
             now: Steady time in [s].
         """
+        self.emergencies.look(now)
         missing = self.life.overdue(now)
         if missing:
             self._miss(missing, now)

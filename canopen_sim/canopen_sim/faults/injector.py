@@ -26,6 +26,7 @@ IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
 
 POWER_FAULTS = frozenset({Fault.POWER_OFF, Fault.REBOOT})
 REBOOT_TIME_MIN = 1e-6  # [s] so that off comes before on
+FLOOD_PERIOD_MIN = 1e-3  # [s] a bus carries not many more frames
 OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
 
 
@@ -54,6 +55,9 @@ class Powered(Protocol):
 
     def switch_on(self, now: float, *, position_kept: bool) -> None:
         """Give power."""
+
+    def repeat_emcy(self, period: float, now: float) -> None:
+        """Send the last EMCY again and again; 0 ends that."""
 
     def faults_changed(self) -> None:
         """The line has other faults from now on."""
@@ -127,6 +131,8 @@ class FaultInjector:
                 return
         elif injection.fault is Fault.WRONG_IDENTITY:
             self._disguise(injection)
+        elif injection.fault is Fault.EMCY_FLOOD:
+            self._device.repeat_emcy(max(injection.delay, FLOOD_PERIOD_MIN), now)
         line = None
         if injection.fault.value.frames:
             line = LineFault(injection, self._device.node_id)
@@ -166,6 +172,8 @@ class FaultInjector:
         elif injection.fault is Fault.WRONG_IDENTITY:
             for address in IDENTITY_OBJECTS.values():
                 self._device.store.overlay.pop(address, None)
+        elif injection.fault is Fault.EMCY_FLOOD:
+            self._device.repeat_emcy(0.0, now)
         elif injection.fault in POWER_FAULTS:
             self._device.switch_on(now, position_kept=injection.position_kept)
 

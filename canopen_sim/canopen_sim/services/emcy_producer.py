@@ -19,6 +19,7 @@ from ..objects.object_store import Integer, ObjectStore, refusal
 from ..timed import NEVER
 
 GENERIC_ERROR = 0x01
+GENERIC_CODE = 0x1000
 REGISTER_BITS: tuple[tuple[int, int, int], ...] = (
     (0x2000, 0x2FFF, 1 << 1),  # current
     (0x3000, 0x3FFF, 1 << 2),  # voltage
@@ -42,14 +43,12 @@ def register_bits(code: int) -> int:
 
 
 class EmcyProducer:
-    """Keeps the active errors of a device and reports them on the network.
-
-    Attributes:
-        deadline: Steady time in [s] at which a message that is held back may be sent.
-    """
+    """Keeps the active errors of a device and reports them on the network."""
 
     def __init__(self, store: ObjectStore, send: Callable[[Frame], None]) -> None:
-        self.deadline = NEVER
+        self._flush_at = self._repeat_at = NEVER
+        self._repeat_period = 0.0
+        self._last = Emergency(GENERIC_CODE, GENERIC_ERROR)
         self._send = send
         self._register = store.integer(Index.ERROR_REGISTER)
         self._cob_id = store.integer(Index.EMCY_COB_ID, default=COB_ID_INVALID)
@@ -71,6 +70,11 @@ class EmcyProducer:
             variable.before_read = _presence_check(self._count, number, variable)
 
     @property
+    def deadline(self) -> float:
+        """Steady time in [s] at which a message is due."""
+        return min(self._flush_at, self._repeat_at)
+
+    @property
     def active(self) -> frozenset[int]:
         """Codes of the errors that are there."""
         return frozenset(self._active)
@@ -81,7 +85,7 @@ class EmcyProducer:
         self._pending.clear()
         self._register.value = 0
         self._next_time = 0.0
-        self.deadline = NEVER
+        self._flush_at = NEVER
 
     def allow(self, allowed: bool, now: float) -> None:
         """Let messages out, or hold them back (NMT Stopped)."""
@@ -101,7 +105,8 @@ class EmcyProducer:
         self._active.add(code)
         self._update_register()
         self._record(code)
-        self._queue(Emergency(code, self._register.value, vendor), now)
+        self._last = Emergency(code, self._register.value, vendor)
+        self._queue(self._last, now)
 
     def set_error(self, code: int, present: bool, now: float) -> None:
         """Report an error that is present at a time in [s], or clear one that is not."""
@@ -120,8 +125,16 @@ class EmcyProducer:
 
     def advance(self, now: float) -> None:
         """Send what the inhibit time held back."""
-        if now >= self.deadline:
+        if now >= self._repeat_at:
+            self._repeat_at = now + self._repeat_period
+            self._queue(self._last, now)
+        elif now >= self._flush_at:
             self._flush(now)
+
+    def repeat(self, period: float, now: float) -> None:
+        """Send the last EMCY of an error again and again from a time in [s] on; 0 ends that."""
+        self._repeat_period = period
+        self._repeat_at = now if period else NEVER
 
     def _update_register(self) -> None:
         value = 0
@@ -142,10 +155,10 @@ class EmcyProducer:
         self._flush(now)
 
     def _flush(self, now: float) -> None:
-        self.deadline = NEVER
+        self._flush_at = NEVER
         while self._pending and self._allowed:
             if now < self._next_time:
-                self.deadline = self._next_time
+                self._flush_at = self._next_time
                 return
             emergency = self._pending.popleft()
             if not self._cob_id.value & COB_ID_INVALID:

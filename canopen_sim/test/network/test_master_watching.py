@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import datetime, timezone
+import re
 
 from drive_samples import bus_config, drive_config, pdo, sdo_write, with_defaults
 import pytest
@@ -15,11 +16,13 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import CodecError
 from arm_canopen.master.emergency_log import EmergencyLog
-from arm_canopen.master.events import Severity
+from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.guarding import Guarding
 from arm_canopen.master.network import Network
+from arm_canopen.master.status import node_status
 from arm_canopen.standard.emcy import Emergency
 from arm_canopen.standard.time_of_day import decode_time_of_day, encode_time_of_day
+from canopen_sim.fault import Fault, FaultInjection
 
 GUARD_TIME = 0.05  # [s]
 
@@ -143,6 +146,68 @@ def test_the_last_emergencies_are_remembered() -> None:
     history = net.network.nodes['a'].emergencies.history
     assert [emergency.code for _, emergency in history] == [0x2310, 0x0000, 0x4310]
     assert [time - net.now for time, _ in history] == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize('code', [0x0000, 0x2310], ids='code before 0x{:04X}'.format)
+def test_a_flood_of_emergencies_is_reported_once_with_its_number(code: int) -> None:
+    """Others are reported at once meanwhile, and the same one again when the flood was over."""
+    net = VirtualNetwork(bus_config(drive_config('a', 2)))
+    net.boot()
+    device, node = net.devices['a'], net.network.nodes['a']
+    flood = FaultInjection(Fault.EMCY_FLOOD, delay=0.002)
+
+    def reported(severity: Severity) -> list[str]:
+        found = (event for event in net.events if event.kind is EventKind.EMERGENCY)
+        return [event.text for event in found if event.severity is severity]
+
+    device.faults.inject(flood, net.now)
+    net.run(5.0)
+    assert [text[:12] for text in reported(Severity.ERROR)] == ['EMCY: 0x1000']
+    assert device.drive is not None
+    device.drive.raise_fault(0x4310, net.now)
+    if code:
+        device.drive.raise_fault(code, net.now)
+    net.run(25.0)
+    others = ['EMCY: 0x4310', f'EMCY: 0x{code:04X}'] if code else ['EMCY: 0x4310']
+    assert [text[:12] for text in reported(Severity.ERROR)] == ['EMCY: 0x1000', *others]
+    counts = reported(Severity.WARNING)
+    assert len(counts) == 2, counts
+    assert re.match(r'EMCY: 5\d\d\d more in 10 s \(2\d\d\d x 0x\w{4} ', counts[0]), counts
+    assert len(node.emergencies.history) == 1 + len(others)
+    assert len(node_status(node, net.now).emergencies) == len(node.emergencies.history)
+
+    device.faults.end(net.now)
+    net.run(15.0)
+    last = reported(Severity.WARNING)[2:]
+    assert len(last) == 1
+    device.faults.inject(flood, net.now)
+    net.run(0.1)
+    assert len(reported(Severity.ERROR)) == 2 + len(others)
+
+
+def test_a_flood_that_alternates_or_counts_is_a_flood() -> None:
+    """An error that comes and goes, vendor bytes that differ each time, frames that are cut."""
+    reported: list[tuple[Severity, str]] = []
+    log = EmergencyLog(lambda _, severity, text: reported.append((severity, text)))
+    now = 100.0
+    for number in range(3000):
+        data = (
+            Emergency(0x8130, 0x11).encode(),
+            Emergency(0, 0).encode(),
+            Emergency(0xFF01, 0x81, number.to_bytes(5, 'little')).encode(),
+            b'\x01',
+        )[number % 4]
+        now += 0.01
+        log.receive(Frame(0x81, data, timestamp=now))
+        log.look(now)
+    counts = [text for _, text in reported if ' more in ' in text]
+    assert len(reported) == 8 + 2
+    assert len(counts) == 2
+    log.look(now + 10.0)
+    numbers = [int(text.split()[1]) for _, text in reported if ' more in ' in text]
+    assert sum(numbers) + len(reported) - len(numbers) == 3000
+    assert '0xFF01' in counts[0]
+    assert counts[0].endswith(', and others)')
 
 
 def test_a_pdo_of_another_length_is_reported_once() -> None:
