@@ -31,9 +31,20 @@ from .scene.allowed_collisions import AllowedCollisionMatrix
 from .scene.clearances import Clearances, Contact, LeastClearance, Proximity
 from .scene.default_collisions import with_default_collisions
 from .scene.objects import AttachedBody, CollisionObject
-from .scene.octomap import octomap_boxes, OCTOMAP_NAME
+from .scene.octomap import OCTOMAP_NAME, octomap_shapes
 from .scene.planning_scene import PlanningScene
-from .scene.shapes import Box, Capsule, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
+from .scene.shapes import (
+    Box,
+    Capsule,
+    Cells,
+    Cone,
+    Cylinder,
+    Mesh,
+    PlacedShape,
+    Plane,
+    Shape,
+    Sphere,
+)
 from .start_poses import pose_quality, start_pose
 from .state import RobotState
 
@@ -49,6 +60,7 @@ __all__ = [
     'AttachedBody',
     'Box',
     'Capsule',
+    'Cells',
     'Clearances',
     'CollisionObject',
     'CommandError',
@@ -86,7 +98,7 @@ __all__ = [
     'load_limits',
     'merge_limits',
     'names_of',
-    'octomap_boxes',
+    'octomap_shapes',
     'pose_quality',
     'rotation_of',
     'sample_link_pairs',

@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from functools import cache
+from itertools import product
 import json
 from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import Point, Pose, Quaternion
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from model_robots import chain
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene
@@ -20,13 +22,32 @@ from octomap_msgs.msg import OctomapWithPose
 import pytest
 from shape_msgs.msg import SolidPrimitive
 
-from arm_model import octomap_boxes, OCTOMAP_NAME, PlacedShape, SceneError
+from arm_model import (
+    Array,
+    AttachedBody,
+    Box,
+    Capsule,
+    Cells,
+    Clearances,
+    combined,
+    inverse,
+    Mesh,
+    OCTOMAP_NAME,
+    octomap_shapes,
+    PlacedShape,
+    SceneError,
+    Shape,
+    Sphere,
+)
+from arm_model import CollisionObject as Thing
 from arm_model import PlanningScene as Scene
+from arm_model import Pose as Placement
 from arm_model.ros import apply_attached_object, apply_collision_object, apply_planning_scene
-from arm_model.scene.octomap import merged
+from arm_model.scene.octomap import _blocks
 
 MODEL = chain('zyyp')
 AT = np.array([0.4, -0.3, 0.5, 0.1])
+CUBE = list(product((-0.05, 0.05), repeat=3))
 
 
 @cache
@@ -42,27 +63,68 @@ def stream(*, binary: bool) -> bytes:
     return base64.b64decode(written()['binary' if binary else 'full'])
 
 
-def edges(box: PlacedShape) -> Any:
-    """Return the edges of a box in [m]."""
-    shape: Any = box.shape
-    return np.array([shape.x, shape.y, shape.z])
-
-
 @pytest.mark.parametrize('binary', [True, False], ids=['binary', 'full'])
-def test_boxes_fill_what_octomap_has_occupied(binary: bool) -> None:
-    """Each leaf is in one box, and boxes hold no more than the leaves; they are fewer."""
-    resolution = written()['resolution']
-    boxes = octomap_boxes('OcTree', stream(binary=binary), resolution, binary=binary)
+def test_cells_are_what_octomap_has_occupied(binary: bool) -> None:
+    """Each leaf is in one cell, and cells hold no more than the leaves."""
+    data, resolution = stream(binary=binary), written()['resolution']
+    found = cells_of(octomap_shapes('OcTree', data, resolution, binary=binary))
     leaves = np.array(written()['leaves'])
-    for *middle, _edge in leaves.tolist():
-        inside = [
-            box
-            for box in boxes
-            if (np.abs(np.array(middle) - box.pose.position) < 0.5 * edges(box)).all()
-        ]
-        assert len(inside) == 1
-    assert sum(np.prod(edges(box)) for box in boxes) == pytest.approx((leaves[:, 3] ** 3).sum())
-    assert len(boxes) < len(leaves)
+    away = np.abs(leaves[:, None, :3] - found[:, :3]).max(axis=2)
+    assert ((away < 0.5 * found[:, 3]).sum(axis=1) == 1).all()
+    assert (found[:, 3] ** 3).sum() == pytest.approx((leaves[:, 3] ** 3).sum())
+
+
+def cells_of(shapes: Sequence[PlacedShape]) -> Array:
+    """Return middle and edge of each cell (n, 4) in [m]."""
+    rows = []
+    for each in shapes:
+        assert isinstance(each.shape, Cells)
+        rows += [[*middle, each.shape.edge] for middle in each.shape.middles.tolist()]
+    return np.array(rows, dtype=np.float64)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.sets(st.tuples(*[st.integers(-3, 3)] * 3), min_size=1, max_size=40),
+    st.sampled_from([Box(0.1, 0.2, 0.1), Sphere(0.1), Capsule(0.05, 0.2), Mesh(CUBE)]),
+    st.tuples(*[st.integers(-8, 8)] * 3),
+)
+def test_cells_count_as_boxes(
+    cells: set[tuple[int, int, int]], shape: Shape, place: tuple[int, int, int]
+) -> None:
+    """As near as the nearest; one that is only touched hides none that is overlapped."""
+    edge = 0.1
+    middles = edge * (np.array(sorted(cells)) + 0.5)
+    thing = Thing('thing', shape, pose=Placement(np.eye(3), 0.05 * np.array(place)))
+    boxes = [PlacedShape(Box(edge, edge, edge), Placement(np.eye(3), each)) for each in middles]
+    near = []
+    for parts in (boxes, [Cells(middles, edge)]):
+        world = Thing(OCTOMAP_NAME, *parts)
+        scene = MODEL.scene.with_object(world)
+        link = scene.kinematics.link_pose('link_4', AT)
+        held = thing.at(combined(inverse(link), thing.pose))
+        scene = scene.with_attached(AttachedBody(held, 'link_4'))
+        found = Clearances(scene).least(AT, np.inf)
+        both = {'thing', OCTOMAP_NAME}
+        pairs = [number for number, pair in enumerate(scene.pairs) if set(pair) == both]
+        near.append(found[pairs].min())
+    by_box, by_cell = near
+    if by_box > 1e-6:
+        assert by_cell == pytest.approx(by_box, abs=1e-5)
+    elif by_box < -1e-6:
+        assert by_cell < 0.0
+
+
+def test_a_large_map_is_taken() -> None:
+    """Of 20,000 cells that no larger ones join."""
+    side = np.arange(40)
+    grid = np.array([(x, y, z) for x in side for y in side for z in side if (x + y + z) % 3 == 0])
+    cubes = np.column_stack([grid + (1 << 15), np.ones(len(grid), dtype=int)])
+    blocks = list(_blocks(cubes, 0.02))
+    assert len(grid) > 20_000
+    assert sum(len(each.middles) for each in blocks) == len(grid)
+    scene = MODEL.scene.with_object(Thing(OCTOMAP_NAME, *blocks))
+    assert Clearances(scene).contacts(AT)
 
 
 @pytest.mark.parametrize('binary', [True, False], ids=['binary', 'full'])
@@ -71,11 +133,11 @@ def test_streams_that_are_cut_or_too_long_are_refused(binary: bool) -> None:
     data = stream(binary=binary)
     for length in range(1, len(data), 7):
         with pytest.raises(SceneError, match='data end within a node, at byte'):
-            octomap_boxes('OcTree', data[:length], 0.05, binary=binary)
+            octomap_shapes('OcTree', data[:length], 0.05, binary=binary)
     with pytest.raises(SceneError, match='the tree ends at byte'):
-        octomap_boxes('OcTree', data + b'\0', 0.05, binary=binary)
+        octomap_shapes('OcTree', data + b'\0', 0.05, binary=binary)
     with pytest.raises(SceneError, match='octomap'):
-        octomap_boxes('OcTree', data, 0.05, binary=not binary)
+        octomap_shapes('OcTree', data, 0.05, binary=not binary)
 
 
 @pytest.mark.parametrize(
@@ -91,48 +153,13 @@ def test_streams_that_are_cut_or_too_long_are_refused(binary: bool) -> None:
 def test_what_is_no_map_is_refused(kind: str, data: bytes, resolution: float, words: str) -> None:
     """With what is wrong and what to send."""
     with pytest.raises(SceneError, match=words):
-        octomap_boxes(kind, data, resolution, binary=True)
+        octomap_shapes(kind, data, resolution, binary=True)
 
 
 def test_a_cell_without_a_probability_is_refused() -> None:
     """NaN is neither free nor occupied."""
     with pytest.raises(SceneError, match='occupied by nan'):
-        octomap_boxes('OcTree', np.float32(np.nan).tobytes() + b'\0', 0.05, binary=False)
-
-
-@given(
-    st.sets(st.tuples(*[st.integers(0, 5)] * 3), max_size=80),
-    st.sets(st.tuples(*[st.integers(4, 7)] * 3), max_size=4),
-)
-def test_merging_neither_adds_nor_loses_a_cell(
-    cells: set[tuple[int, int, int]], large: set[tuple[int, int, int]]
-) -> None:
-    """Of cells, and of larger cubes among them."""
-    cubes = [(*cell, 1) for cell in cells]
-    cubes += [(4 * x, 4 * y, 4 * z, 4) for x, y, z in large]
-    wanted = {
-        (x + i, y + j, z + k)
-        for x, y, z, edge in cubes
-        for i in range(edge)
-        for j in range(edge)
-        for k in range(edge)
-    }
-    spans = merged(np.array(cubes, dtype=np.int64).reshape(-1, 4))
-    found = [
-        (x, y, z)
-        for (x0, y0, z0), (x1, y1, z1) in spans.tolist()
-        for x in range(x0, x1)
-        for y in range(y0, y1)
-        for z in range(z0, z1)
-    ]
-    assert len(found) == len(set(found))
-    assert set(found) == wanted
-
-
-def test_a_solid_block_is_one_box() -> None:
-    """Of leaves of different sizes too."""
-    cubes = [(0, 0, 0, 2), *((2, y, z, 1) for y in range(2) for z in range(2))]
-    assert merged(np.array(cubes)).tolist() == [[[0, 0, 0], [3, 2, 2]]]
+        octomap_shapes('OcTree', np.float32(np.nan).tobytes() + b'\0', 0.05, binary=False)
 
 
 def with_map(scene: Scene, message: OctomapWithPose, *, diff: bool = True) -> Scene:

@@ -22,6 +22,7 @@ from arm_model import (
     AttachedBody,
     Box,
     Capsule,
+    Cells,
     Clearances,
     CollisionObject,
     Cone,
@@ -394,6 +395,7 @@ def test_padding_is_the_same_in_every_direction_and_for_the_world_only(
         middle = shape.points.mean(axis=0)
         large: Shape = Mesh(middle + scale * (shape.points - middle))
     else:
+        assert not isinstance(shape, Plane | Cells)
         large = type(shape)(*(scale * length for length in astuple(shape)))
     scaled = CollisionObject('thing', large, pose=pose)
     larger = scene.with_contents(scale={'link_4': scale})

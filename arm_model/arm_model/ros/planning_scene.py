@@ -35,7 +35,7 @@ from ..exceptions import CommandError, LinkNameError, ObjectNameError, SceneErro
 from ..pose import combined, inverse, ORIGIN, Pose, rotation_of
 from ..scene.allowed_collisions import AllowedCollisionMatrix
 from ..scene.objects import AttachedBody, CollisionObject
-from ..scene.octomap import octomap_boxes, OCTOMAP_NAME
+from ..scene.octomap import OCTOMAP_NAME, octomap_shapes
 from ..scene.planning_scene import PlanningScene
 from ..scene.shapes import Box, Cone, Cylinder, Mesh, PlacedShape, Plane, Shape, Sphere
 from .numbers import xyz, xyzw
@@ -78,7 +78,7 @@ def apply_planning_scene(
 
     A whole scene replaces objects and attached bodies, a diff (``is_diff``) changes those that it
     names; so do padding and scale. A matrix without names leaves what may touch as it is. Joints
-    in the message count nowhere. An octomap is the object ``<octomap>``, made of boxes.
+    in the message count nowhere. An octomap is the object ``<octomap>``.
 
     Args:
         scene: The scene before.
@@ -258,13 +258,13 @@ class _Draft:
         self.objects.pop(OCTOMAP_NAME, None)
         if not tree.data:
             return
-        boxes = octomap_boxes(
+        cells = octomap_shapes(
             tree.id, tree.data.tobytes(), float(tree.resolution), binary=bool(tree.binary)
         )
-        if boxes:
+        if cells:
             frame = self._frame(OCTOMAP_NAME, message.header.frame_id)
             place = combined(frame, _pose(message.origin, OCTOMAP_NAME))
-            self.objects[OCTOMAP_NAME] = CollisionObject(OCTOMAP_NAME, *boxes, pose=place)
+            self.objects[OCTOMAP_NAME] = CollisionObject(OCTOMAP_NAME, *cells, pose=place)
 
     def apply(self, message: ObjectMessage) -> None:
         """Add, move, extend or remove an object of the world."""

@@ -13,6 +13,12 @@ import pinocchio as pin
 from ..arrays import Array, Native
 from .planning_scene import PlanningScene
 
+AT_ONCE = 100
+"""Pairs that are measured in one step: other threads wait for it, such as a control cycle."""
+
+TOUCH = 1e-9
+"""Depth of a contact with a cell of an octree whose depth is not known in [m]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proximity:
@@ -80,6 +86,7 @@ class Clearances:
         self._data = scene.kinematics.native.createData()
         self._results = scene.geometry.createData()
         self._found = list(self._results.distanceResults)  # they refer to it
+        self._of_cells = scene.of_cells.tolist()
         self._distances: Array = np.full(len(scene.pairs), -np.inf)
         self._places: Array = np.zeros_like(scene.distance_rate_bounds)
 
@@ -116,7 +123,12 @@ class Clearances:
             return bounds
         pairs = doubtful.tolist()
         found = self.measure(positions, pairs)
-        bounds[doubtful] = [found[pair].min_distance for pair in pairs]
+        of_cells = self._of_cells
+        bounds[doubtful] = [
+            # of an octree the first cell counts that is not apart, though it only touches
+            min(distance, -TOUCH) if of_cells[pair] and distance <= 0.0 else distance
+            for pair, distance in ((pair, found[pair].min_distance) for pair in pairs)
+        ]
         self._distances[doubtful] = bounds[doubtful]
         self._places[doubtful] = positions
         return bounds
@@ -136,7 +148,8 @@ class Clearances:
         expanded = self._kinematics.expanded(positions)
         pin.updateGeometryPlacements(native, self._data, geometry, results, expanded)
         found = self._found
-        if len(pairs) == len(found):  # all at once, which is quicker than one by one
+        # all at once, which is quicker than one by one; other threads wait meanwhile
+        if len(pairs) == len(found) <= AT_ONCE:
             pin.computeDistances(geometry, results)
         else:
             for pair in pairs:

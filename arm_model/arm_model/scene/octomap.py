@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Octrees as OctoMap serializes them, as few boxes.
+"""Octrees as OctoMap serializes them, as the cells that are occupied.
 
 A tree has 16 levels around the origin of the map; a leaf may be at any of them. The child with the
 number i of a node is on the positive side of x, y and z where bit 0, 1 and 2 of i are set.
@@ -16,17 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
-from itertools import permutations
 import math
 import struct
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import frozen
 from ..exceptions import SceneError
-from ..pose import ORIGIN, Pose
-from .shapes import Box, PlacedShape
+from .shapes import Cells, PlacedShape
 
 OCTOMAP_NAME = '<octomap>'
 """Name of the octomap among the objects of a scene, as in MoveIt."""
@@ -37,12 +34,12 @@ VALUES = {'OcTree': struct.Struct('<f'), 'ColorOcTree': struct.Struct('<f3x')}
 ROOT_SIZE = 1 << 16
 """Edge of the whole tree, in its smallest cells."""
 
-MAX_BOXES = 1_000
-"""How many boxes a map may have. pinocchio copies its table of pairs for each shape that is added
-to a scene: 1,000 boxes take single copies of 4 MB, beside a control cycle."""
+MAX_CELLS = 100_000
+"""How many occupied cells a map may have."""
 
-MAX_RUNS = 500_000
-"""Rows of smallest cells into which leaves are cut so that they join across their borders."""
+BLOCK = 128
+"""Cells of one shape, which lie together: each look at it takes some 20 us, so a control cycle
+waits for none."""
 
 MAX_DATA = 2_000_000
 """Bytes of a stream at most; a million nodes take about a second."""
@@ -52,15 +49,13 @@ OCCUPIED, INNER = 2, 3
 
 Cubes = NDArray[np.int64]
 """Least corner x, y, z and edge of cubes, in smallest cells (n, 4)."""
-Spans = NDArray[np.int64]
-"""Least and greatest corners of boxes, in smallest cells (n, 2, 3)."""
 
 
 @lru_cache(maxsize=4)
-def octomap_boxes(
+def octomap_shapes(
     kind: str, data: bytes, resolution: float, *, binary: bool
 ) -> tuple[PlacedShape, ...]:
-    """Return what is occupied in a map, as few boxes that do not overlap, in its frame.
+    """Return what is occupied in a map, as cells of one size that lie together, in its frame.
 
     Args:
         kind: Class of the tree.
@@ -82,69 +77,21 @@ def octomap_boxes(
         )
     leaves = _binary_leaves(data) if binary else _full_leaves(data, VALUES[kind])
     cubes: Cubes = np.array(list(leaves), dtype=np.int64).reshape(-1, 4)
-    spans = merged(cubes)
-    if len(spans) > MAX_BOXES:
+    if len(cubes) > MAX_CELLS:
         raise SceneError(
-            f'octomap: {len(spans)} boxes are left when its cells are joined, {MAX_BOXES} are'
-            ' looked at; send a coarser map, or what is in reach'
+            f'octomap: {len(cubes)} cells are occupied, {MAX_CELLS} are looked at; send a coarser'
+            ' map, or what is in reach'
         )
-    return tuple(_placed(span, resolution) for span in spans)
+    return tuple(PlacedShape(each) for each in _blocks(cubes, resolution))
 
 
-def merged(cubes: Cubes) -> Spans:
-    """Return boxes that fill the same space as cubes which do not overlap; few of them.
-
-    Rows of cells become rectangles, these become boxes; the order of the axes that gives the
-    fewest counts.
-
-    Args:
-        cubes: The cubes.
-    """
-    if not len(cubes):
-        return np.empty((0, 2, 3), dtype=np.int64)
-    found = (_joined(_rows(cubes, order[0]), order) for order in permutations(range(3)))
-    return min(found, key=len)
-
-
-def _rows(cubes: Cubes, axis: int) -> Spans:
-    """Cut cubes into rows of smallest cells along an axis, where these are not too many."""
-    corner, edge = cubes[:, :3], cubes[:, 3]
-    if int((edge * edge).sum()) > MAX_RUNS:
-        return np.stack([corner, corner + edge[:, None]], axis=1)
-    counts = edge * edge
-    owner = np.repeat(np.arange(len(cubes)), counts)
-    number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-    lower = corner[owner].copy()
-    first, second = (each for each in range(3) if each != axis)
-    lower[:, first] += number // edge[owner]
-    lower[:, second] += number % edge[owner]
-    upper = lower + 1
-    upper[:, axis] = lower[:, axis] + edge[owner]
-    return np.stack([lower, upper], axis=1)
-
-
-def _joined(spans: Spans, order: tuple[int, ...]) -> Spans:
-    """Join boxes that touch with a whole face, along one axis after the other."""
-    for axis in order:
-        others = [each for each in range(3) if each != axis]
-        across = spans[:, :, others].reshape(len(spans), 4)
-        along = np.lexsort((spans[:, 0, axis], *across.T))
-        spans, across = spans[along], across[along]
-        goes_on = (across[1:] == across[:-1]).all(axis=1)
-        goes_on &= spans[1:, 0, axis] == spans[:-1, 1, axis]
-        starts = np.flatnonzero(np.concatenate([[True], ~goes_on]))
-        ends = np.append(starts[1:], len(spans)) - 1
-        upper = spans[ends, 1, axis]
-        spans = spans[starts]
-        spans[:, 1, axis] = upper
-    return spans
-
-
-def _placed(span: Spans, resolution: float) -> PlacedShape:
-    lower, upper = (span - ROOT_SIZE // 2) * resolution
-    return PlacedShape(
-        Box(*(upper - lower).tolist()), Pose(ORIGIN.rotation, frozen(0.5 * (lower + upper)))
-    )
+def _blocks(cubes: Cubes, resolution: float) -> Iterator[Cells]:
+    """Yield cubes of the same edge, some at a time in the order of the tree."""
+    for edge in np.unique(cubes[:, 3]).tolist():
+        corners = cubes[cubes[:, 3] == edge, :3]
+        middles = (corners - ROOT_SIZE // 2 + 0.5 * edge) * resolution
+        for begin in range(0, len(middles), BLOCK):
+            yield Cells(middles[begin : begin + BLOCK], edge * resolution)
 
 
 def _child(x: int, y: int, z: int, edge: int, number: int) -> tuple[int, int, int, int]:
@@ -200,6 +147,8 @@ def _full_leaves(data: bytes, value: struct.Struct) -> Iterator[tuple[int, int, 
         place += value.size + 1
         if children:
             waiting += (_child(*cube, each) for each in range(7, -1, -1) if children >> each & 1)
+        elif log_odds >= 0.0 and cube[3] == ROOT_SIZE:
+            yield from (_child(*cube, number) for number in range(8))
         elif log_odds >= 0.0:
             yield cube
     _require_end(place, len(data))

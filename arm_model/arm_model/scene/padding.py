@@ -9,7 +9,7 @@ from functools import lru_cache
 
 from ..arrays import Native
 from ..exceptions import SceneError
-from .shapes import Mesh, native, Plane, Shape
+from .shapes import Cells, Mesh, native, Plane, Shape
 
 
 @lru_cache(maxsize=1024)
@@ -43,4 +43,6 @@ def _scaled(shape: Shape, scale: float) -> Shape:
     if isinstance(shape, Mesh):  # a hull of its own, also where the scale is 1
         middle = shape.points.mean(axis=0)
         return Mesh(middle + scale * (shape.points - middle))
-    return shape if isinstance(shape, Plane) else type(shape)(*(scale * e for e in astuple(shape)))
+    if isinstance(shape, Plane | Cells):  # which links do not have
+        return shape
+    return type(shape)(*(scale * length for length in astuple(shape)))

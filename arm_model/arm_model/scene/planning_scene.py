@@ -10,10 +10,11 @@ from fnmatch import fnmatchcase
 from itertools import combinations, product
 from types import MappingProxyType
 
+import coal
 import numpy as np
 import pinocchio as pin
 
-from ..arrays import Array, Native
+from ..arrays import Array, Mask, Native
 from ..exceptions import LinkNameError, ObjectNameError, SceneError
 from ..kinematics import Kinematics
 from ..pose import combined, inverse, Pose
@@ -74,6 +75,7 @@ class PlanningScene:
         scale: The same of factors of their lengths.
         geometry: All shapes and their pairs, for pinocchio.
         pairs: Names of the link or object of each pair of shapes that is checked (k).
+        of_cells: Mask of the pairs in which one shape is of an octree (k).
         relative_motion_sign: Sense in which each column of the kinematics moves the second shape
             of a pair against the first (k, columns): 1, -1, or 0.
         distance_rate_bounds: How fast each joint changes a pair's distance at most (k, n) in
@@ -127,7 +129,11 @@ class PlanningScene:
             (bodies[first].name, bodies[second].name) for first, second in pairs
         )
         self.relative_motion_sign, self.distance_rate_bounds = self._bounds(bodies, extents, pairs)
-        for array in (self.relative_motion_sign, self.distance_rate_bounds):
+        solids = [each.geometry for each in self.geometry.geometryObjects]
+        self.of_cells: Mask = np.array(
+            [any(isinstance(solids[each], coal.OcTree) for each in pair) for pair in pairs], bool
+        )
+        for array in (self.relative_motion_sign, self.distance_rate_bounds, self.of_cells):
             array.setflags(write=False)
 
     @property

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes that may collide; all of them convex, so that their distances are quick and exact."""
+"""Shapes that may collide; all but the cells of octrees convex: their distances are exact."""
 
 from __future__ import annotations
 
@@ -108,7 +108,37 @@ class Mesh:
         return hash(self.points.tobytes())
 
 
-Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Mesh
+class Cells:
+    """Cubes of an octree that have one size.
+
+    Attributes:
+        middles: Their middles (m, 3) in [m], on the grid of their edge about the origin.
+        edge: Their edge in [m].
+        tree: The shape of coal, shared by all scenes.
+    """
+
+    __slots__ = ('edge', 'middles', 'tree')
+
+    def __init__(self, middles: Array, edge: float) -> None:
+        """Make the tree."""
+        self.middles, self.edge = frozen(middles), edge
+        self.tree = coal.makeOctree(np.asarray(middles, dtype=np.float64), edge)
+        self.tree.computeLocalAABB()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it has the same cubes."""
+        return (
+            isinstance(other, Cells)
+            and self.edge == other.edge
+            and np.array_equal(self.middles, other.middles)
+        )
+
+    def __hash__(self) -> int:
+        """Return the hash of the middles."""
+        return hash(self.middles.tobytes())
+
+
+Shape = Box | Sphere | Cylinder | Capsule | Cone | Plane | Mesh | Cells
 """What a link or an object may be made of."""
 
 
@@ -128,6 +158,8 @@ def native(shape: Shape) -> Native:
     """
     if isinstance(shape, Mesh):
         return shape.hull
+    if isinstance(shape, Cells):
+        return shape.tree
     solid = _half_space(shape) if isinstance(shape, Plane) else _primitive(shape)
     solid.computeLocalAABB()
     return solid
