@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import resource
 import tempfile
+from typing import Any
 
 from hypothesis import given, settings, strategies
 from mcap.reader import make_reader
@@ -183,7 +184,7 @@ def test_metadata_before_version_5(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('options', [{}, {'repeat_channels': False}, {'use_chunking': False}])
-def test_files_of_other_writers(options: dict[str, bool], tmp_path: Path) -> None:
+def test_files_of_other_writers(options: dict[str, Any], tmp_path: Path) -> None:
     """With an index, with one that names no channel, and with none; the first is read by it."""
     path = tmp_path / 'other_0.mcap'
     with path.open('wb') as stream:
@@ -194,7 +195,7 @@ def test_files_of_other_writers(options: dict[str, bool], tmp_path: Path) -> Non
         for number in range(20):
             each = message(number)
             writer.add_message(channel, each.log_time, each.data, each.publish_time, each.sequence)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     assert list(BagReader(path).messages()) == [message(number) for number in range(20)]
     with path.open('rb') as stream:
         assert has_index(stream) == (not options)
