@@ -9,6 +9,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from moveit_msgs.srv import GetCartesianPath, GetPositionIK
+import numpy as np
 from rclpy.node import Node
 
 from arm_model import Array, CommandError, PlanningScene, RobotModel
@@ -152,7 +153,7 @@ class GroupKinematics:
             positions: Positions of all joints of the robot in [rad], where it begins.
 
         Raises:
-            PlanningError: The request is refused, or the path between its places is not valid.
+            PlanningError: The request is refused.
         """
         model = self._robot.model_at(request.group_name, positions)
         reader = RequestReader(model, snapshot, positions)
@@ -179,13 +180,17 @@ class GroupKinematics:
             scene=scene,
             is_valid=None if check is None else lambda state: not check.violated(state),
         )
-        path = self._timed(request, model, found.positions, scene)
+        path, rows, reason = self._timed(request, model, found.positions, scene)
+        steps = max(len(found.positions) - 1, 1)
+        fraction = found.fraction if rows == steps + 1 else found.fraction * (rows - 1) / steps
         start = state_message(self._robot.joints, positions, snapshot.root)
         response = GetCartesianPath.Response(
             start_state=start,
             solution=trajectory_message(model.joints, path, snapshot.root),
-            fraction=found.fraction,
-            error_code=error_code(reason=found.reason),
+            fraction=fraction,
+            error_code=error_code(
+                reason=f'the path ends at {fraction:.1%}: {reason}' if reason else found.reason
+            ),
         )
         return response, start
 
@@ -195,11 +200,16 @@ class GroupKinematics:
         model: RobotModel,
         rows: Array,
         scene: PlanningScene | None,
-    ) -> Path:
+    ) -> tuple[Path, int, str]:
         """Return the path through joint positions as fast as a request allows.
 
+        It ends in front of what is not valid between two of them.
+
+        Returns:
+            The path, how many of the positions it leads through, and why no more.
+
         Raises:
-            PlanningError: A factor or speed is refused, or it is not valid between the positions.
+            PlanningError: A factor or speed is refused.
         """
         limits = scaled(
             model.limits,
@@ -212,16 +222,15 @@ class GroupKinematics:
                 self._settings.acceleration_scaling,
             ),
         )
-        path = timed_rows(rows, limits)
-        violation = None if scene is None else ValidityCheck(limits, scene).path(path)
-        if violation is not None:
-            raise PlanningError(
-                PlanningCode.INVALID_MOTION_PLAN,
-                f'between two places of the path {violation.reason}; take a smaller max_step, or'
-                ' keep farther away',
-            )
+        path, reason = timed_rows(rows, limits), ''
+        check = None if scene is None else ValidityCheck(limits, scene)
+        while check is not None and len(rows) > 1 and (near := check.path(path)) is not None:
+            nearest = int(np.abs(rows - near.positions).max(axis=1).argmin())
+            rows = rows[: max(min(nearest, len(rows) - 1), 1)]
+            path, reason = timed_rows(rows, limits), f'between two places {near.reason}'
         link = LinkKinematics(model, request.cartesian_speed_limited_link)
-        return speed_limited(path, link, max(request.max_cartesian_speed, 0.0))[0]
+        path, _ = speed_limited(path, link, max(request.max_cartesian_speed, 0.0))
+        return path, len(rows), reason
 
     def _solver(self, model: RobotModel, link: str) -> IkSolver:
         key = model.group, link
