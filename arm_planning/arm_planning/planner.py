@@ -56,6 +56,9 @@ GOAL_SAMPLES = 60
 IK_SOLUTIONS = 4
 """Solutions of inverse kinematics that are goals of a free motion at most."""
 
+CANCELED = 'canceled while it was planned'
+"""Why a plan was not found."""
+
 DEFAULT_PLANNER = FREE_MOTION[0]
 """What plans a request without a planner_id."""
 
@@ -84,12 +87,18 @@ class Planner:
         self._solvers: dict[str, IkSolver] = {}
         self._check: ValidityCheck | None = None
 
-    def plan(self, request: MotionRequest, scene: PlanningScene | None = None) -> MotionPlan:
+    def plan(
+        self,
+        request: MotionRequest,
+        scene: PlanningScene | None = None,
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> MotionPlan:
         """Return a motion that is valid everywhere.
 
         Args:
             request: What is asked for.
             scene: What may collide; by default that of the model.
+            is_canceled: Whether the plan is wanted no more; a search ends at once then.
 
         Raises:
             PlanningError: The request is refused, or no motion was found in time.
@@ -100,7 +109,7 @@ class Planner:
         if request.planner_id in PLANNER_IDS:
             plan = self._industrial.plan(request, self._checked_in(scene))
         else:
-            plan = self._free_motion(request, scene, began + request.timeout)
+            plan = self._free_motion(request, scene, began + request.timeout, is_canceled)
         return replace(plan, planning_time=self._clock() - began)
 
     def plan_sequence(
@@ -183,11 +192,20 @@ class Planner:
         return self._model.kinematics.link_pose(link or self._model.tip, state)
 
     def _free_motion(
-        self, request: MotionRequest, scene: PlanningScene, deadline: float
+        self,
+        request: MotionRequest,
+        scene: PlanningScene,
+        deadline: float,
+        is_canceled: Callable[[], bool],
     ) -> MotionPlan:
-        """Return the quickest of the free motions that are found in as many attempts."""
+        """Return the quickest of the free motions that are found in as many attempts.
+
+        Constraints make a search so slow that the first one counts.
+        """
 
         def expired() -> bool:
+            if is_canceled():
+                raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
             return self._clock() > deadline
 
         check = self._checked_in(scene)
@@ -204,7 +222,7 @@ class Planner:
         free = FreeMotion(limits, check, self._draw, constraints)
         paths = [free.plan(start, goals, expired)]
         with suppress(PlanningError):  # no time is left for further attempts
-            while len(paths) < request.attempts:
+            while constraints is None and len(paths) < request.attempts:
                 paths.append(free.plan(start, goals, expired))
         notes: tuple[str, ...] = ()
         if request.max_cartesian_speed:

@@ -171,15 +171,21 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
     assert (answer.error_code.val, answer.fraction) == (SUCCESS, 1.0), answer.error_code
     assert list(answer.start_state.joint_state.position)[:7] == pytest.approx(at(rig))
-    # a post that stands between two steps of the hand
+
+
+def test_a_cartesian_path_ends_in_front_of_what_stands_between_its_places(
+    rig: MoveGroupRig,
+) -> None:
+    """A post between two steps of the hand."""
     ahead = tip(rig)
     post = box('post', ahead.position.x + 0.15, 0.0, ahead.position.z, edge=0.06)
     change = PlanningScene(is_diff=True)
     change.robot_state.is_diff, change.world.collision_objects = True, [post]
     apply = ApplyPlanningScene.Request(scene=change)
     assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
-    asked.max_step, asked.waypoints[0] = 0.5, ahead
     ahead.position.x += 0.3
+    asked = GetCartesianPath.Request(group_name='panda_arm', link_name=HAND, waypoints=[ahead])
+    asked.header.frame_id, asked.avoid_collisions, asked.max_step = BASE, True, 0.5
     answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
     assert answer.error_code.val == SUCCESS, answer.error_code
     assert answer.fraction == 0.0  # of one step

@@ -10,6 +10,7 @@ from pathlib import Path
 import re
 from typing import Any
 
+from action_msgs.msg import GoalStatus
 from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Pose as PoseMessage
 from isolation import Isolation, reserve
@@ -25,10 +26,18 @@ from move_group_rig import (
     READY,
 )
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
-from moveit_msgs.msg import MoveItErrorCodes
-from moveit_msgs.srv import GetPlannerParams, GetPositionFK, QueryPlannerInterfaces
+from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetMotionPlan,
+    GetPlannerParams,
+    GetPositionFK,
+    QueryPlannerInterfaces,
+)
+from planning_messages import box, pose_at
 from processes import executable, RunningProcess
 import pytest
+from shape_msgs.msg import SolidPrimitive
 
 from arm_model.ros import seconds
 from arm_planning import ConfigError
@@ -319,6 +328,46 @@ def test_a_speed_override_gives_an_execution_more_time(panda: MoveGroupRig) -> N
     assert result.result().result.error_code.val == MoveItErrorCodes.TIMED_OUT
     panda.client.node.destroy_timer(timer)
     server.destroy()
+
+
+def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGroupRig) -> None:
+    """A goal behind a wall, for which a minute is allowed."""
+    wall = box('wall', 0.0, 0.0, 0.0)
+    wall.primitives = [
+        SolidPrimitive(type=SolidPrimitive.BOX, dimensions=size)
+        for size in ([1.1, 0.02, 1.0], [1.1, 0.02, 1.0], [2.5, 2.5, 0.02])
+    ]
+    wall.primitive_poses = [
+        pose_at(0.69, 0.0, 0.5),
+        pose_at(-0.7, 0.0, 0.5),
+        pose_at(0.0, 0.0, 0.8),
+    ]
+    change = ApplyPlanningScene.Request(scene=PlanningScene(is_diff=True))
+    change.scene.robot_state.is_diff = True
+    change.scene.world.collision_objects = [wall]
+    call = panda.client.call
+    panda.positions |= dict(zip(JOINTS, [1.2, *READY[1:]], strict=True))
+    panda.settle()
+    assert call(ApplyPlanningScene, '/apply_planning_scene', change).success
+    request = motion_request(joint_goal([-1.2, *READY[1:]]))
+    request.allowed_planning_time = 60.0
+    goal = action_goal(request, plan_only=True)
+    handle = panda.send(MoveGroup, '/move_action', goal)
+    result = handle.get_result_async()
+    hand = motion_request(joint_goal([0.02], ['panda_finger_joint1']), 'hand')
+    asked = GetMotionPlan.Request(motion_plan_request=hand)
+    plan = panda.client.call_async(GetMotionPlan, '/plan_kinematic_path', asked)
+    panda.client.spin_until(plan.done, 20.0, 'plan of the hand')
+    assert plan.result().motion_plan_response.error_code.val == MoveItErrorCodes.SUCCESS
+    assert not result.done(), result.result().result.error_code
+    handle.cancel_goal_async()
+    panda.client.spin_until(result.done, 20.0, 'result')
+    assert result.result().status == GoalStatus.STATUS_CANCELED
+    assert result.result().result.error_code.val == MoveItErrorCodes.PREEMPTED
+    wall.operation = CollisionObject.REMOVE
+    assert call(ApplyPlanningScene, '/apply_planning_scene', change).success
+    panda.positions |= dict(zip(JOINTS, READY, strict=True))
+    panda.settle()
 
 
 def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:

@@ -154,6 +154,20 @@ def test_it_is_the_constraint_that_keeps_the_cup_level() -> None:
     assert check.path(path) is not None
 
 
+def test_under_constraints_the_first_path_counts() -> None:
+    """Further attempts would take as long each, until the time is over."""
+    model = robot('panda')
+    constraints = level(model)
+    start, goal = ends(model, ConstraintCheck(model, constraints), Planner(model), seed=0)
+    asked = MotionRequest(start, [JointGoal(goal)], timeout=TIMEOUT, constraints=constraints)
+    scene = with_random_boxes(model, 5, 0)
+    first, second = (
+        Planner(model).plan(replace(asked, attempts=count), scene).path.duration
+        for count in (1, 5)
+    )
+    assert first == second
+
+
 def test_a_pose_is_reached_by_a_solution_that_heeds_the_constraints() -> None:
     """Of the solutions of inverse kinematics those that do not are no goals."""
     model = robot('gp110')

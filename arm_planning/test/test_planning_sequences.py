@@ -23,7 +23,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from arm_planning import PlanningCode, PlanningError
-from arm_planning.ros.planning import PlannedMotion, PlanningThread
+from arm_planning.ros.planning import PlannedMotion, PlanningThreads
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_monitor import SceneMonitor
 from arm_planning.ros.sequence_request import group_runs
@@ -64,16 +64,16 @@ def right(place: float, **fields: Any) -> Any:
 
 
 @pytest.fixture(name='thread')
-def make_thread(monkeypatch: pytest.MonkeyPatch) -> PlanningThread:
+def make_thread(monkeypatch: pytest.MonkeyPatch) -> PlanningThreads:
     """Return what plans for two arms, which stand still."""
     monkeypatch.setattr(SceneMonitor, '_publish', lambda _self: None)
     node: Any = QuietNode()
     monitor = SceneMonitor(node, RobotGroups(*two_arms_texts()))
     monitor._take_joints(JointState(name=list(STANDING), position=list(STANDING.values())))
-    return PlanningThread(node, monitor, node, RobotGroups(*two_arms_texts()))
+    return PlanningThreads(node, monitor, node, lambda: RobotGroups(*two_arms_texts()))
 
 
-def planned(thread: PlanningThread, *items: Any) -> PlannedMotion:
+def planned(thread: PlanningThreads, *items: Any) -> PlannedMotion:
     """Plan a sequence."""
     return thread.prepare_sequence(items)()
 
@@ -89,7 +89,7 @@ def test_runs_are_the_items_in_order(groups: list[str]) -> None:
     assert all(a != b for a, b in pairwise(names))
 
 
-def test_one_trajectory_for_each_change_of_the_group(thread: PlanningThread) -> None:
+def test_one_trajectory_for_each_change_of_the_group(thread: PlanningThreads) -> None:
     """Each begins where its group ended, and only the joints of its group are in it."""
     plan = planned(thread, left(0.3), left(0.5), right(0.4), left(0.1))
     first, second, third = (each.joint_trajectory for each in plan.trajectories)
@@ -105,7 +105,7 @@ def test_one_trajectory_for_each_change_of_the_group(thread: PlanningThread) -> 
     assert places == pytest.approx(STANDING)
 
 
-def test_each_group_may_have_a_start(thread: PlanningThread) -> None:
+def test_each_group_may_have_a_start(thread: PlanningThreads) -> None:
     """The joints that it leaves out are where they are."""
     start = {'right_1': 0.2}
     plan = planned(thread, with_start(left(0.3), {'left_1': 0.1}), with_start(right(0.4), start))
@@ -114,12 +114,12 @@ def test_each_group_may_have_a_start(thread: PlanningThread) -> None:
     assert list(second) == [0.2, 1.0]
 
 
-def test_no_items_are_no_motion(thread: PlanningThread) -> None:
+def test_no_items_are_no_motion(thread: PlanningThreads) -> None:
     """As in MoveIt, which has no objection."""
     assert planned(thread).trajectories == []
 
 
-def test_a_sequence_heeds_path_constraints(thread: PlanningThread) -> None:
+def test_a_sequence_heeds_path_constraints(thread: PlanningThreads) -> None:
     """Of its messages, of which each is looked at for its own motion."""
     limited = left(0.5)
     bounds = JointConstraint(
@@ -132,7 +132,7 @@ def test_a_sequence_heeds_path_constraints(thread: PlanningThread) -> None:
     assert caught.value.code is PlanningCode.INVALID_MOTION_PLAN
 
 
-def test_what_is_refused(thread: PlanningThread) -> None:
+def test_what_is_refused(thread: PlanningThreads) -> None:
     """With the number of the item, before anything is planned."""
     attached = right(0.1)
     attached.req.start_state.attached_collision_objects = [AttachedCollisionObject()]

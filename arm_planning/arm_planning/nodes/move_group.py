@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 import sys
 import threading
@@ -41,7 +42,7 @@ from ..ros.parameters import (
 )
 from ..ros.path_watch import PathWatch
 from ..ros.planner_queries import PlannerQueries
-from ..ros.planning import PlanningThread
+from ..ros.planning import PlanningThreads
 from ..ros.robot_groups import RobotGroups
 from ..ros.scene_monitor import SceneMonitor
 from ..ros.state_services import StateServices
@@ -126,11 +127,11 @@ class MoveGroup(Node):
         PathWatch(monitor, execution, self._watch)
         ExecuteAction(self, execution)
         self._planning = Background(self, 'planning')
-        planning = PlanningThread(
+        planning = PlanningThreads(
             self,
             monitor,
             self._planning,
-            _robot(description),
+            partial(_robot, description),
             settings=settings,
             cartesian_limits=given.cartesian_limits,
         )

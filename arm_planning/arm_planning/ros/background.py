@@ -42,26 +42,39 @@ def as_refusal(error: BaseException) -> PlanningError:
 
 
 class Background:
-    """One thread beside the executor of a node; work is done in turn."""
+    """Threads beside the executor of a node, one for each lane; in a lane work is done in turn.
+
+    Attributes:
+        is_closing: Whether the node ends; work that takes long ends early then.
+    """
 
     def __init__(self, node: Node, name: str) -> None:
         """Start no thread before there is work.
 
         Args:
             node: The node.
-            name: Name of the thread.
+            name: Name of the threads.
         """
-        self._node = node
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix=name)
+        self._node, self._name = node, name
+        self._pools: dict[str, ThreadPoolExecutor] = {}
+        self.is_closing = False
 
-    def submit(self, work: Callable[[], Any], then: Callable[[Future[Any]], None]) -> Future[Any]:
+    def _lane(self, name: str) -> ThreadPoolExecutor:
+        if name not in self._pools:
+            self._pools[name] = ThreadPoolExecutor(1, thread_name_prefix=self._name)
+        return self._pools[name]
+
+    def submit(
+        self, work: Callable[[], Any], then: Callable[[Future[Any]], None], lane: str = ''
+    ) -> Future[Any]:
         """Have work done, and what follows from it in the executor of the node.
 
         Args:
             work: What is done in the thread.
             then: Gets the future of the work when that is done or cancelled.
+            lane: Work of other lanes is not waited for.
         """
-        future = self._pool.submit(work)
+        future = self._lane(lane).submit(work)
 
         def hand_over(done: Future[Any]) -> None:
             executor = self._node.executor
@@ -77,6 +90,7 @@ class Background:
         name: str,
         begin: Callable[[Any], Callable[[], Any]],
         refuse: Callable[[Any, PlanningError], None],
+        lane: Callable[[Any], str] = lambda _: '',
     ) -> None:
         """Offer a service whose answers are made in the thread.
 
@@ -85,6 +99,7 @@ class Background:
             name: Its name.
             begin: Called in the executor with the request; returns what makes the response.
             refuse: Fills the response of a request that is refused.
+            lane: Returns the lane of a request that was begun.
         """
 
         def respond(response: Any, outcome: Future[Any]) -> Any:  # noqa: ANN401
@@ -96,10 +111,14 @@ class Background:
             self._node.get_logger().warning(f'{name} refused: {refusal}')
             return response
 
-        create_deferred_service(
-            self._node, kind, name, lambda request: self._pool.submit(begin(request)), respond
-        )
+        def submit(request: Any) -> Future[Any]:  # noqa: ANN401
+            work = begin(request)  # or it is refused, and has no lane
+            return self._lane(lane(request)).submit(work)
+
+        create_deferred_service(self._node, kind, name, submit, respond)
 
     def close(self) -> None:
         """Drop what has not begun, and wait for what has."""
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        self.is_closing = True
+        for pool in self._pools.values():
+            pool.shutdown(wait=True, cancel_futures=True)

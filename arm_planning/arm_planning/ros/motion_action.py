@@ -18,10 +18,11 @@ from rclpy.timer import Timer
 from node_runner.action_goals import serve_goals
 
 from ..exceptions import PlanningCode, PlanningError
+from ..planner import CANCELED
 from .background import as_refusal, Background, error_code
 from .execute_action import conclude
 from .execution import Execution, INVALIDATED, TrajectoryExecution
-from .planning import PlannedMotion, PlanningThread, sequence_response
+from .planning import PlannedMotion, PlanningThreads, sequence_group, sequence_response
 
 REPLAN_ATTEMPTS = 5
 """How often a goal that does not say so is planned anew at most, as in MoveIt."""
@@ -30,7 +31,7 @@ STATE_WAITS, STATE_PERIOD = 10, 0.1
 looks in [s]; MoveIt waits for a second, too."""
 
 
-Prepare = Callable[[Any, bool], Callable[[], PlannedMotion]]
+Prepare = Callable[[Any, bool, Callable[[], bool]], Callable[[], PlannedMotion]]
 Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
 
 
@@ -41,24 +42,34 @@ class MotionKind:
     Attributes:
         action: Its class.
         name: Its name.
-        prepare: Takes what a goal asks for and whether it is planned anew, and returns what plans
-            it in the thread of planning; raises PlanningError.
+        prepare: Takes what a goal asks for, whether it is planned anew, and what says that it is
+            canceled; returns what plans it in the thread of its group; raises PlanningError.
+        group: Returns the group of what a goal asks for.
         answer: Makes the result of how it ended, the plan, and whether that was begun.
     """
 
     action: Any
     name: str
     prepare: Prepare
+    group: Callable[[Any], str]
     answer: Answer
 
 
-def single_motion(planning: PlanningThread) -> MotionKind:
+def single_motion(planning: PlanningThreads) -> MotionKind:
     """Return move_action: a motion of MoveGroupInterface::plan and ::move."""
 
-    def prepare(asked: Any, again: bool) -> Callable[[], PlannedMotion]:  # noqa: ANN401
+    def prepare(
+        asked: Any,  # noqa: ANN401
+        again: bool,
+        is_canceled: Callable[[], bool],
+    ) -> Callable[[], PlannedMotion]:
         if again:  # from where it has stopped
             asked.request.start_state = RobotState(is_diff=True)
-        return planning.prepare(asked.request, asked.planning_options.planning_scene_diff)
+        diff = asked.planning_options.planning_scene_diff
+        return planning.prepare(asked.request, diff, is_canceled)
+
+    def group(asked: Any) -> str:  # noqa: ANN401
+        return str(asked.request.group_name)
 
     def answer(code: MoveItErrorCodes, planned: PlannedMotion | None, begun: bool) -> Any:  # noqa: ANN401
         result = MoveGroup.Result(error_code=code)
@@ -70,25 +81,32 @@ def single_motion(planning: PlanningThread) -> MotionKind:
                 result.executed_trajectory = result.planned_trajectory
         return result
 
-    return MotionKind(MoveGroup, 'move_action', prepare, answer)
+    return MotionKind(MoveGroup, 'move_action', prepare, group, answer)
 
 
-def sequence(planning: PlanningThread) -> MotionKind:
+def sequence(planning: PlanningThreads) -> MotionKind:
     """Return sequence_move_group, of Pilz' planner."""
 
-    def prepare(asked: Any, _: bool) -> Callable[[], PlannedMotion]:  # noqa: ANN401
+    def prepare(
+        asked: Any,  # noqa: ANN401
+        _: bool,
+        is_canceled: Callable[[], bool],
+    ) -> Callable[[], PlannedMotion]:
         if asked.planning_options.replan:
             raise PlanningError(
                 PlanningCode.PLANNING_FAILED,
                 'planning_options.replan: a sequence is not planned anew; leave it out',
             )
         diff = asked.planning_options.planning_scene_diff
-        return planning.prepare_sequence(asked.request.items, diff)
+        return planning.prepare_sequence(asked.request.items, diff, is_canceled)
+
+    def group(asked: Any) -> str:  # noqa: ANN401
+        return sequence_group(asked.request.items)
 
     def answer(code: MoveItErrorCodes, planned: PlannedMotion | None, _: bool) -> Any:  # noqa: ANN401
         return MoveGroupSequence.Result(response=sequence_response(code, planned))
 
-    return MotionKind(MoveGroupSequence, 'sequence_move_group', prepare, answer)
+    return MotionKind(MoveGroupSequence, 'sequence_move_group', prepare, group, answer)
 
 
 @dataclass(slots=True, eq=False)
@@ -110,13 +128,13 @@ class _Goal:
 
 
 class MotionAction:
-    """Plans in the thread of planning; executes beside other goals whose joints are others."""
+    """Plans in the thread of a group; executes beside other goals whose joints are others."""
 
     def __init__(
         self,
         node: Node,
         kind: MotionKind,
-        planning: PlanningThread,
+        planning: PlanningThreads,
         background: Background,
         execution: TrajectoryExecution,
     ) -> None:
@@ -126,7 +144,7 @@ class MotionAction:
             node: The node.
             kind: The action.
             planning: What shows plans.
-            background: The thread of planning.
+            background: The threads of planning.
             execution: What executes.
         """
         self._node, self._kind, self._planning = node, kind, planning
@@ -152,7 +170,9 @@ class MotionAction:
 
     def _plan(self, goal: _Goal) -> None:
         try:
-            work = self._kind.prepare(goal.handle.request, goal.replans > 0)
+            work = self._kind.prepare(
+                goal.handle.request, goal.replans > 0, lambda: goal.is_canceled
+            )
         except PlanningError as error:
             is_stale = error.code is PlanningCode.ROBOT_STATE_STALE
             if is_stale and goal.state_waits < STATE_WAITS:
@@ -161,7 +181,8 @@ class MotionAction:
             else:
                 self._refuse(goal, error)
             return
-        goal.work = self._background.submit(work, lambda done: self._planned(goal, done))
+        lane = self._kind.group(goal.handle.request)
+        goal.work = self._background.submit(work, lambda done: self._planned(goal, done), lane)
 
     def _refuse(self, goal: _Goal, refusal: PlanningError) -> None:
         """End a goal that has no plan; one that was on its way has stopped there."""
@@ -170,7 +191,7 @@ class MotionAction:
 
     def _planned(self, goal: _Goal, done: Future[Any]) -> None:
         if goal.is_canceled or done.cancelled():
-            self._end(goal, PlanningCode.PREEMPTED, 'canceled while it was planned')
+            self._end(goal, PlanningCode.PREEMPTED, CANCELED)
             return
         error = done.exception()
         if error is not None:

@@ -28,7 +28,7 @@ from ..exceptions import PlanningCode, PlanningError
 from ..industrial.limits import CartesianLimits
 from ..industrial.sequence import SequenceItem
 from ..moveit_config.settings import MoveItSettings
-from ..planner import Planner
+from ..planner import CANCELED, Planner
 from ..requests import MotionRequest
 from .background import Background, error_code
 from .motion_request import RequestReader
@@ -57,6 +57,10 @@ class PlannedMotion:
     notes: Sequence[str] = ()
 
 
+SEEDS = count()
+"""Of planners: a plan that was not found is not searched for in the same way again."""
+
+
 class GroupPlanners:
     """The planner of each group of a robot, made anew when joints beside it have moved."""
 
@@ -71,7 +75,6 @@ class GroupPlanners:
         """
         self._robot, self._cartesian_limits = robot, cartesian_limits
         self._planners: dict[str, tuple[RobotModel, Planner]] = {}
-        self._seeds = count()
 
     def at(self, group: str, positions: Array) -> tuple[RobotModel, Planner]:
         """Return model and planner of a group, with the joints beside it where they are.
@@ -86,21 +89,20 @@ class GroupPlanners:
         model = self._robot.model_at(group, positions)
         known = self._planners.get(group)
         if known is None or known[0] is not model:
-            # another seed: a plan that was not found is not searched for in the same way again
-            planner = Planner(model, self._cartesian_limits, seed=next(self._seeds))
+            planner = Planner(model, self._cartesian_limits, seed=next(SEEDS))
             known = self._planners[group] = model, planner
         return known
 
 
-class PlanningThread:
-    """Plans in a thread of its own, with a robot of its own."""
+class PlanningThreads:
+    """Plans in a thread for each group, with a robot of its own: groups do not wait for others."""
 
     def __init__(
         self,
         node: Node,
         monitor: SceneMonitor,
         background: Background,
-        robot: RobotGroups,
+        robot: Callable[[], RobotGroups],
         *,
         settings: MoveItSettings | None = None,
         cartesian_limits: CartesianLimits | None = None,
@@ -110,48 +112,67 @@ class PlanningThread:
         Args:
             node: The node.
             monitor: The scene and where the joints are.
-            background: The thread.
-            robot: The robot, for that thread alone.
+            background: The threads, which have a lane for each group.
+            robot: Makes a robot, for one thread.
             settings: What holds where a request does not say so.
             cartesian_limits: Limits of LIN and CIRC; None has the defaults.
         """
-        self._monitor, self._robot, self._settings = monitor, robot, settings
-        self._planners = GroupPlanners(robot, cartesian_limits)
+        self._monitor, self._background, self._settings = monitor, background, settings
+        self._make_robot, self._cartesian_limits = robot, cartesian_limits
+        self._planners: dict[str, GroupPlanners] = {}
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
-        background.serve(GetMotionPlan, 'plan_kinematic_path', self._serve, _refuse)
         background.serve(
-            GetMotionSequence, 'plan_sequence_path', self._serve_sequence, _refuse_sequence
+            GetMotionPlan,
+            'plan_kinematic_path',
+            self._serve,
+            _refuse,
+            lambda asked: str(asked.motion_plan_request.group_name),
+        )
+        background.serve(
+            GetMotionSequence,
+            'plan_sequence_path',
+            self._serve_sequence,
+            _refuse_sequence,
+            lambda asked: sequence_group(asked.request.items),
         )
 
-    def prepare(self, message: Any, scene_diff: Any = None) -> Callable[[], PlannedMotion]:  # noqa: ANN401
+    def prepare(
+        self,
+        message: Any,  # noqa: ANN401
+        scene_diff: Any = None,  # noqa: ANN401
+        is_canceled: Callable[[], bool] = lambda: False,
+    ) -> Callable[[], PlannedMotion]:
         """Return what plans a motion; called in the executor, what it returns in the thread.
 
         Args:
             message: The moveit_msgs/MotionPlanRequest.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
+            is_canceled: Whether the plan is wanted no more; the search ends at once then.
 
         Raises:
             PlanningError: The request is refused.
         """
         if not message.group_name:
-            known = ', '.join(self._robot.names)
+            known = ', '.join(self._monitor.robot.names)
             raise PlanningError(
                 PlanningCode.INVALID_GROUP_NAME, f'group_name is empty; groups: {known}'
             )
         snapshot, positions = self._monitor.start(message.start_state, message.group_name)
         snapshot = _changed(snapshot, scene_diff, positions)
-        return lambda: self._plan(message, snapshot, positions)
+        return lambda: self._plan(message, snapshot, positions, is_canceled)
 
     def prepare_sequence(
         self,
         items: Sequence[Any],
         scene_diff: Any = None,  # noqa: ANN401
+        is_canceled: Callable[[], bool] = lambda: False,
     ) -> Callable[[], PlannedMotion]:
         """Return what plans a sequence, as :meth:`prepare`; without items it is one of no motion.
 
         Args:
             items: The moveit_msgs/MotionSequenceItem.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
+            is_canceled: Whether the plan is wanted no more.
 
         Raises:
             PlanningError: The sequence is refused.
@@ -164,7 +185,7 @@ class PlanningThread:
             if run.group not in [each.group for each in runs[:number]]:
                 positions = self._begin(run, positions)
         snapshot = _changed(snapshot, scene_diff, positions)
-        return lambda: self._plan_sequence(runs, snapshot, positions)
+        return lambda: self._plan_sequence(runs, snapshot, positions, is_canceled)
 
     def _begin(self, run: GroupRun, positions: Array) -> Array:
         """Return all positions with those at which the first item of a group begins."""
@@ -193,29 +214,52 @@ class PlanningThread:
         """
         self._displayed.publish(
             DisplayTrajectory(
-                model_id=self._robot.name,
+                model_id=self._monitor.robot.name,
                 trajectory=list(planned.trajectories),
                 trajectory_start=planned.start,
             )
         )
 
-    def _plan(self, message: Any, snapshot: SceneSnapshot, positions: Array) -> PlannedMotion:  # noqa: ANN401
-        begin = time.monotonic()
-        model, planner = self._planners.at(message.group_name, positions)
+    def _planners_in(self, lane: str) -> GroupPlanners:
+        """Return the planners of a lane, in its thread."""
+        if lane not in self._planners:
+            self._planners[lane] = GroupPlanners(self._make_robot(), self._cartesian_limits)
+        return self._planners[lane]
+
+    def _plan(
+        self,
+        message: Any,  # noqa: ANN401
+        snapshot: SceneSnapshot,
+        positions: Array,
+        is_canceled: Callable[[], bool],
+    ) -> PlannedMotion:
+        begin, group = time.monotonic(), message.group_name
+        model, planner = self._planners_in(group).at(group, positions)
         request = RequestReader(model, snapshot, positions, self._settings).request(message)
-        plan = planner.plan(request, scene_for(snapshot, model.scene))
-        start = state_message(self._robot.joints, positions, snapshot.root)
+        plan = planner.plan(
+            request,
+            scene_for(snapshot, model.scene),
+            lambda: is_canceled() or self._background.is_closing,
+        )
+        start = state_message(self._monitor.robot.joints, positions, snapshot.root)
         trajectory = trajectory_message(model.joints, plan.path, snapshot.root)
         return PlannedMotion(start, [trajectory], time.monotonic() - begin, plan.notes)
 
     def _plan_sequence(
-        self, runs: Sequence[GroupRun], snapshot: SceneSnapshot, start: Array
+        self,
+        runs: Sequence[GroupRun],
+        snapshot: SceneSnapshot,
+        start: Array,
+        is_canceled: Callable[[], bool],
     ) -> PlannedMotion:
         begin, positions = time.monotonic(), start
+        planners = self._planners_in(runs[0].group)
         trajectories = []
         notes: list[str] = []
         for run in runs:
-            model, planner = self._planners.at(run.group, positions)
+            if is_canceled():
+                raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
+            model, planner = planners.at(run.group, positions)
             read = partial(_read_item, partial(self._reader, model, snapshot, positions))
             items = [
                 SequenceItem(partial(read, number, item.req), item.blend_radius)
@@ -227,7 +271,7 @@ class PlanningThread:
             positions = self._moved(positions, end)
             notes += plan.notes
         return PlannedMotion(
-            state_message(self._robot.joints, start, snapshot.root),
+            state_message(self._monitor.robot.joints, start, snapshot.root),
             trajectories,
             time.monotonic() - begin,
             notes,
@@ -269,6 +313,11 @@ class PlanningThread:
             return response
 
         return answer
+
+
+def sequence_group(items: Sequence[Any]) -> str:
+    """Return the group whose thread plans the moveit_msgs/MotionSequenceItem of a sequence."""
+    return str(items[0].req.group_name) if items else ''
 
 
 def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> Any:  # noqa: ANN401
