@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Laws of the SDO frames (CiA 301, 7.2.4.3), and transcripts of the standard's figures."""
 
+from contextlib import suppress
+
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.exceptions import CodecError
+from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.sdo import (
     Abort,
     decode_request,
@@ -14,6 +17,7 @@ from arm_canopen.standard.sdo import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
+    fitted,
     Request,
     Response,
     Segment,
@@ -81,8 +85,39 @@ def test_reading_fails_with_codec_error_only(data: bytes) -> None:
             message = decode(data)
         except CodecError:
             continue
-        assert len(data) == 8
+        assert len(data) == 8 or (decode is decode_response and len(data) < 8)
         assert len(message.encode()) == 8
+
+
+@given(message=RESPONSES)
+def test_an_answer_without_its_unused_bytes_is_read(message: Response) -> None:
+    """As far as it is complete; one byte less is none."""
+    frame = message.encode()
+    sizes = []
+    for size in range(9):
+        with suppress(CodecError):
+            if decode_response(frame[:size]) == message:
+                sizes.append(size)
+    assert sizes == list(range(sizes[0], 9))
+    assert not any(frame[sizes[0] :])
+
+
+@pytest.mark.parametrize(
+    ('data_type', 'data', 'value'),
+    [
+        (DataType.INTEGER8, b'\xfd\xa5\xa5\xa5', b'\xfd'),
+        (DataType.UNSIGNED16, b'\x37\x06\0\0', b'\x37\x06'),
+        (DataType.UNSIGNED32, b'\1\2\3\4', b'\1\2\3\4'),
+        (DataType.UNSIGNED16, b'\1', b'\1'),
+        (DataType.UNSIGNED16, b'12345', b'12345'),
+        (DataType.VISIBLE_STRING, b'abc', b'abc'),
+    ],
+)
+def test_an_expedited_value_is_cut_to_its_type(
+    data_type: DataType, data: bytes, value: bytes
+) -> None:
+    """What is too short, or came in segments, is left for the codec to refuse."""
+    assert fitted(data_type, data) == value
 
 
 TRANSCRIPTS: tuple[tuple[Request, str], ...] = (

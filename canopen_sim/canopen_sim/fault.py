@@ -19,6 +19,7 @@ class Service(Enum):
     SDO = 'SDO'
     PDO = 'PDO'
     HEARTBEAT = 'heartbeat'
+    BOOT_UP = 'boot-up'
     OTHER = 'other'
 
 
@@ -62,9 +63,28 @@ def _of_frames(text: str, service: Service, sent: bool, *settings: str) -> Fault
 class Fault(Enum):
     """Every fault; :attr:`label` is its name in services and scenario files."""
 
-    SDO_DELAY = _of_frames('answers SDOs late', Service.SDO, _SENT, 'delay')
+    SDO_DELAY = _of_frames('answers SDOs late', Service.SDO, _SENT, 'object', 'delay')
     SDO_SILENCE = _of_frames('does not answer SDOs', Service.SDO, _RECEIVED, 'object', *_RANDOM)
     SDO_ABORT = _of_frames('aborts SDOs', Service.SDO, _RECEIVED, 'object', 'abort', *_RANDOM)
+    SDO_FOUR_BYTES = _of_frames(
+        'answers SDO reads of shorter objects with four bytes', Service.SDO, _SENT
+    )
+    SDO_NO_SIZE = _of_frames('leaves the size out of its SDO answers', Service.SDO, _SENT)
+    SDO_SHORT = _of_frames('leaves out the unused bytes of its SDO answers', Service.SDO, _SENT)
+    BLOCK_ABORT = _of_frames('aborts SDO block transfers', Service.SDO, _RECEIVED, 'abort')
+    BLOCK_SILENCE = _of_frames('does not answer SDO block transfers', Service.SDO, _RECEIVED)
+    BLOCK_CRC = FaultKind(
+        'computes another CRC in SDO block transfers',
+        (),
+        frozenset({(Service.SDO, _SENT), (Service.SDO, _RECEIVED)}),
+    )
+    NODE_ID_CONFLICT = FaultKind(
+        'shares its node id with another device, which answers, too',
+        (),
+        frozenset(
+            (service, _SENT) for service in (Service.SDO, Service.HEARTBEAT, Service.BOOT_UP)
+        ),
+    )
     TPDO_LOSS = _of_frames('loses PDOs that it sends', Service.PDO, _SENT, 'pdo', *_RANDOM)
     TPDO_DELAY = _of_frames('sends PDOs late', Service.PDO, _SENT, 'pdo', 'delay', *_RANDOM)
     RPDO_LOSS = _of_frames('misses PDOs', Service.PDO, _RECEIVED, 'pdo', *_RANDOM)

@@ -133,7 +133,7 @@ def test_wrong_requests_say_what_there_is(services: Services) -> None:
         ({'device': 'joint9', 'fault': 'reboot'}, "unknown device 'joint9'; did you mean 'joint"),
         ({'fault': 'explode'}, '\n  power_off: has no power (position_kept, duration)'),
         ({'fault': 'sdo_delay', 'settings': ['delay=long']}, 'a time in [s]'),
-        ({'fault': 'sdo_delay', 'settings': ['pdo=1']}, 'choose one of duration, delay'),
+        ({'fault': 'sdo_delay', 'settings': ['pdo=1']}, 'choose one of duration, object, delay'),
         ({'fault': 'sdo_delay', 'duration': -1.0}, 'duration -1.0'),
         ({'fault': 'sdo_delay', 'duration': float('nan')}, 'duration nan'),
     ]

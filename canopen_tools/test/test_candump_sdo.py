@@ -40,6 +40,19 @@ CONVERSATIONS = {
     'a wrong length': [
         ('<', '4f41600037000000', '0x6041:00 Statusword = 37 (UNSIGNED16 takes 2 bytes, got 1)'),
     ],
+    'four bytes for a smaller object': [
+        ('<', '4341600037160000', '0x6041:00 Statusword = 0x1637 Operation enabled'),
+        ('<', '43616000fda5a5a5', '0x6061:00 Modes of operation display = -3 Mode -3'),
+    ],
+    'without its unused bytes': [
+        (
+            '<',
+            '4b4160003716',
+            '0x6041:00 Statusword = 0x1637 Operation enabled (6 bytes instead of 8)',
+        ),
+        ('<', '60606000', 'accepts 0x6060:00 Modes of operation (4 bytes instead of 8)'),
+        ('<', '4b416000', 'an SDO frame has 8 bytes, got 4'),
+    ],
     'real number': [
         ('<', '437560000000c03f', '0x6075:00 Motor rated current = 1.5'),
     ],

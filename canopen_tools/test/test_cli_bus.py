@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 import threading
 import time
@@ -217,6 +218,48 @@ def test_what_does_not_work_is_reported(
     """2 for what the command line or files rule out, 1 for what a device answers."""
     assert main([*arguments, '--can', name, '--bus-config', bus_yml]) == code
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('deviation', 'remark'),
+    [
+        (Fault.SDO_FOUR_BYTES, 'INTEGER8 by its EDS, with 4 bytes'),
+        (Fault.SDO_NO_SIZE, ''),
+        (Fault.SDO_SHORT, 'bytes where CiA 301 has 8'),
+    ],
+)
+def test_answers_that_deviate_are_read_as_the_master_reads_them(
+    name: str,
+    runner: DeviceRunner,
+    bus_yml: str,
+    *,
+    deviation: Fault,
+    remark: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Cut to the type of the object, and what is odd is said once beside them."""
+    left = runner.host.devices[0]
+    inject = partial(left.faults.inject, FaultInjection(deviation))
+    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
+    arguments = ['--can', name, '--bus-config', bus_yml]
+    assert main(['write', 'left', '0x6098', '-3', *arguments]) == 0
+    capsys.readouterr()
+    assert main(['read', 'left', '0x6098', '0x6041', '--value', *arguments]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == '-3\n592\n'
+    assert captured.err.count('canopen: ') == bool(remark)
+    assert remark in captured.err
+
+
+def test_two_devices_with_one_node_id_make_the_scan_fail(
+    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are named with the remedy, and a script notices by the exit code."""
+    right = runner.host.devices[1]
+    inject = partial(right.faults.inject, FaultInjection(Fault.NODE_ID_CONFLICT))
+    runner.call(lambda: inject(time.monotonic())).result(DEADLINE)
+    assert main(['scan', '--can', name, *LISTEN]) == 1
+    assert 'node 3: several devices answer' in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures('runner')

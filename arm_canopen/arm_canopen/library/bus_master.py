@@ -38,7 +38,7 @@ from .bus_recording import BusRecording
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 QUICK_STOP = struct.pack('<H', Command.QUICK_STOP)
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
-NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED)
+NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED, EventKind.SDO)
 """A device that is absent is no fault of one in operation."""
 
 

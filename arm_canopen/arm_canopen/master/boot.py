@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.identity import Identity
@@ -17,6 +18,7 @@ from .events import EventKind, Severity
 from .nmt_sender import SendNmt
 from .remote_node import BootPhase, RemoteNode
 from .scheduler import Scheduler
+from .sdo_channel import SECOND_ANSWER_TIME
 from .startup import Startup
 from .takeover import preset_outputs, read_outputs
 
@@ -75,7 +77,7 @@ class BootProcess:
         line = bus.place_of(node.name, 'reset_communication').line
         self._written = f' ({bus.file}:{line})' if line else ''
         self._reported = ''
-        self._fault = BootFault.CONFIGURATION
+        self._fault: BootFault | None = BootFault.CONFIGURATION
         self._restored = False
 
     async def run(self, *, announced: bool, pause: float = 0.0) -> None:
@@ -226,7 +228,29 @@ class BootProcess:
         self._enter(BootPhase.OPERATIONAL)
         self._node.report(EventKind.BOOT, Severity.INFO, text)
 
+    async def _check_alone(self) -> None:
+        """Refuse a node id that several devices have: each would do what one is commanded.
+
+        A frame that the bus brings twice is no second device, so one doubled answer is confirmed
+        by another.
+        """
+        counters, node_id = self._node.sdo.counters, self._node.config.node_id
+        self._fault = None  # CiA 302-2 has no letter for it
+        for index in (Index.ERROR_REGISTER, Index.DEVICE_TYPE):
+            with suppress(SdoAbortError):
+                await self._configurator.read_number(index, 0)
+            doubled = counters.doubled  # a server answers in order, so what is late came before
+            await self._scheduler.timer(SECOND_ANSWER_TIME)
+            if counters.doubled == doubled:
+                return
+        raise BootError(
+            f'two devices have node id {node_id}: each SDO of {self._node.name} is answered '
+            'twice; it is not started, as both would move. Switch one of them off, and give it '
+            'another node id (canopen lss, or its switches)'
+        )
+
     async def _check_identity(self, expected: Identity) -> None:
+        await self._check_alone()
         for attribute, index, subindex, wanted in expected.objects:
             self._fault = IDENTITY_FAULTS[attribute]
             found = await self._configurator.read_number(index, subindex)
@@ -275,9 +299,9 @@ class BootProcess:
         self._node.phase_detail = detail
 
     def _fail(self, reason: str) -> None:
-        step, fault = self._node.phase.value, self._fault
-        self._enter(BootPhase.FAILED, f'{step}: {reason} ({fault})')
-        self._report_once(f'boot failed while {step}: {reason} ({fault})')
+        step, fault = self._node.phase.value, f' ({self._fault})' if self._fault else ''
+        self._enter(BootPhase.FAILED, f'{step}: {reason}{fault}')
+        self._report_once(f'boot failed while {step}: {reason}{fault}')
 
     def _report_once(self, text: str) -> None:
         """Report a reason when it is new; further attempts that end alike are not reported."""

@@ -24,6 +24,7 @@ class EventKind(Enum):
     NMT_STATE = 'nmt state'
     BOOT = 'boot'
     BOOT_FAILED = 'boot failed'
+    SDO = 'sdo'
     HEARTBEAT_LOST = 'heartbeat lost'
     EMERGENCY = 'emergency'
     PDO = 'pdo'

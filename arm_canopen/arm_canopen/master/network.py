@@ -346,6 +346,7 @@ class Network:
             if emergency_id is not None:
                 yield emergency_id, node.emergencies.receive
             yield CobId.SDO_RESPONSE + node_id, node.sdo.receive
+            yield CobId.SDO_REQUEST + node_id, node.sdo.receive_request
             for entry in node.image.tpdos:
                 yield entry.config.cob_id, entry.receive
 

@@ -67,7 +67,14 @@ class RemoteObjects:
             cyclic=config.is_drive,
             send_last=is_controlword,
         )
-        self.sdo = SdoClient(config.node_id, config.name, scheduler, send)
+        self.sdo = SdoClient(
+            config.node_id,
+            config.name,
+            scheduler,
+            send,
+            dictionary=config.dictionary,
+            on_odd=partial(report, EventKind.SDO, Severity.WARNING),
+        )
         self.sdo.on_download.append(self._object_downloaded)
         self.report = report
         self._is_online = is_online

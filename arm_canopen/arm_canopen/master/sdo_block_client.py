@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import struct
 
+from ..exceptions import SdoError, SdoTimeoutError
 from ..standard.sdo_abort import AbortCode
 from ..standard.sdo_block import (
     ACKNOWLEDGE_UPLOAD,
@@ -43,7 +44,8 @@ async def write_blocks(
 
     Raises:
         SdoAbortError: The device refused, or answered something that makes no sense.
-        SdoTimeoutError: It did not answer.
+        SdoTimeoutError: It did not answer, and does not have the value.
+        SdoError: It did not answer the end, so it may have the value.
     """
     question = struct.pack(
         '<BHBI', DOWNLOAD_INITIATE | CRC_BIT | SIZE_BIT, *channel.address, len(data)
@@ -66,7 +68,10 @@ async def write_blocks(
             raise channel.refuse(AbortCode.SEQUENCE_NUMBER)
         position += taken * SEGMENT_BYTES
     end = end_frame(DOWNLOAD_END, data, with_crc=with_crc)
-    await channel.exchange(end, _command(DOWNLOAD_ENDED), timeout)
+    try:
+        await channel.exchange(end, _command(DOWNLOAD_ENDED), timeout)
+    except SdoTimeoutError as error:
+        raise SdoError(f'{error} after all of it was sent; read it back') from error
 
 
 async def read_blocks(channel: SdoChannel, timeout: float, size_max: int) -> bytes:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+import math
 from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
@@ -17,6 +18,7 @@ from ..standard.sdo import (
     decode_response,
     DownloadResponse,
     DownloadSegmentResponse,
+    FRAME_BYTES,
     Segment,
     UploadRequest,
     UploadResponse,
@@ -33,9 +35,10 @@ Match: TypeAlias = Callable[[bytes], T | None]
 REPEAT_AFTER = 0.25  # [s] before a request that may be repeated is sent again
 MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for sub in range(5)))
 """Objects that a device has or refuses (CiA 301, table 65); the answer shows where others end."""
+_ABORT = b'\x80'
+SECOND_ANSWER_TIME = 0.02  # [s] in which another device with the same node id answers, too
+OTHER_CLIENT_TIME = 1.0  # [s] in which the answers to another client are there
 PENDING_MAX = 16  # answers to remember that never came
-_FRAME_SIZE = 8  # [byte]
-_ABORT = 0x80
 
 
 @dataclass(slots=True)
@@ -46,6 +49,7 @@ class SdoCounters:
     aborted: int = 0
     timed_out: int = 0
     stale: int = 0  # answers that belong to no open request
+    doubled: int = 0  # of these: the answer to a request that was sent once, for a second time
     repeated: int = 0  # requests that were sent again
 
 
@@ -61,7 +65,14 @@ class SdoChannel:
         address: The object of the present transfer.
     """
 
-    def __init__(self, node_id: int, name: str, scheduler: Scheduler, send: Send) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        name: str,
+        scheduler: Scheduler,
+        send: Send,
+        on_odd: Callable[[str], None] = lambda text: None,
+    ) -> None:
         """Take the way to the bus.
 
         Args:
@@ -69,9 +80,12 @@ class SdoChannel:
             name: Its name, for messages.
             scheduler: Time.
             send: Hands a frame to the bus.
+            on_odd: Takes what is odd about the device, once each.
         """
         self.counters = SdoCounters()
         self.address: Address = (0, 0)
+        self._on_odd = on_odd
+        self._odd: set[str] = set()
         self._title = f'{name} (node {node_id})'
         self._request_id = CobId.SDO_REQUEST + node_id
         self._scheduler = scheduler
@@ -80,6 +94,8 @@ class SdoChannel:
         self._match: Match[Any] = lambda data: None
         self._strays = 0  # frames since the open question that do not answer it
         self._pending_replies: list[Address] = []
+        self._answered_at: dict[bytes, float] = {}  # when requests that left once were answered
+        self._other_client_until = 0.0
 
     async def begin(
         self, index: int, subindex: int, timeout: float, *, settle: bool = True
@@ -105,15 +121,42 @@ class SdoChannel:
         What does not answer the open question is passed over: it is the late answer to one that
         timed out, or meant for another client.
         """
+        if len(data) < FRAME_BYTES:
+            self.note_odd(
+                'length',
+                f'sends SDO answers of {len(data)} bytes where CiA 301 has 8; they are read where '
+                'all is there that they announce, else they count as none. Where SDOs time out, '
+                'update its firmware',
+            )
         promise = self._answered
         if promise is not None:
             answer = self._abort_of(data) or self._match(data)
             if answer is not None:
                 self._answered = None
+                if not self._pending_replies:
+                    self._answered_at[_object_of(data)] = self._scheduler.now
                 promise.resolve(answer)
                 return
         self.counters.stale += 1
         self._strays += 1
+        named, now = _object_of(data), self._scheduler.now
+        if (
+            named
+            and now - self._answered_at.get(named, -math.inf) <= SECOND_ANSWER_TIME
+            and not self._pending_replies
+            and now >= self._other_client_until
+        ):
+            self.counters.doubled += 1
+
+    def note_other_client(self) -> None:
+        """Somebody else has sent a request, whose answer is not a second one to an own request."""
+        self._other_client_until = self._scheduler.now + OTHER_CLIENT_TIME
+
+    def note_odd(self, kind: str, text: str) -> None:
+        """Report something odd about the device, once of each kind."""
+        if kind not in self._odd:
+            self._odd.add(kind)
+            self._on_odd(text)
 
     def cancel(self) -> None:
         """Abort the transfer, whether or not a request is open."""
@@ -125,6 +168,7 @@ class SdoChannel:
     def restarted(self) -> None:
         """The device has restarted, so it owes no answer any more."""
         self._pending_replies = []
+        self._answered_at.clear()
 
     def send(self, data: bytes) -> BusError | None:
         """Send a frame that is not answered; return why the bus has not taken it."""
@@ -211,9 +255,12 @@ class SdoChannel:
         self._pending_replies = [*self._pending_replies, *[self.address] * sent][-PENDING_MAX:]
 
     def _abort_of(self, data: bytes) -> Abort | None:
-        if len(data) != _FRAME_SIZE or data[0] != _ABORT:
+        if data[:1] != _ABORT:  # what ends a block has the same command specifier
             return None
-        abort = decode_response(data)
+        try:
+            abort = decode_response(data)
+        except CodecError:
+            return None
         # python-canopen's peers send aborts with index 0, so such an abort counts for any
         if isinstance(abort, Abort) and (abort.index, abort.subindex) in (self.address, (0, 0)):
             return abort
@@ -260,6 +307,11 @@ def _ends_of_waits(timeout: float, *, repeat: bool) -> Iterator[float]:
         wait *= 2
         end += wait
     yield timeout
+
+
+def _object_of(data: bytes) -> bytes:
+    """Return index and sub-index of an answer that names them, else nothing."""
+    return data[1:4] if len(data) >= 4 and data[0] >> 5 in (2, 3, 4) else b''
 
 
 def _place(address: Address) -> str:

@@ -10,12 +10,14 @@ from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 from ..can.frame import Frame
-from ..exceptions import SdoAbortError, SdoError
+from ..exceptions import SdoAbortError, SdoError, SdoTimeoutError
+from ..standard.dictionary import object_address, ObjectDictionary
 from ..standard.sdo import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
     EXPEDITED_MAX,
+    fitted,
     Segment,
     SEGMENT_MAX,
     UploadRequest,
@@ -46,13 +48,32 @@ class SdoClient:
             the promise of its end.
     """
 
-    def __init__(self, node_id: int, name: str, scheduler: Scheduler, send: Send) -> None:
-        """Take the way to the bus; arguments as of :class:`SdoChannel`."""
+    def __init__(
+        self,
+        node_id: int,
+        name: str,
+        scheduler: Scheduler,
+        send: Send,
+        *,
+        dictionary: ObjectDictionary | None = None,
+        on_odd: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        """Take the way to the bus; further arguments as of :class:`SdoChannel`.
+
+        Args:
+            node_id: The device.
+            name: Its name, for messages.
+            scheduler: Time.
+            send: Hands a frame to the bus.
+            dictionary: Types of its objects; without it an answer has as many bytes as came.
+            on_odd: Takes what is odd about the device, once each.
+        """
         self.node_id = node_id
         self.on_download: list[DownloadHook] = []
         self._name = name
         self._scheduler = scheduler
-        self._channel = SdoChannel(node_id, name, scheduler, send)
+        self._dictionary = dictionary
+        self._channel = SdoChannel(node_id, name, scheduler, send, on_odd)
         self._queue: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
         self._urgent: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
         self._yields = False  # the transfer that runs ends for an urgent one
@@ -138,6 +159,10 @@ class SdoClient:
         """Take an answer of the device."""
         self._channel.receive(frame.data)
 
+    def receive_request(self, _frame: Frame) -> None:
+        """Another client of this bus has sent a request to the device."""
+        self._channel.note_other_client()
+
     def _end_running(self, reason: str) -> None:
         """End the transfer that runs; the next one begins before this returns."""
         if self._running is not None:
@@ -172,19 +197,47 @@ class SdoClient:
     async def _upload(self, index: int, subindex: int, timeout: float, *, block: bool) -> bytes:
         channel = self._channel
         await channel.begin(index, subindex, timeout)
+        failure: SdoError | None = None
         if block and self._has_blocks:
             try:
                 return await read_blocks(channel, timeout, SIZE_MAX)
-            except SdoAbortError as error:
-                if error.code != AbortCode.COMMAND_SPECIFIER:
-                    raise
-                self._has_blocks = False
+            except (SdoAbortError, SdoTimeoutError) as error:
+                failure = error
+                await channel.begin(index, subindex, timeout)
         request = UploadRequest(index, subindex).encode()
         match = response(UploadResponse, channel.address)
         answer = await channel.exchange(request, match, timeout, repeat=True)
-        if answer.data is not None:
-            return answer.data
-        return await self._upload_segments(answer.size, timeout)
+        data = (
+            await self._upload_segments(answer.size, timeout)
+            if answer.data is None
+            else self._fitted(answer.data, answer.size)
+        )
+        self._give_up_blocks(failure)
+        return data
+
+    def _fitted(self, data: bytes, size: int | None) -> bytes:
+        """Cut the value of an expedited answer to its type, and note a size that is too large."""
+        address = self._channel.address
+        entry = self._dictionary.get(*address) if self._dictionary is not None else None
+        if entry is None:
+            return data
+        value = fitted(entry.data_type, data)
+        if size is not None and len(value) < size:
+            self._channel.note_odd(
+                'size',
+                f'answers SDOs for {object_address(*address)}, {entry.data_type.name} by its EDS, '
+                f'with {size} bytes ({data.hex(" ")}); the first {len(value)} count. Where values '
+                'are wrong, correct DataType in the EDS',
+            )
+        return value
+
+    def _give_up_blocks(self, failure: SdoError | None) -> None:
+        """Use segments from now on, after they did what a block transfer failed to do."""
+        if failure is not None:
+            self._has_blocks = False
+            self._channel.note_odd(
+                'block', f'has failed at an SDO block transfer, and gets segments now: {failure}'
+            )
 
     async def _upload_segments(self, size: int | None, timeout: float) -> bytes:
         channel, match = self._channel, response(Segment, self._channel.address)
@@ -217,13 +270,13 @@ class SdoClient:
         channel = self._channel
         await channel.begin(index, subindex, timeout, settle=not urgent)
         leave()
+        failure: SdoError | None = None
         if len(data) >= BLOCK_MIN and self._has_blocks:
             try:
                 await write_blocks(channel, self._scheduler, data, timeout)
-            except SdoAbortError as error:
-                if error.code != AbortCode.COMMAND_SPECIFIER:
-                    raise
-                self._has_blocks = False
+            except (SdoAbortError, SdoTimeoutError) as error:
+                failure = error
+                await channel.begin(index, subindex, timeout)
             else:
                 return
         short = 0 < len(data) <= EXPEDITED_MAX
@@ -232,6 +285,7 @@ class SdoClient:
         await channel.exchange(request.encode(), match, timeout, repeat=repeat)
         if not short:
             await self._download_segments(data, timeout)
+        self._give_up_blocks(failure)
 
     async def _download_segments(self, data: bytes, timeout: float) -> None:
         channel, match = self._channel, response(DownloadSegmentResponse, self._channel.address)

@@ -4,6 +4,8 @@
 
 Each message is a value with ``encode()``; ``decode_request`` reads what a client sent,
 ``decode_response`` what a server sent. The block protocol is refused with its abort code.
+Some servers leave out the unused bytes of a frame, or answer with four bytes for a smaller object:
+``decode_response`` and ``fitted`` read those alike for the master, the tools and the monitor.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ import struct
 from typing import TypeAlias
 
 from ..exceptions import CodecError
+from .datatypes import byte_length, DataType
 
+FRAME_BYTES = 8
 EXPEDITED_MAX = 4  # [byte]
 SEGMENT_MAX = 7  # [byte]
 
@@ -167,9 +171,10 @@ def _encode_initiate(
 
 
 def _decode_initiate(data: bytes) -> tuple[int, int, bytes | None, int | None]:
-    command, index, subindex, size = struct.unpack('<BHBI', data)
+    command, index, subindex = struct.unpack_from('<BHB', data)
     indicated = bool(command & 0x01)
     if not command & 0x02:
+        size = int.from_bytes(data[4:], 'little')
         return index, subindex, None, size if indicated else None
     if not indicated:
         return index, subindex, data[4:], None
@@ -183,9 +188,42 @@ def _decode_segment(data: bytes) -> Segment:
     return Segment(bool(command & 0x10), data[1 : 1 + length], bool(command & 0x01))
 
 
-def _check_length(data: bytes) -> None:
-    if len(data) != 8:
+def _padded(data: bytes) -> bytes:
+    """Return a frame of a server with the unused bytes that it may have left out.
+
+    Raises:
+        CodecError: The frame is empty, longer than 8 bytes, or bytes are missing that it uses.
+    """
+    if not data or len(data) > FRAME_BYTES or len(data) < _used_bytes(data[0]):
         raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
+    if data[0] >> 5 == 2 and data[0] & 0x03 == 0x02:  # the frame's length is that of the value
+        return data
+    return data.ljust(FRAME_BYTES, b'\0')
+
+
+def _used_bytes(command: int) -> int:
+    """Return how many bytes of an answer carry something, by its command byte."""
+    match command >> 5:
+        case 0:  # a segment of an upload
+            return 1 + SEGMENT_MAX - (command >> 1 & 0x07)
+        case 1:
+            return 1
+        case 2 if command & 0x03 == 0x03:
+            return FRAME_BYTES - (command >> 2 & 0x03)
+        case 2:
+            return {0x00: 4, 0x01: 8, 0x02: 5}[command & 0x03]
+        case 3 | 4:  # an abort without its code is an abort nevertheless
+            return 4
+    return FRAME_BYTES
+
+
+def fitted(data_type: DataType, data: bytes) -> bytes:
+    """Return the value of an expedited upload without the bytes behind those of its type.
+
+    Servers that leave out the size, or give it as four bytes, send four for a smaller object.
+    """
+    size = byte_length(data_type)
+    return data[:size] if size is not None and size < len(data) <= EXPEDITED_MAX else data
 
 
 def decode_request(data: bytes) -> Request:
@@ -194,7 +232,8 @@ def decode_request(data: bytes) -> Request:
     Raises:
         CodecError: It has not 8 bytes or its command specifier is unknown.
     """
-    _check_length(data)
+    if len(data) != FRAME_BYTES:
+        raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
     match data[0] >> 5:
         case 0:
             return _decode_segment(data)
@@ -213,9 +252,9 @@ def decode_response(data: bytes) -> Response:
     """Read a frame from a server.
 
     Raises:
-        CodecError: It has not 8 bytes or its command specifier is unknown.
+        CodecError: Bytes are missing, or its command specifier is unknown.
     """
-    _check_length(data)
+    data = _padded(data)
     match data[0] >> 5:
         case 0:
             return _decode_segment(data)

@@ -61,8 +61,8 @@ class Services:
         can_id = frame.can_id
         if can_id in (self.sdo.response_ids if outgoing else self.sdo.can_ids):
             return Traffic(Service.SDO, outgoing)
-        if can_id == CobId.HEARTBEAT + self.nmt.node_id and any(frame.data):  # 0 is boot-up
-            return Traffic(Service.HEARTBEAT, outgoing)
+        if can_id == CobId.HEARTBEAT + self.nmt.node_id:
+            return Traffic(Service.HEARTBEAT if any(frame.data) else Service.BOOT_UP, outgoing)
         engine = self.tpdos if outgoing else self.rpdos
         number = 0 if frame.is_remote else engine.number_of(can_id)
         return Traffic(Service.PDO if number else Service.OTHER, outgoing, number)

@@ -7,12 +7,14 @@ It knows nothing of the package's device; its SDO server is the one made from th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from drive_samples import drive_dictionary
 from sdo_byte_server import SdoByteServer
 
 from arm_canopen.can.frame import Frame
+from arm_canopen.standard.datatypes import byte_length
 from arm_canopen.standard.nmt import NmtState
 
 START, STOP, PRE_OPERATIONAL, RESET_NODE, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82
@@ -22,6 +24,15 @@ STATES = {
     PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
 }
 MILLISECOND = 0.001  # [s]
+
+
+def object_bytes(values: Mapping[tuple[int, int], int]) -> dict[tuple[int, int], bytes]:
+    """Return the objects of a drive as their types have them; unknown ones have four bytes."""
+    dictionary = drive_dictionary()
+    sizes = {entry.address: byte_length(entry.data_type) for entry in dictionary}
+    return {
+        place: value.to_bytes(sizes.get(place) or 4, 'little') for place, value in values.items()
+    }
 
 
 @dataclass

@@ -9,9 +9,10 @@ in between and after. Two drives move: the fault meets the first, and the second
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import random
+import re
 
 from drive_samples import (
     bus_config,
@@ -31,7 +32,10 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.drive import DriveState, OperationMode
+from canopen_sim.device import Device
 from canopen_sim.drive.drive import Drive as SimulatedDrive
 from canopen_sim.fault import Fault as Deviation
 from canopen_sim.fault import FaultInjection
@@ -556,6 +560,80 @@ def test_a_twentieth_of_all_frames_lost(mode: OperationMode) -> None:
     assert arm.net.network.nodes[FAULTY].online
 
 
+BLOB = 0x2FFF
+SDO_DEVIATIONS: tuple[tuple[FaultInjection, str], ...] = (
+    (
+        FaultInjection(Deviation.SDO_FOUR_BYTES),
+        r'0x1001:00, UNSIGNED8 by its EDS, with 4 bytes \(00 a5 a5 a5\)',
+    ),
+    (FaultInjection(Deviation.SDO_NO_SIZE), ''),  # which CiA 301 allows
+    (FaultInjection(Deviation.SDO_SHORT), r'SDO answers of \d bytes where CiA 301 has 8'),
+    (FaultInjection(Deviation.BLOCK_ABORT), r'SDO block transfer.*general error'),
+    (FaultInjection(Deviation.BLOCK_SILENCE), r'SDO block transfer.*did not answer'),
+    (FaultInjection(Deviation.BLOCK_CRC), r'SDO block transfer.*CRC'),
+)
+"""What devices do otherwise than CiA 301 has it, and how the master reports it."""
+
+
+@pytest.mark.parametrize(
+    ('deviation', 'said'), SDO_DEVIATIONS, ids=[each.fault.label for each, _ in SDO_DEVIATIONS]
+)
+def test_a_device_that_deviates_is_driven(deviation: FaultInjection, said: str) -> None:
+    """It boots, moves, and shows true values; what is odd is said once, with a remedy."""
+    blob = ObjectEntry(BLOB, 0, 'Blob', DataType.DOMAIN)
+    drive = drive_config(FAULTY, NODE_ID)
+    drive = replace(drive, dictionary=ObjectDictionary([*drive.dictionary, blob]))
+    net = VirtualNetwork(bus_config(drive))
+    net.devices[FAULTY].faults.inject(deviation, net.now)
+    net.boot()
+    objects = net.network.nodes[FAULTY].objects
+    net.do(FAULTY, 'init')
+    net.select(FAULTY, OperationMode.PROFILE_POSITION)
+    net.commands[FAULTY].set_target(0.1)
+    net.run(1.0)
+    assert net.drives[FAULTY].view.position == pytest.approx(0.1, abs=0.01)
+    net.result(objects.write_object(0x6098, 0, -3))
+    for content in (bytes(range(256)) * 2, bytes(300)):
+        net.result(objects.sdo.write(BLOB, 0, content, 0.2))
+        blob_read = net.network.scheduler.spawn(objects.upload(f'0x{BLOB:X}'))
+        assert net.result(blob_read)[1] == content
+    for index, value in ((0x6061, 1), (0x6098, -3), (0x1000, 0x20192)):
+        read = net.network.scheduler.spawn(objects.read_object(index))
+        assert net.result(read) == value
+    warnings = net.reported(Severity.WARNING)
+    assert len(warnings) == bool(said), warnings
+    assert re.search(said, ''.join(warnings))
+
+
+@pytest.mark.parametrize('later', [False, True], ids=['at start', 'while it runs'])
+def test_two_devices_with_one_node_id_are_named_and_not_enabled(*, later: bool) -> None:
+    """Both would move; the others run, and after one is switched off the other boots."""
+    net = VirtualNetwork(bus_config(drive_config(FAULTY, NODE_ID), drive_config(WITNESS, 3)))
+    if later:
+        net.boot()
+    other = Device(
+        NODE_ID, drive_dictionary(), lambda frame: net.wire.put(net.now, 'other', frame)
+    )
+    net.connect('other', other)
+    other.advance(net.now)
+    if not later:
+        net.start()
+    net.run(3.0)
+    assert any('two devices have node id 2' in text for text in net.reported(Severity.WARNING)), (
+        net.story()
+    )
+    with pytest.raises(DriveError, match='two devices have node id 2'):
+        net.do(FAULTY, 'init')
+    for device in (other, net.devices[FAULTY]):
+        assert device.drive is not None
+        assert device.drive.state is DriveState.SWITCH_ON_DISABLED
+    net.do(WITNESS, 'init')
+    net.stations.pop('other')
+    net._due.pop('other')
+    net.run_until(net.all_ready)
+    net.do(FAULTY, 'init')
+
+
 def test_another_device_than_expected_is_not_driven() -> None:
     """Its identity is said, it stays disabled, the others run, and the right one boots later."""
     other = with_defaults(drive_dictionary().for_node(NODE_ID), {(0x1018, 1): 0x1234})
@@ -566,7 +644,7 @@ def test_another_device_than_expected_is_not_driven() -> None:
     net = VirtualNetwork(config, dictionaries={FAULTY: other})
     net.start()
     net.run_until(lambda: net.drives[WITNESS].view.ready)
-    net.run(2.0)
+    net.run(2.1)
     assert any('another device: vendor id 0x00001234' in text for text in net.reported())
     with pytest.raises(DriveError, match='vendor id'):
         net.do(FAULTY, 'init')

@@ -9,7 +9,13 @@ import itertools
 
 from drive_samples import bus_config, drive_config, pdo, sdo_write
 import pytest
-from scripted_device import PRE_OPERATIONAL, RESET_COMMUNICATION, ScriptedDevice, START
+from scripted_device import (
+    object_bytes,
+    PRE_OPERATIONAL,
+    RESET_COMMUNICATION,
+    ScriptedDevice,
+    START,
+)
 from virtual_network import VirtualNetwork
 
 from arm_canopen.config.model import NodeConfig
@@ -45,6 +51,7 @@ DEFAULT_COB_IDS = {
 DEVICE_VALUES = {
     **{place: getattr(IDENTITY, name) for name, place in IDENTITY_PLACES.items()},
     **DEFAULT_COB_IDS,
+    (0x1001, 0): 0,
     (0x1016, 1): 0,
     (0x6040, 0): 0,
     (0x6060, 0): 0,
@@ -89,7 +96,7 @@ class Scene:
         self.device = ScriptedDevice(
             NODE_ID,
             lambda frame: self.net.send_as(NODE, frame),
-            {place: value.to_bytes(4, 'little') for place, value in DEVICE_VALUES.items()},
+            object_bytes(DEVICE_VALUES),
         )
         self.node: RemoteNode = self.net.network.nodes[NODE]
         if there:

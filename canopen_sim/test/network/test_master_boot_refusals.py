@@ -9,7 +9,7 @@ import struct
 
 from drive_samples import bus_config
 import pytest
-from scripted_device import ScriptedDevice, START
+from scripted_device import object_bytes, ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
@@ -42,7 +42,7 @@ class Refusing:
         self.device = ScriptedDevice(
             NODE_ID,
             lambda frame: self.net.send_as(NODE, frame),
-            {place: value.to_bytes(4, 'little') for place, value in DEVICE_VALUES.items()},
+            object_bytes(DEVICE_VALUES),
             refuses=refuses,
         )
         self.net.connect(NODE, self.device)

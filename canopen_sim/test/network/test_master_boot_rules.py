@@ -9,6 +9,7 @@ from dataclasses import replace
 from drive_samples import bus_config
 import pytest
 from scripted_device import (
+    object_bytes,
     PRE_OPERATIONAL,
     RESET_COMMUNICATION,
     RESET_NODE,
@@ -43,7 +44,6 @@ CONFIGURED = {
     (0x1A00, 2): 0x6064_0020,
 }
 """The PDO objects of a device that has been configured before."""
-WIDTHS = {0x6040: 2, 0x6060: 1}  # [byte]
 COMMANDED = {(0x6040, 0): 0x000F, (0x6060, 0): 8}
 
 
@@ -66,10 +66,7 @@ class Network:
         device = ScriptedDevice(
             config.node_id,
             lambda frame: self.net.send_as(config.name, frame),
-            {
-                place: value.to_bytes(WIDTHS.get(place[0], 4), 'little')
-                for place, value in values.items()
-            },
+            object_bytes(values),
         )
         self.net.connect(config.name, device)
         return device
@@ -84,7 +81,7 @@ def running(**changes: object) -> tuple[Network, ScriptedDevice]:
     """Return a network whose device has been configured and started by another master."""
     network = Network(io_config(**changes))
     device = network.devices[NODE]
-    device.values |= {place: value.to_bytes(4, 'little') for place, value in CONFIGURED.items()}
+    device.values |= object_bytes(CONFIGURED)
     device.state, device.guarded = NmtState.OPERATIONAL, True
     return network, device
 

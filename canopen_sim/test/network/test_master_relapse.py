@@ -9,7 +9,7 @@ import itertools
 
 from drive_samples import bus_config, drive_config
 import pytest
-from scripted_device import ScriptedDevice, START
+from scripted_device import object_bytes, ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
@@ -63,7 +63,7 @@ def relapsing(**changes: bool) -> tuple[VirtualNetwork, Relapsing]:
     device = Relapsing(
         NODE_ID,
         lambda frame: net.send_as(NODE, frame),
-        {place: value.to_bytes(4, 'little') for place, value in DEVICE_VALUES.items()},
+        object_bytes(DEVICE_VALUES),
         **changes,  # type: ignore[arg-type]
     )
     net.connect(NODE, device)

@@ -131,7 +131,7 @@ def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
     """
 
     async def upload() -> bytes:
-        client = session.client(target.node_id, target.name)
+        client = session.client(target.node_id, target.name, target.dictionary)
         return await client.read(index, subindex, target.timeout)
 
     if session.masters:
@@ -144,8 +144,7 @@ def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
         data = _read(session, target, expected.index, expected.subindex)
     except SdoAbortError as error:
         return Row(expected, abort_text(error.code), is_equal=False)
-    held = data[: len(expected.data)] if len(data) == 4 else data
-    return Row(expected, _text(target, expected, held), expected.fits(data))
+    return Row(expected, _text(target, expected, data), expected.fits(data))
 
 
 def _cells(target: Target, names: ObjectNames, row: Row) -> tuple[str, ...]:

@@ -9,9 +9,10 @@ import argparse
 from arm_canopen.can import open_bus
 from arm_canopen.config.read.object_text import bytes_from_text, text_from_bytes
 from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.datatypes import byte_length, DataType
+from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectEntry
 from arm_canopen.standard.objects import Index
+from arm_canopen.standard.sdo import fitted
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
@@ -93,9 +94,8 @@ def write(options: argparse.Namespace) -> int:
         warn_of_master(session, target)
 
         async def download() -> None:
-            await session.client(target.node_id, target.name).write(
-                *entry.address, data, target.timeout
-            )
+            client = session.client(target.node_id, target.name, target.dictionary)
+            await client.write(*entry.address, data, target.timeout)
 
         session.run(download())
         title = _title(target, entry)
@@ -141,13 +141,11 @@ def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> by
 
 def _upload(session: Session, target: Target, entry: ObjectEntry) -> bytes:
     async def upload() -> bytes:
-        client = session.client(target.node_id, target.name)
+        client = session.client(target.node_id, target.name, target.dictionary)
         long = entry.data_type in LONG_TYPES
         return await client.read(*entry.address, target.timeout, block=long)
 
-    data = session.run(upload())
-    size = byte_length(entry.data_type)
-    return data if size is None else data[:size]  # without a size an answer has 4 bytes
+    return fitted(entry.data_type, session.run(upload()))  # of the type that --type names
 
 
 def _title(target: Target, entry: ObjectEntry) -> str:

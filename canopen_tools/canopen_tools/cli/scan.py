@@ -85,8 +85,9 @@ def add_parser(parsers: SubParsers) -> None:
         'scan',
         help='list the devices on a bus',
         description='List the devices on a bus. It listens first; without a master on the bus it '
-        'reads the identity of every node id. Exit code: 0; 1 when there is no device, or with '
-        '--bus-config when one is missing or another one; 2 wrong usage.',
+        'reads the identity of every node id. Exit code: 0; 1 when there is no device, several '
+        'have one node id, or with --bus-config when one is missing or another one; 2 wrong '
+        'usage.',
         allow_abbrev=False,
     )
     add_bus_arguments(parser)
@@ -209,20 +210,9 @@ def _identify(session: Session, device: Found) -> None:
     if not device.is_there:
         return
     client = session.client(device.node_id)
-    responses = 0
-
-    def count(frame: Frame) -> None:
-        nonlocal responses
-        responses += frame.can_id == CobId.SDO_RESPONSE + device.node_id
-
-    session.listeners.append(count)
-    try:
-        _read_identity(session, device, client)
-        session.listen(SECOND_ANSWER)
-    finally:
-        session.listeners.remove(count)
-    # each of these values comes in one frame; those that another master has asked for do not count
-    device.twice = not session.masters and responses > len(IDENTITY)
+    _read_identity(session, device, client)
+    session.listen(SECOND_ANSWER)
+    device.twice = client.counters.doubled > 1  # the bus may bring one frame twice
 
 
 def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
@@ -268,7 +258,8 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, queried: bool) -
     ]
     print_table((*head, '') if named else head, rows, right='node')
     print_line(f'{counted(len(present), "device")}')
-    return 1 if not present or any(differences.values()) else 0
+    wrong = any(differences.values()) or any(device.twice for device in present)
+    return 1 if not present or wrong else 0
 
 
 def _state(device: Found, *, queried: bool) -> str:

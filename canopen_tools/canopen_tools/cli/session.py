@@ -16,7 +16,10 @@ from arm_canopen.can import Bus, Frame
 from arm_canopen.config.model import BusConfig
 from arm_canopen.master import MasterFrames, Promise, Scheduler, SdoClient
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.nmt import NmtState, parse_heartbeat
+
+from .output import warn
 
 T = TypeVar('T')
 
@@ -75,11 +78,21 @@ class Session:
         """
         self.bus.send(frame)
 
-    def client(self, node_id: int, name: str = '') -> SdoClient:
-        """Return the SDO client for a device."""
+    def client(
+        self, node_id: int, name: str = '', dictionary: ObjectDictionary | None = None
+    ) -> SdoClient:
+        """Return the SDO client for a device whose objects are of these types."""
         client = self._clients.get(node_id)
         if client is None:
-            client = SdoClient(node_id, name or 'the device', self.scheduler, self.send)
+            name = name or f'node {node_id}'
+            client = SdoClient(
+                node_id,
+                name,
+                self.scheduler,
+                self.send,
+                dictionary=dictionary,
+                on_odd=lambda text: warn(f'{name} {text}'),
+            )
             self._clients[node_id] = client
         return client
 
@@ -111,6 +124,8 @@ class Session:
                 self.states[node_id] = state
         elif function == CobId.SDO_REQUEST:
             self._sdo_times[node_id] = monotonic()
+            if node_id in self._clients:
+                self._clients[node_id].receive_request(frame)
         elif function == CobId.SDO_RESPONSE and node_id in self._clients:
             self._clients[node_id].receive(frame)
 

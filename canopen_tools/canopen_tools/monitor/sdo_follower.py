@@ -17,6 +17,8 @@ from arm_canopen.standard.sdo import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
+    FRAME_BYTES,
+    Response,
     Segment,
     UploadRequest,
     UploadResponse,
@@ -102,6 +104,12 @@ class SdoFollower:
             message = decode_response(data)
         except CodecError as error:
             return SdoText(str(error))
+        step = self._answer(message)
+        if len(data) == FRAME_BYTES:
+            return step
+        return SdoText(f'{step.text} ({len(data)} bytes instead of 8)', step.is_abort)
+
+    def _answer(self, message: Response) -> SdoText:
         match message:
             case UploadResponse(index, subindex, content, size):
                 return SdoText(self._initiated(index, subindex, content, size))

@@ -8,12 +8,13 @@ from collections.abc import Callable
 
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
-from arm_canopen.standard.datatypes import byte_length, DataType, decode, Value
+from arm_canopen.standard.datatypes import DataType, decode, Value
 from arm_canopen.standard.dictionary import object_address
 from arm_canopen.standard.drive import Controlword, drive_state, mode_title
 from arm_canopen.standard.emcy import error_code_text, error_register_text
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
 from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+from arm_canopen.standard.sdo import fitted
 
 CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
     (0x80, 0x80, 'Fault reset'),
@@ -161,7 +162,7 @@ def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes
     if data_type is None:
         return data.hex(' ') or 'nothing'
     try:
-        value = decode(data_type, data[: byte_length(data_type)])
+        value = decode(data_type, fitted(data_type, data))
     except CodecError as error:
         return f'{data.hex(" ")} ({error})'
     return value_text(index, subindex, value)

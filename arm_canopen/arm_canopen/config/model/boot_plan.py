@@ -93,9 +93,7 @@ class BootWrite:
         return value.to_bytes(len(self.data), 'little')
 
     def fits(self, held: bytes) -> bool:
-        """Return whether a value of the device is what is wanted; padding does not matter."""
-        if len(self.data) <= 4 and len(held) == 4:
-            held = held[: len(self.data)]
+        """Return whether a value of the device is what is wanted."""
         if self.mask is None or len(held) != len(self.data):
             return held == self.data
         return self.over(int.from_bytes(held, 'little')) == held
