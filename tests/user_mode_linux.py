@@ -32,6 +32,7 @@ MODULES = (
     'net/can/can-bcm.ko',
     'drivers/net/can/dev/can-dev.ko',
     'drivers/net/can/vcan.ko',
+    'net/sched/sch_tbf.ko',
 )
 
 INIT = """#!/bin/bash

@@ -15,6 +15,7 @@ import subprocess
 
 from can_receiving import receive_count, unstamped
 from can_strategies import frames
+from drive_samples import bus_config, drive_config
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -23,6 +24,7 @@ from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.interfaces import CanInterface, missing_interface_text
 from arm_canopen.can.socketcan import failure_text, pack, SocketCanBus, unpack
 from arm_canopen.exceptions import BusError
+from arm_canopen.library.bus_master import BusMaster
 
 _numbers = itertools.count()
 
@@ -134,6 +136,22 @@ def test_a_full_transmit_queue_is_reported_and_not_waited_for(
         assert bus.counters.sent == accepted + 1
 
 
+def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Nobody wants the set-points of half a second ago when the cable is plugged in again."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setblocking(False)
+    monkeypatch.setattr('arm_canopen.can.socketcan._open_socket', lambda name: ours)
+    config = bus_config(*(drive_config(f'joint{number}', number) for number in range(2, 9)))
+    with SocketCanBus('can0') as bus, theirs:
+        BusMaster(config, bus, lambda event: None)
+        with pytest.raises(BusError, match='transmit queue of can0 is full'):
+            send_for_ever(bus)
+        cycle = 1 + 7 * 3  # SYNC and RPDOs
+        assert 2 * cycle <= bus.counters.sent <= 4 * cycle
+
+
 def test_what_is_no_frame_of_the_kernel_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     """A read of another length is counted and does not end the bus."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -232,6 +250,21 @@ def test_an_adapter_that_is_plugged_in_again_is_used_again(vcan: str) -> None:
             bus.send(Frame(2))
             assert unstamped(receive_count(other, 1)) == [Frame(2)]
         assert bus.counters.lost == 0
+
+
+@pytest.mark.vcan
+def test_few_frames_wait_in_the_transmit_queue_of_the_kernel(vcan: str) -> None:
+    """A bus that carries next to nothing holds as many as it was told, and no hundreds."""
+    ip_link('set', vcan, 'up', 'txqueuelen', '1000')
+    slow = ['root', 'tbf', 'rate', '8kbit', 'burst', '100', 'limit', '1000000']
+    made = subprocess.run(['tc', 'qdisc', 'add', 'dev', vcan, *slow], check=False)
+    if made.returncode:
+        pytest.skip('no tc, or no tbf in this kernel')
+    with open_bus(vcan) as bus:
+        bus.limit_queue(60)
+        with pytest.raises(BusError, match='transmit queue'):
+            send_for_ever(bus)
+        assert 60 <= bus.counters.sent <= 90
 
 
 @pytest.mark.vcan

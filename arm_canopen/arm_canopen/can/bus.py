@@ -56,6 +56,15 @@ class Bus(ABC):
             BusError: The interface refuses it (down, transmit queue full).
         """
 
+    def limit_queue(self, frames: int) -> None:  # noqa: B027  # most cannot be told
+        """Let no more frames wait for the bus, as far as the interface can be told.
+
+        Those beyond are refused. What waits while the cable is off leaves when it is on again.
+
+        Args:
+            frames: About how many.
+        """
+
     @abstractmethod
     def receive(self, timeout: float) -> list[Frame]:
         """Wait for frames.

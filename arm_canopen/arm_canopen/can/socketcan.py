@@ -34,6 +34,7 @@ _ERROR_CLASSES = 0x1FFF_FFFF
 _FRAME = struct.Struct('=IB3x8s')  # struct can_frame: identifier with flags, length, payload
 
 _QUEUE_LENGTH_MIN = 100  # frames; the kernel's default of 10 is less than one cycle of an arm
+_QUEUED_FRAME = 1024  # [byte] that the kernel counts for one, 768 to 960 by its version
 _log = logging.getLogger(__name__)
 
 
@@ -49,6 +50,7 @@ class SocketCanBus(SocketBus):
         receiver = _open_socket(name)
         super().__init__(name, receiver)
         self._send_lock = Lock()
+        self._queue_limit = 0
         self._gone = False
 
     def receive(self, timeout: float) -> list[Frame]:
@@ -80,6 +82,12 @@ class SocketCanBus(SocketBus):
             self.counters.send_errors += 1
             raise self._explain(error) from error
 
+    def limit_queue(self, frames: int) -> None:
+        """Let no more frames wait in the transmit queue; see :meth:`Bus.limit_queue`."""
+        with self._send_lock:
+            self._queue_limit = frames
+            _limit_sending(self._receiver, frames)
+
     def _read_one(self) -> Frame | None:
         packed, ancillary, _, _ = self._receiver.recvmsg(_FRAME.size, ANCILLARY_SIZE)
         stamp = self._stamps.read(ancillary)
@@ -91,6 +99,8 @@ class SocketCanBus(SocketBus):
     def _reopen(self) -> None:
         receiver = _open_socket(self.name)
         with self._send_lock:
+            if self._queue_limit:
+                _limit_sending(receiver, self._queue_limit)
             old, self._receiver = self._receiver, receiver
             self._gone = False
         old.close()
@@ -160,6 +170,11 @@ def _open_socket(name: str) -> socket.socket:
         raw.close()
         raise BusError(failure_text(name, error)) from error
     return raw
+
+
+def _limit_sending(sock: socket.socket, frames: int) -> None:
+    # the kernel doubles the size for its own bookkeeping
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, frames * _QUEUED_FRAME // 2)
 
 
 def _check_interface(name: str) -> None:

@@ -38,6 +38,7 @@ from .bus_recording import BusRecording
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 QUICK_STOP = struct.pack('<H', Command.QUICK_STOP)
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
+QUEUED_CYCLES = 2  # whose frames may wait for the bus; older ones are worth nothing
 NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED, EventKind.SDO)
 """A device that is absent is no fault of one in operation."""
 
@@ -57,6 +58,12 @@ async def leave_device(
     if powered:  # again by itself, or by another master
         raise DriveError(f'{powered} is enabled again; cut its power')
     await device.unwatch()
+
+
+def frames_per_cycle(config: BusConfig) -> int:
+    """Return how many frames the master sends in a cycle: SYNC, heartbeat, RPDOs, and SDOs."""
+    rpdos = sum(pdo.enabled for node in config.nodes for pdo in node.rpdos)
+    return 2 + rpdos + len(config.nodes)
 
 
 class BusMaster:
@@ -94,6 +101,7 @@ class BusMaster:
         """
         self.config = config
         self.can = can
+        can.limit_queue(QUEUED_CYCLES * frames_per_cycle(config))
         self._report_event = report
         self._beside_master = beside_master
         self.load = BusLoad(config.master.bitrate, time.monotonic())
