@@ -108,6 +108,8 @@ class Fault(Enum):
     FOLLOWING_ERROR = _of_drive('the motor is too far from its demand', 0x8611)
     ENCODER_LOSS = _of_drive('the encoder gives no signal', 0x7305, at_once=True, lasting=True)
     BLOCKED_MOTOR = _of_drive('the motor is stuck', 0x7121, lasting=True)
+    HALT_IGNORED = _of_drive('has no halt: bit 8 does nothing', 0, lasting=True)
+    QUICK_STOP_IGNORED = _of_drive('has no quick stop: bit 2 does nothing', 0, lasting=True)
     STO = _of_drive('safe torque off: no torque, and no fault', 0, at_once=True, lasting=True)
     MODE_REQUIRED = _of_drive('refuses Operation enabled without a mode', 0, lasting=True)
     MODE_ZERO_REFUSED = _of_drive('refuses mode 0 in 0x6060', 0, lasting=True)

@@ -24,7 +24,13 @@ from .objects import DriveObjects, MILLISECOND, NO_WINDOW
 from .servo import ServoModel
 from .shared_errors import SharedErrors
 from .state_machine import chosen, POWERED_STATES, StateMachine, VOLTAGE_STATES
-from .states import AbortConnectionOption, FAULT_RESET_BIT, StopOption
+from .states import (
+    AbortConnectionOption,
+    decode_command,
+    DriveCommand,
+    FAULT_RESET_BIT,
+    StopOption,
+)
 from .switches import INTERLOCK_BIT, Switches
 
 FOLLOWING_ERROR_CODE = 0x8611
@@ -332,15 +338,21 @@ class Drive:
         self._word = word
         if word & ~previous & FAULT_RESET_BIT and self._machine.state is State.FAULT:
             self._reset_fault(now)
-        self._machine.command(word, now)
+        is_quick_stop = decode_command(word) is DriveCommand.QUICK_STOP
+        if not (is_quick_stop and Fault.QUICK_STOP_IGNORED in self.causes):
+            self._machine.command(word, now)
         if self._machine.operating:
             self._apply_halt(now)
             self._mode.command(word, previous, now)
             self._mode.update(now)
         self._publish(now)
 
+    @property
+    def _halted(self) -> bool:
+        return bool(self._word & HALT) and Fault.HALT_IGNORED not in self.causes
+
     def _apply_halt(self, now: float) -> None:
-        halted = bool(self._word & HALT)
+        halted = self._halted
         if halted is self._mode.halted:
             return
         self._mode.halted = halted
@@ -370,7 +382,7 @@ class Drive:
         self._publish(now)
 
     def _begin_mode(self, now: float) -> None:
-        self._mode.halted = bool(self._word & HALT)
+        self._mode.halted = self._halted
         self._mode.start(self._word, now)
         self._mode.update(now)
 
