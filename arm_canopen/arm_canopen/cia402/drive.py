@@ -16,14 +16,14 @@ from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, mode_title, OperationMode, Statusword
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_control import DriveControl
-from .drive_view import DriveView, FAULTY, POWERED
+from .drive_view import DriveView, FAULTY, LOOK_PERIOD, POWERED
 from .feed_forward import FeedForward
 from .following_watch import Following, FollowingWatch, MARGIN_TIME
 from .modes import NO_BITS
 from .motion import AxisFeedback, Setpoint
 from .refusal import Refusal, RefusalCause
 from .state_machine import Command, fault_reset, next_command
-from .stop_sequence import StopSequence
+from .stop_sequence import BrakingWatch, StopSequence
 from .target_limits import check_setpoint
 
 FOLLOWS_COMMAND = int(Statusword.FOLLOWS_COMMAND)
@@ -84,6 +84,8 @@ class Drive:
         self.feed_forward = FeedForward(self.objects, self.view.units)
         self._streamed = False
         self.stop = StopSequence(self.view, scheduler, self.report)
+        self._braking = BrakingWatch()
+        self._state = DriveState.UNKNOWN  # that the last cycle has seen
         self._reset_began: float | None = None
         self._begun = False
         self._announced = False
@@ -135,8 +137,9 @@ class Drive:
                 poll = self.node.objects.poll(self.node.config.poll_period)
                 self._polling = self._scheduler.background(poll)
         view = self.view
-        before = view.state
+        before = self._state
         view.observe()
+        self._state = view.state
         if view.state is DriveState.UNKNOWN:
             return
         self.following_error = self.control.setpoint - view.position
@@ -145,6 +148,7 @@ class Drive:
         if view.state is not before:
             self._state_changed(before)
         self._watch_sight()
+        self._watch_braking()
         self._watch_following()
         if not self._announced and view.ready:
             self._announced = True
@@ -157,7 +161,7 @@ class Drive:
             self.feed_forward.end()
         self._led, self._streamed = self._streamed, False
         command, bits = Command.DISABLE_VOLTAGE, NO_BITS
-        if self.view.state is not DriveState.UNKNOWN:
+        if self.node.operational and self.view.state is not DriveState.UNKNOWN:
             command, bits = self.control.step(self._command(), now, period)
         elif self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
@@ -203,7 +207,7 @@ class Drive:
         if self.control.goal is not None:
             self.control.goal = DriveState.SWITCH_ON_DISABLED
         first, self.failure = not self.failure, self.failure or text
-        if first or not self.stop.disabled:
+        if first or self.view.state in POWERED:
             self.stop.begin(quiet=not first)
         if not first:
             return
@@ -248,12 +252,43 @@ class Drive:
         if self._is_led_to_rest() or (control.halted and not control.halt.leaving):
             return
         control.hold()
+        self._scheduler.background(self._look_for_motion())
         self.released(Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old'))
         self.report(
             Severity.ERROR,
             f'stopped: no TPDOs for {view.age:.1f} s; it stays halted until the first target '
             'after they have come again',
         )
+
+    async def _look_for_motion(self) -> None:
+        """See by SDO whether a drive slows down whose TPDOs do not come."""
+        while not self.view.fresh and self.control.acts:
+            await self.view.look()
+            await self._scheduler.timer(LOOK_PERIOD)
+
+    def _watch_braking(self) -> None:
+        """Stop an axis by stronger means that a halt, or being disabled, does not slow down."""
+        view, control = self.view, self.control
+        halted = control.halted and not control.halt.leaving
+        leaves = control.goal not in {None, DriveState.OPERATION_ENABLED}
+        enabled = view.state is DriveState.OPERATION_ENABLED
+        if self.stop.running or not enabled or not (halted or leaves):
+            self._braking.clear()
+            return
+        if not self._braking.fails(
+            self._scheduler.now, view, view.parameters.profile.deceleration
+        ):
+            return
+        text = (
+            f'moves on at {view.rate:.3g} per second, although it was '
+            f'{"halted" if halted else "disabled"}: quick stop, and no power if that does not '
+            'slow it down either'
+        )
+        if halted:
+            control.goal = DriveState.QUICK_STOP_ACTIVE
+        self.stop.begin(disables=not halted)
+        self.released(Refusal(RefusalCause.NOT_ENABLED, 'its halt did not slow it down'))
+        self.report(Severity.ERROR, text)
 
     def _is_led_to_rest(self) -> bool:
         """Whether a motion source may still lead a silent drive, to stop it on its path."""
@@ -365,9 +400,9 @@ class Drive:
         self._unseen_since = None
         self._following.clear()
         control.forget()
-        self.stop.abandon(reason)
         view.error = self.failure = ''
         view.lose_sight()
+        self._state = DriveState.UNKNOWN
         cause = RefusalCause.OFFLINE
         if self.node.left_operational:
             cause = RefusalCause.NOT_OPERATIONAL

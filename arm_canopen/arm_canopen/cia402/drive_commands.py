@@ -44,7 +44,7 @@ class DriveCommands:
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
         self.drive = drive
         self._steps = DriveSequences(drive, scheduler)
-        self.stops = StopCommands(drive, self._steps)
+        self.stops = StopCommands(drive, self._steps, scheduler)
         self._stopping: dict[str, Sequence] = {
             'disable': self.stops.disable,
             'halt': self.stops.halt,
@@ -172,7 +172,8 @@ class DriveCommands:
 
         def stopped() -> bool:
             halted = halt.held and not halt.leaving
-            return halted or not control.stays_enabled or control.mode is not mode
+            led_away = drive.stop.running or not control.stays_enabled
+            return halted or led_away or control.mode is not mode
 
         await steps.until(
             lambda: stopped() or (delivery.done and not halt.leaving),

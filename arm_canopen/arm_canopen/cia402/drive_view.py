@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 import math
 
 from ..config.model.drive import DriveConfig
@@ -25,6 +26,8 @@ FAULTY = (DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE)
 EMCY_AGE_MAX = 0.2  # [s] of an EMCY that came with a fault
 POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which it may move under power, and falls or coasts when that goes."""
+LOOK_PERIOD = 0.02  # [s] between two readings by SDO of what TPDOs do not show
+LOOK_AGE_MAX = 0.5  # [s] of such a reading
 REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
 REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
 
@@ -40,7 +43,7 @@ class DriveView:
         objects: Its objects in the process image.
         state: State shown in the last cycle.
         statusword: 0x6041 as it was then.
-        fresh: Its state was known in the last cycle, and young enough to act on.
+        fresh: Its TPDOs showed its state in the last cycle, young enough to act on.
         error: 0x603F in words when it was faulted last, else empty.
         cache: Reads its parameters.
     """
@@ -70,6 +73,8 @@ class DriveView:
         self.fresh = False
         self.error = ''
         self._position = math.nan
+        self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
+        self._looked_at = -math.inf
         self._scheduler = scheduler
         self.cache = ParameterCache(node, config, self.units, scheduler, warn)
         polled = self.objects.position_is_polled
@@ -79,6 +84,17 @@ class DriveView:
     def parameters(self) -> DriveParameters:
         """What it reported about itself."""
         return self.cache.parameters
+
+    @property
+    def seen(self) -> bool:
+        """Whether its state is young enough to judge a stop by, from TPDOs or read by SDO."""
+        return self.fresh or self._looks
+
+    @property
+    def _looks(self) -> bool:
+        """Whether :meth:`look` has shown the state that TPDOs do not show."""
+        recent = self._scheduler.now - self._looked_at <= LOOK_AGE_MAX
+        return not self.fresh and self._looked is not None and recent
 
     @property
     def age(self) -> float:
@@ -103,7 +119,7 @@ class DriveView:
     @property
     def velocity(self) -> float:
         """Actual velocity in user units per second; from the positions where no PDO has it."""
-        reported = self.objects.velocity
+        reported = None if self._looks else self.objects.velocity
         return self.rate if reported is None else self.units.velocity_from_device(reported)
 
     @property
@@ -118,12 +134,21 @@ class DriveView:
 
     @property
     def stands(self) -> bool:
-        """Whether the axis stands; a real encoder is never quite still.
+        """Whether the axis was seen to stand; a real encoder is never quite still.
 
-        Both 0x606C and the rate of the position have to be slow, and fresh.
+        Both 0x606C and the rate of the position have to be slow, and seen.
         """
-        rest = max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
-        return self.fresh and self.speed <= rest
+        return self.speed_known and self.speed <= self.rest_speed
+
+    @property
+    def speed_known(self) -> bool:
+        """Whether it was seen for long enough to tell motion from rest."""
+        return self.seen and self._estimate.known
+
+    @property
+    def rest_speed(self) -> float:
+        """Speed in user units per second up to which it counts as standing."""
+        return max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
 
     @property
     def effort(self) -> float:
@@ -133,7 +158,7 @@ class DriveView:
     @property
     def ready(self) -> bool:
         """Whether its state and its parameters are known."""
-        return self.state is not DriveState.UNKNOWN and self.cache.known and self.fresh
+        return self.fresh and self.cache.known and self.state is not DriveState.UNKNOWN
 
     def error_of_emcy(self) -> str:
         """Return the error of an EMCY that came just now; empty for none, until 0x603F is read."""
@@ -151,14 +176,14 @@ class DriveView:
         if not node.online:
             detail = f' ({node.phase_detail})' if node.phase_detail else ''
             loss = f'; lost before: {node.loss}' if node.loss else ''
-            return f'offline: {node.phase.value}{detail}{loss}'
+            shown = f'{statusword_text(self.statusword)} by SDO; ' if self._looks else ''
+            return f'{shown}offline: {node.phase.value}{detail}{loss}'
         parts = ['no statusword yet']
         if self.state is not DriveState.UNKNOWN:
-            parts = [
-                statusword_text(self.statusword),
-                f'mode {mode_title(self.objects.mode_display)}',
-            ]
-            if not self.fresh:
+            parts = [statusword_text(self.statusword)]
+            if node.operational:
+                parts.append(f'mode {mode_title(self.objects.mode_display)}')
+            if not self.seen:
                 parts.append(f'no TPDOs for {self.age:.1f} s')
         if halted:
             parts.append('halted')
@@ -184,25 +209,57 @@ class DriveView:
         self.error = error_code_text(int(code)) if isinstance(code, int) else ''
 
     def observe(self) -> None:
-        """Take state and position from the process image."""
-        seen = self.objects.observe() if self.node.operational else None
-        if seen is None:
-            self.lose_sight()
-            return
-        word, position_inc = seen
-        self._position = self.units.position_from_device(position_inc)
-        self.fresh = self.objects.fresh(self._scheduler.now)
-        if self.fresh:
-            self._estimate.note(self._scheduler.now, position_inc)
+        """Take state and position from the process image, or from the last look by SDO."""
+        shown = self.objects.observe() if self.node.operational else None
+        self.fresh = shown is not None and self.objects.fresh(self._scheduler.now)
+        if self._looks:
+            shown = self._looked
+        elif self.fresh and shown is not None:
+            stamp = self.objects.position_timestamp
+            self._estimate.note(self._scheduler.now, shown[1], stamp)
         else:
             self._estimate.clear()
+        if shown is None:
+            self.state, self.statusword = DriveState.UNKNOWN, 0
+            return
+        word, position_inc = shown
+        self._position = self.units.position_from_device(position_inc)
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 
     def lose_sight(self) -> None:
         """Forget the state; the position stays the last one."""
         self.state, self.statusword, self.fresh = DriveState.UNKNOWN, 0, False
+        self._looked = None
         self._estimate.clear()
+
+    async def look(self) -> None:
+        """Read statusword and position by SDO; what is not answered stays unknown."""
+        objects, begin = self.node.objects, self._scheduler.now
+        try:
+            word = await objects.read_object(self.objects.at(Index.STATUSWORD))
+            position_inc = await objects.read_object(self.objects.at(Index.POSITION_ACTUAL))
+        except (SdoError, CodecError):
+            return
+        if isinstance(word, int) and isinstance(position_inc, int):
+            self._looked, self._looked_at = (word, position_inc), begin
+            if not self.fresh:
+                self._estimate.note(self._scheduler.now, position_inc)
+
+    @contextmanager
+    def looking(self) -> Iterator[None]:
+        """Look again and again while TPDOs do not show the state."""
+        task = self._scheduler.background(self._look_on())
+        try:
+            yield
+        finally:
+            task.cancel(SdoError('nothing more to see'))
+
+    async def _look_on(self) -> None:
+        while True:
+            await self._scheduler.timer(LOOK_PERIOD)
+            if not self.fresh:
+                await self.look()
 
     def actual(self) -> Actual:
         """Return where the drive is, and the velocity from which it has to be braked.

@@ -101,7 +101,12 @@ class DriveSequences:
                 await self._select_where_required(timeout)
             drive.control.goal = goal
             slow = 'if it only takes longer: `quirks: slow_states` in bus.yml'
-            await self.until(lambda: drive.view.state is goal, timeout, goal.title, slow)
+            await self.until(
+                lambda: drive.view.state is goal and not drive.stop.running,
+                timeout,
+                goal.title,
+                slow,
+            )
         except BaseException:  # also when it is cancelled: nobody waits for the rest of the way
             drive.leave_operation()
             raise
@@ -227,7 +232,10 @@ class DriveSequences:
         ramp = view.speed / view.parameters.profile.deceleration  # [s]
         control.hold()
         await self.settle()
-        await self.until(lambda: control.mode.braked and view.stands, timeout + ramp, 'standstill')
+        with view.looking():
+            await self.until(
+                lambda: control.mode.braked and view.stands, timeout + ramp, 'standstill'
+            )
 
     async def reset_fault(self) -> None:
         """Reset a fault if there is one."""

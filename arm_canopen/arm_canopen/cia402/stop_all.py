@@ -75,7 +75,7 @@ async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[_Outc
         try:
             await _to_its_end(commands.request('halt'), commands, scheduler)
         except CanopenError:
-            if not (view.fresh and view.state in FAULTY):
+            if not (view.seen and view.state in FAULTY):
                 raise
         await _at_rest(commands, scheduler)
     except CanopenError as error:
@@ -116,12 +116,10 @@ async def _at_rest(commands: DriveCommands, scheduler: Scheduler) -> None:
     view = drive.view
 
     def rests() -> bool:
-        if view.state in POWERED:
-            return view.stands
-        return view.fresh and view.state is not DriveState.FAULT_REACTION_ACTIVE
+        return view.stands and view.state is not DriveState.FAULT_REACTION_ACTIVE
 
     timeout = BRAKED_TIMEOUT + drive.stop.ramp_time()
-    with suppress(TimeoutError):
-        await scheduler.until(lambda: rests() or not view.node.operational, timeout)
+    with view.looking(), suppress(TimeoutError):
+        await scheduler.until(rests, timeout)
     if not rests():
         raise DriveError(f'{drive.name} is not seen to come to rest: {drive.describe()}')

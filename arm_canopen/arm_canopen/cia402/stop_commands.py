@@ -4,12 +4,17 @@
 
 from __future__ import annotations
 
-from ..config.model.drive import RecoveryPolicy
+from collections.abc import Coroutine
+from contextlib import suppress
+from typing import Any
+
 from ..exceptions import DriveError
+from ..master.scheduler import Promise, Scheduler
 from ..standard.drive import DriveState
 from .drive import Drive
 from .refusal import Refusal, RefusalCause
 from .sequences import DriveSequences
+from .stop_sequence import STOP_TIMEOUT
 
 BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of the ramp
 
@@ -17,82 +22,127 @@ BRAKED_TIMEOUT = 10.0  # [s] for a halt to end in standstill, beside the time of
 class StopCommands:
     """Disable, halt, quick stop and shutdown of one drive."""
 
-    def __init__(self, drive: Drive, steps: DriveSequences) -> None:
+    def __init__(self, drive: Drive, steps: DriveSequences, scheduler: Scheduler) -> None:
         self._drive = drive
         self._steps = steps
+        self._scheduler = scheduler
 
     async def disable(self) -> str:
         """Lead to Switched On, as ros2_canopen's service does; the motor is without torque."""
         drive = self._drive
-        await self._ready_to_stop('disabled')
+        if not await self._ready_to_stop('disabled'):
+            return await self.shutdown()
         if drive.view.state is DriveState.OPERATION_ENABLED:
-            await self._steps.reach(DriveState.SWITCHED_ON)
+            await self._escalated(self._steps.reach(DriveState.SWITCHED_ON))
         else:
             await self._stay_disabled()
-        return drive.describe()
+        return await self._at_rest()
 
     async def halt(self) -> str:
-        """Brake and stay enabled (bit 8, option code 0x605D); the next single target goes on."""
+        """Brake and stay enabled (bit 8, option code 0x605D); the next single target goes on.
+
+        A drive that this does not slow down, or that no PDO reaches, gets a quick stop.
+        """
         drive = self._drive
-        await self._ready_to_stop('halted')
+        if not await self._ready_to_stop('halted'):
+            return await self._quick_stop()
         if self._is_quick_stopped():
-            return f'nothing to halt: {drive.describe()}'
+            return f'nothing to halt: {await self._at_rest()}'
         if not drive.control.stays_enabled:
             await self._stay_disabled()
-            return f'nothing to halt: {drive.describe()}'
+            return f'nothing to halt: {await self._at_rest()}'
         # whatever was about to lead it elsewhere
         drive.control.goal = DriveState.OPERATION_ENABLED
-        await self._steps.halt(BRAKED_TIMEOUT)
+        await self._escalated(self._steps.halt(BRAKED_TIMEOUT))
         return drive.describe()
 
     async def quick_stop(self) -> str:
-        """Quick stop; what follows depends on the drive's option code 0x605A."""
-        drive, steps = self._drive, self._steps
-        await self._ready_to_stop('quick stop')
-        if drive.view.state is DriveState.OPERATION_ENABLED:
-            drive.control.goal = DriveState.QUICK_STOP_ACTIVE
-            await steps.until(
-                lambda: drive.view.state is not DriveState.OPERATION_ENABLED,
-                steps.quirks.state_timeout,
-                'the quick stop',
-            )
-            return drive.describe()
+        """Quick stop; what follows at rest depends on the drive's option code 0x605A."""
+        drive = self._drive
+        reachable = await self._ready_to_stop('quick stop')
+        if not reachable or drive.view.state is DriveState.OPERATION_ENABLED:
+            return await self._quick_stop()
         if not self._is_quick_stopped():
             await self._stay_disabled()
-        return f'nothing to stop: {drive.describe()}'
+        return f'nothing to stop: {await self._at_rest()}'
 
     async def shutdown(self) -> str:
         """Bring the drive to rest and take its power away.
 
         Raises:
-            DriveError: It does not show that its power is away.
+            DriveError: It was not seen to rest without power.
         """
         drive = self._drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.SHUTDOWN))
+        self._require_booted()
         drive.control.goal = DriveState.SWITCH_ON_DISABLED
         await drive.stop.run()
-        if not drive.stop.disabled:
-            raise self._steps.refused('is not disabled; cut its power')
+        if not await drive.stop.confirmed():
+            what = 'not seen to come to rest' if drive.stop.disabled else 'not disabled'
+            raise self._steps.refused(f'is {what}; cut its power')
         return drive.describe()
 
-    async def _ready_to_stop(self, reason: str) -> None:
-        """Take the drive from whatever moves it, or would do so when it comes back.
+    async def _quick_stop(self) -> str:
+        """Quick stop by whatever reaches the drive; one that goes on loses its power."""
+        drive = self._drive
+        drive.control.goal = DriveState.QUICK_STOP_ACTIVE
+        await drive.stop.run(disables=False)
+        if not drive.stop.rests:
+            raise self._steps.refused('is not seen to come to rest; cut its power')
+        return drive.describe()
+
+    async def _escalated(self, stop: Coroutine[Promise[Any], None, None]) -> None:
+        """Await a stop; where it does not slow the drive down, the end of what follows it."""
+        drive = self._drive
+        try:
+            await stop
+        except DriveError:
+            if not drive.stop.running:
+                raise
+            await drive.stop.ended()
+            if not drive.stop.rests:
+                raise
+
+    async def _at_rest(self) -> str:
+        """Describe the drive when it was seen to stand.
 
         Raises:
-            DriveError: It is offline or faulted.
+            DriveError: It moves on, or is not seen.
+        """
+        view = self._drive.view
+        timeout = STOP_TIMEOUT + self._drive.stop.ramp_time()
+        with view.looking(), suppress(TimeoutError):
+            await self._scheduler.until(lambda: view.stands, timeout)
+        if not view.stands:
+            raise self._steps.refused('is not seen to come to rest; cut its power')
+        return self._drive.describe()
+
+    def _require_booted(self) -> None:
+        if not self._drive.node.was_booted:
+            raise self._steps.refused('is not known to stand, as it was never booted')
+
+    async def _ready_to_stop(self, reason: str) -> bool:
+        """Take the drive from whatever moves it, or would do so when it comes back.
+
+        Returns:
+            Whether it can be braked by PDOs; it cannot while a quick stop already runs.
+
+        Raises:
+            DriveError: It was never booted, or is faulted.
         """
         drive = self._drive
-        returning = drive.interrupted is not None and drive.config.recovery is RecoveryPolicy.AUTO
         drive.interrupted = None
+        drive.released(Refusal(RefusalCause.COMMANDED, reason))
+        self._require_booted()
+        if not drive.node.operational or drive.stop.running:
+            return False
         try:
             await self._steps.ready(to_stop=True)
-        except DriveError as error:
-            if not returning:
-                raise
-            raise DriveError(f'{error}; it will not be enabled when it comes back') from error
+        except DriveError:
+            return False  # it shows nothing, or not any more
         self._steps.require_no_fault()
-        drive.released(Refusal(RefusalCause.COMMANDED, reason))
+        return True
 
     async def _stay_disabled(self) -> None:
         """Have it enabled no more, also where the command for that is on its way already."""

@@ -5,34 +5,63 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 from ..exceptions import CodecError, SdoError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, statusword_text
 from ..standard.objects import Index
-from .drive_view import DriveView, FAULTY
+from .drive_view import DriveView
 from .state_machine import Command
 
-REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command by RPDO
+REACTION_TIME = 0.5  # [s] in which a drive shows that it has got a command
+UNSEEN_TIMEOUT = 1.0  # [s] for it to show anything, beside the time of the ramp
 STOP_TIMEOUT = 2.0  # [s] to come to rest, beside the time of the ramp
 RAMP_MAX = 10.0  # [s] that a ramp may take on the way out; then the power goes all the same
-SHUTDOWN_MAX = STOP_TIMEOUT + (STOP_TIMEOUT + RAMP_MAX) + STOP_TIMEOUT
-"""Longest time of a shutdown in [s]: to begin the stop, to come to rest, to lose the power."""
-DISABLED = (
-    DriveState.SWITCH_ON_DISABLED,
-    DriveState.NOT_READY_TO_SWITCH_ON,
-    DriveState.UNKNOWN,
-    *FAULTY,
-)
+SHUTDOWN_MAX = STOP_TIMEOUT + RAMP_MAX + 2 * STOP_TIMEOUT
+"""Longest time of a shutdown in [s]: to brake, to lose the power, and to run out without it."""
+DISABLED = (DriveState.SWITCH_ON_DISABLED, DriveState.NOT_READY_TO_SWITCH_ON, DriveState.FAULT)
+"""States without power; after UNKNOWN and in the reaction to a fault it may still move."""
+FALLEN_RATIO = 0.98  # of the least speed so far, below which a speed is falling
+PATIENCE_RATIO = 0.04  # of the time of a ramp, in which more than that has to be seen
+
+
+class BrakingWatch:
+    """Judges whether a stop that was commanded slows an axis down, by its positions."""
+
+    def __init__(self) -> None:
+        self._least = math.inf
+        self._since = 0.0
+
+    def clear(self) -> None:
+        """Judge from the next speed on."""
+        self._least = math.inf
+
+    def fails(self, now: float, view: DriveView, deceleration: float) -> bool:
+        """Return whether the axis was seen not to slow down for too long.
+
+        Args:
+            now: Steady time in [s].
+            view: The state of the drive.
+            deceleration: Of the stop, in user units per second squared.
+        """
+        if not view.speed_known:
+            self.clear()
+            return False
+        speed = max(abs(view.rate), view.rest_speed)
+        if speed == view.rest_speed or speed < FALLEN_RATIO * self._least:
+            self._least, self._since = speed, now
+        return now - self._since > max(REACTION_TIME, PATIENCE_RATIO * speed / deceleration)
 
 
 class StopSequence:
     """Stops a drive and takes its power away; every step has a deadline.
 
-    It looks at the process image itself, because it also serves drives whose part of the cycle
-    fails. A drive that does not react is commanded by SDO; then no RPDO carries its controlword
-    any more, which might enable it again. Where the SDO fails, the RPDO leaves again if it can.
+    A drive that does not react to its RPDO, or gets none because its device is not operational,
+    is commanded by SDO; then no RPDO carries its controlword any more, which might enable it
+    again. Where the SDO fails, the RPDO leaves again if it can. What its TPDOs do not show is read
+    by SDO. A drive that a quick stop does not slow down loses its power.
 
     Attributes:
         goal: State that the drive is led to, whatever else is commanded; None while it does not
@@ -42,12 +71,12 @@ class StopSequence:
     def __init__(
         self, view: DriveView, scheduler: Scheduler, report: Callable[[Severity, str], None]
     ) -> None:
-        """Take the state of the drive and the time; nothing runs before :meth:`begin`.
+        """Bind it to the drive; nothing runs before :meth:`begin`.
 
         Args:
             view: The state of the drive.
             scheduler: Time.
-            report: Takes what goes wrong.
+            report: Receives what goes wrong.
         """
         self.goal: DriveState | None = None
         self._view = view
@@ -56,6 +85,9 @@ class StopSequence:
         self._task: Task[None] | None = None
         self._sdo_error = ''
         self._quiet = False
+        self._disables = True
+        self._braking = BrakingWatch()
+        self._began = self._unseen_after = 0.0
 
     @property
     def running(self) -> bool:
@@ -64,37 +96,54 @@ class StopSequence:
 
     @property
     def disabled(self) -> bool:
-        """Whether the drive shows that its power is away, or shows nothing at all."""
-        return self._view.objects.state in DISABLED
+        """Whether the drive was seen to be without power."""
+        return self._view.seen and self._view.state in DISABLED
+
+    @property
+    def rests(self) -> bool:
+        """Whether the drive was seen to stand, and no target moves it any more."""
+        enabled = self._view.state in {DriveState.OPERATION_ENABLED, DriveState.UNKNOWN}
+        return self._view.stands and not enabled
 
     def ramp_time(self) -> float:
         """Return how long it brakes in [s], by the slower of its ramps."""
-        parameters = self._view.parameters
-        ramp = min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
-        return min(RAMP_MAX, self._view.speed / ramp)
+        return min(RAMP_MAX, self._view.speed / self._deceleration)
 
-    def begin(self, *, quiet: bool = False) -> None:
+    @property
+    def _deceleration(self) -> float:
+        parameters = self._view.parameters
+        return min(parameters.quick_stop_deceleration, parameters.profile.deceleration)
+
+    def begin(self, *, quiet: bool = False, disables: bool = True) -> None:
         """Begin, unless it runs already; what kept the RPDO from the drive before may be over.
 
         Args:
             quiet: Do not report what goes wrong: it is tried again and again.
+            disables: Disable a drive that a quick stop holds at rest; one that runs does so, too.
         """
-        if not self.running:
-            self._quiet = quiet
-            self._view.objects.unmute_controlword()
-            self.goal = DriveState.QUICK_STOP_ACTIVE
-            self._task = self._scheduler.background(self._run())
+        if self.running:
+            self._disables |= disables
+            return
+        self._quiet, self._disables = quiet, disables
+        self._view.objects.unmute_controlword()
+        self.goal = DriveState.QUICK_STOP_ACTIVE
+        self._task = self._scheduler.background(self._run())
 
-    async def run(self) -> None:
+    async def run(self, *, disables: bool = True) -> None:
         """Begin if need be, and wait for the end."""
         if self._quiet:
             self.abandon('begun anew')  # what has failed in it may work now
-        self.begin()
+        self.begin(disables=disables)
         await self.ended()
+
+    async def confirmed(self) -> bool:
+        """Return whether the drive is seen to stand without power now."""
+        with self._view.looking():
+            return await self._within(UNSEEN_TIMEOUT, lambda: self.disabled and self.rests)
 
     async def ended(self) -> None:
         """Wait until it does not run."""
-        await self._within(SHUTDOWN_MAX, lambda: not self.running)
+        await self._within(SHUTDOWN_MAX + REACTION_TIME, lambda: not self.running)
 
     def abandon(self, reason: str) -> None:
         """End it where it is."""
@@ -104,54 +153,98 @@ class StopSequence:
 
     def use_sdo(self) -> None:
         """Command the drive by SDO from now on, because its RPDO does not reach it."""
-        objects = self._view.objects
-        if objects.mutes_controlword:
+        if self._view.objects.mutes_controlword:
             return
-        objects.mute_controlword()
+        self._view.objects.mute_controlword()
         if self.running:
             self._write()
 
     async def _run(self) -> None:
         """Lead through the steps; what holds already ends a step at once."""
-        objects = self._view.objects
+        view = self._view
         self._sdo_error = ''
-        deadline = self._scheduler.now + STOP_TIMEOUT + self.ramp_time()
+        self._note_sight()
         try:
-            await self._lead(
-                DriveState.QUICK_STOP_ACTIVE,
-                lambda: objects.state is not DriveState.OPERATION_ENABLED,
-            )
-            if not await self._within(deadline - self._scheduler.now, self._rests):
-                self._report_motion()
-            await self._lead(DriveState.SWITCH_ON_DISABLED, lambda: self.disabled)
-            if not await self._within(STOP_TIMEOUT, lambda: self.disabled):
-                error = f' ({self._sdo_error})' if self._sdo_error else ''
-                self._report(f'does not show that it is disabled{error}', '. Cut its power')
+            with view.looking():
+                await self._lead(
+                    DriveState.QUICK_STOP_ACTIVE,
+                    lambda: self.disabled or self.rests,
+                    STOP_TIMEOUT + RAMP_MAX,
+                )
+                braked = not self._gives_up()
+                if not (self.disabled or self.rests):
+                    self._report_motion()
+                if not self._disables and (self.rests or (braked and not self.disabled)):
+                    return
+                await self._lead(
+                    DriveState.SWITCH_ON_DISABLED, lambda: self.disabled, STOP_TIMEOUT
+                )
+                if not self.disabled:
+                    error = f' ({self._sdo_error})' if self._sdo_error else ''
+                    self._report(f'does not show that it is disabled{error}', '. Cut its power')
+                elif not await self._within(STOP_TIMEOUT, lambda: self.rests):
+                    self._report('has no power, but moves on', '. Does its brake hold?')
         finally:
             self.goal = None
 
+    async def _lead(self, goal: DriveState, done: Callable[[], bool], timeout: float) -> None:
+        """Command a state, again and again by SDO where the drive does not react to its RPDO."""
+        self.goal = goal
+        view, self._began = self._view, self._scheduler.now
+        end = self._began + timeout
+        self._braking.clear()
+
+        def left() -> float:
+            return max(0.0, end - self._scheduler.now)
+
+        def reacts() -> bool:
+            waits = (DriveState.OPERATION_ENABLED, DriveState.UNKNOWN)
+            return done() or self._gives_up() or (view.seen and view.state not in waits)
+
+        by_sdo = view.objects.controlword_muted or not view.node.operational
+        while True:
+            if by_sdo:
+                view.objects.mute_controlword()
+                self._write()
+            if await self._within(min(REACTION_TIME, left()), reacts) or not left():
+                break
+            if not by_sdo:
+                self._braking.clear()  # the drive may not have got its command before
+            by_sdo = True
+        await self._within(left(), lambda: done() or self._gives_up())
+
+    def _note_sight(self) -> None:
+        """The drive is seen: should it fall silent, its ramp may take as long as from now on."""
+        self._unseen_after = self._scheduler.now + UNSEEN_TIMEOUT + self.ramp_time()
+
+    def _gives_up(self) -> bool:
+        """Return whether the step is in vain: the drive does not slow down, or shows nothing."""
+        view, now = self._view, self._scheduler.now
+        if not view.seen:
+            return now > self._unseen_after
+        self._note_sight()
+        idle = view.stands and view.state is DriveState.OPERATION_ENABLED
+        if idle and now - self._began > STOP_TIMEOUT:
+            return True
+        return self._braking.fails(now, view, self._deceleration)
+
     def _report_motion(self) -> None:
-        """Report that it is not seen to rest: it moves, or sends nothing any more."""
-        silence = self._scheduler.now - self._view.objects.timestamp
-        if self._view.objects.fresh(self._scheduler.now):
+        """Report that it is not seen to rest: it moves, or shows nothing any more."""
+        view = self._view
+        if view.seen:
             self._report('did not come to rest in time')
-        else:
-            self._report(
-                f'has sent no TPDO for {silence:.1f} s, and is not seen to come to rest; last',
-                '. Check its power and cable',
-            )
+            return
+        silence = self._scheduler.now - view.objects.timestamp
+        self._report(
+            f'has sent no TPDO for {silence:.1f} s, and is not seen to come to rest; last',
+            '. Check its power and cable',
+        )
 
     def _report(self, what: str, remedy: str = '') -> None:
         if not self._quiet:
-            self._log(Severity.ERROR, f'{what}: {self._shown()}{remedy}')
-
-    async def _lead(self, goal: DriveState, reacts: Callable[[], bool]) -> None:
-        """Command a state, by SDO where the drive does not react to its RPDO."""
-        self.goal = goal
-        if self._view.objects.controlword_muted:
-            self._write()
-        elif not await self._within(REACTION_TIME, reacts):
-            self.use_sdo()
+            view = self._view
+            shown = f'{statusword_text(view.objects.statusword)}; {view.speed:.3g} per second'
+            self._log(Severity.ERROR, f'{what}: {shown}{remedy}')
 
     def _write(self) -> None:
         """Write the controlword of this step; the step does not wait for the answer."""
@@ -169,19 +262,19 @@ class StopSequence:
             if objects.mutes_controlword and objects.can_send(int(command)):
                 objects.unmute_controlword()
 
-    def _shown(self) -> str:
-        view = self._view
-        return f'{statusword_text(view.objects.statusword)}; {view.speed:.3g} per second'
-
-    def _rests(self) -> bool:
-        state = self._view.objects.state
-        if state is DriveState.QUICK_STOP_ACTIVE:  # option codes 5 to 8 hold there
-            return self._view.stands
-        return state is not DriveState.OPERATION_ENABLED
-
     async def _within(self, timeout: float, condition: Callable[[], bool]) -> bool:
+        """Return whether a condition holds in time, for a drive whose cycle may fail."""
+        view = self._view
+
+        def holds() -> bool:
+            try:
+                view.observe()
+            except Exception:  # noqa: BLE001  # what made the cycle fail may last
+                view.lose_sight()
+            return condition()
+
         try:
-            await self._scheduler.until(condition, timeout)
+            await self._scheduler.until(holds, timeout)
         except TimeoutError:
             return False
         return True

@@ -23,9 +23,21 @@ class VelocityEstimate:
         self._window = max(WINDOW, 2.5 * poll_period)
         self._positions: deque[tuple[float, float]] = deque()
 
-    def note(self, now: float, position_inc: float) -> None:
-        """Take a position in [inc] at a steady time in [s]."""
+    def note(self, now: float, position_inc: float, stamp: float | None = None) -> None:
+        """Add a position in [inc].
+
+        Args:
+            now: Steady time in [s].
+            position_inc: The position.
+            stamp: Steady time in [s] at which it came; one that has not come anew for a window
+                counts as still there.
+        """
         positions = self._positions
+        if stamp is not None and positions and stamp <= positions[-1][0]:
+            if now - positions[-1][0] <= self._window:
+                return
+        elif stamp is not None:
+            now = stamp
         positions.append((now, position_inc))
         while len(positions) > 2 and positions[1][0] <= now - self._window:
             positions.popleft()
@@ -33,6 +45,13 @@ class VelocityEstimate:
     def clear(self) -> None:
         """Forget all positions."""
         self._positions.clear()
+
+    @property
+    def known(self) -> bool:
+        """Whether the positions span enough time to tell motion from rest."""
+        if len(self._positions) < 2:
+            return False
+        return self._positions[-1][0] - self._positions[0][0] >= 0.5 * self._window
 
     @property
     def rate(self) -> float:

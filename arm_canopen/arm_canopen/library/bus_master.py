@@ -51,12 +51,16 @@ async def leave_device(
     From the first step on, nothing but that is commanded to them.
 
     Raises:
-        DriveError: An axis keeps its power; the device goes on to watch the master, and stops it.
+        DriveError: An axis was not seen to rest without power; the device goes on to watch the
+            master, and stops it.
     """
-    await scheduler.gather([axis.leave() for axis in axes])
-    powered = ', '.join(axis.drive.name for axis in axes if not axis.drive.stop.disabled)
-    if powered:  # again by itself, or by another master
-        raise DriveError(f'{powered} is enabled again; cut its power')
+    ends = [axis.leave() for axis in axes]
+    if not device.was_booted:
+        return  # nothing was commanded to it
+    await scheduler.gather(ends)
+    for axis in axes:
+        if not await axis.drive.stop.confirmed():  # by itself, or by another master
+            raise DriveError(f'{axis.drive.name} moves or is enabled again; cut its power')
     await device.unwatch()
 
 
@@ -227,7 +231,8 @@ class BusMaster:
         """
         if self.black_box is not None:
             self.black_box.fault('', f'{OWNER} has ended by a defect')
-        powered = [axis.drive for axis in self.commands.values() if not axis.drive.stop.disabled]
+        drives = [axis.drive for axis in self.commands.values()]
+        powered = [each for each in drives if each.node.was_booted and not each.stop.disabled]
         for drive in powered:
             index = drive.objects.at(Index.CONTROLWORD)
             request = DownloadRequest(index, 0, QUICK_STOP)

@@ -133,6 +133,11 @@ class RemoteNode:
         return self.online and not self.left_operational
 
     @property
+    def was_booted(self) -> bool:
+        """Whether this master has booted it, so that its axes may move by a command of ours."""
+        return self.online or bool(self.loss)
+
+    @property
     def phase_text(self) -> str:
         """How far it has booted, in words."""
         return f'{self.phase.value} {self.phase_detail}'.rstrip()

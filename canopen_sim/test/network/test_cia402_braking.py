@@ -8,7 +8,6 @@ from drive_samples import PERIOD, SCALE
 from moving_drive import JOINT, MovingDrive, RAMP, STANDING
 import pytest
 
-from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState
 
 pytestmark = pytest.mark.slow
@@ -84,8 +83,7 @@ def test_a_disable_whose_ramp_does_not_end_becomes_a_quick_stop() -> None:
     moving.net.devices[JOINT].store.find(0x6084).value = 500
     disabling = moving.net.begin(JOINT, 'disable', preempt=True)
     moving.run(12.0)
-    with pytest.raises(DriveError, match='did not reach Switched on within 6'):
-        disabling.result()
+    assert 'Switch on disabled' in disabling.result()
     assert_braked(moving, DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED)
 
 

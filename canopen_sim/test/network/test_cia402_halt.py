@@ -454,8 +454,10 @@ def test_a_lesser_stop_does_not_end_a_quick_stop(verb: str) -> None:
     net = running_in(OperationMode.PROFILE_POSITION, sdo_writes=writes)
     net.commands[JOINT].set_target(3.0)
     net.run(0.8)
-    net.do(JOINT, 'quick_stop', preempt=True)
+    net.begin(JOINT, 'quick_stop', preempt=True)
     net.run(0.1)
+    assert 'Quick stop active' in net.do(JOINT, verb, preempt=True)
+    assert abs(net.drives[JOINT].view.velocity) < 0.01
     assert 'nothing to' in net.do(JOINT, verb, preempt=True)
     net.run(3.0)
     assert net.drives[JOINT].view.state is DriveState.QUICK_STOP_ACTIVE
@@ -469,10 +471,8 @@ def test_recovery_does_not_undo_a_stop(verb: str) -> None:
     net = running_in(OperationMode.CYCLIC_POSITION, axes=(axis,))
     net.power_off(JOINT)
     net.run(1.0)
-    if verb == 'shutdown':
-        net.do(JOINT, verb, preempt=True)
-    elif verb:
-        with pytest.raises(DriveError, match='will not be enabled when it comes back'):
+    if verb:
+        with pytest.raises(DriveError, match='cut its power: offline'):
             net.do(JOINT, verb, preempt=True)
     net.power_on(JOINT)
     net.run(3.0)

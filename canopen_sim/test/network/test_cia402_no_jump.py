@@ -259,7 +259,7 @@ def test_shutdown_never_lets_a_moving_axis_go(
     loaded = Loaded(sdo_writes=writes)
     loaded.move(mode)
     if halted:
-        loaded.net.do(JOINT, 'quick_stop', preempt=True)
+        loaded.net.begin(JOINT, 'quick_stop', preempt=True)
         loaded.net.run(0.05)
         assert loaded.net.drives[JOINT].view.velocity > 0.1
     drive = loaded.net.devices[JOINT].drive
@@ -275,16 +275,35 @@ def test_shutdown_never_lets_a_moving_axis_go(
     assert not [text for text in loaded.net.reported() if 'did not come to rest' in text]
 
 
-def test_shutdown_of_a_drive_that_is_off_lost_or_faulted_ends_at_once() -> None:
-    """There is nothing to wait for, and nothing is raised."""
+def test_shutdown_of_a_drive_that_is_off_or_faulted_ends_at_once() -> None:
+    """It is seen to stand without power, so nothing has to be waited for."""
     loaded = Loaded()
-    loaded.net.do(JOINT, 'shutdown', timeout=0.1)
+    assert 'Switch on disabled' in loaded.net.do(JOINT, 'shutdown', timeout=0.1)
     loaded.enable(OperationMode.PROFILE_POSITION)
     drive = loaded.net.devices[JOINT].drive
     assert drive is not None
     drive.raise_fault(0x4210, loaded.net.now)
     loaded.net.run(0.5)
     assert 'Fault' in loaded.net.do(JOINT, 'shutdown', timeout=0.1)
-    loaded.net.power_off(JOINT)
-    loaded.net.run(1.0)
-    assert 'offline' in loaded.net.do(JOINT, 'shutdown', timeout=0.1)
+
+
+@pytest.mark.parametrize('gone', [True, False], ids=['no power', 'moves on'])
+def test_shutdown_of_a_lost_drive_is_no_success_unless_its_rest_is_seen(gone: bool) -> None:
+    """A device without an answer may move; one whose heartbeat alone is lost is stopped by SDO."""
+    loaded = Loaded()
+    loaded.move(OperationMode.PROFILE_VELOCITY)
+    drive = loaded.net.devices[JOINT].drive
+    assert drive is not None
+    if gone:
+        loaded.net.power_off(JOINT)
+        loaded.net.run(1.0)
+        with pytest.raises(DriveError, match='not disabled; cut its power: offline'):
+            loaded.net.do(JOINT, 'shutdown', timeout=5.0)
+        return
+    lost = {base + NODE_ID for base in (0x180, 0x280, 0x700)}
+    loaded.net.wire.loses = lambda sender, frame: frame.can_id in lost
+    loaded.net.run(0.4)
+    answer = loaded.net.do(JOINT, 'shutdown', timeout=5.0)
+    assert 'Switch on disabled' in answer
+    assert abs(drive.velocity) < 1e-3 * SCALE
+    assert drive.state is DriveState.SWITCH_ON_DISABLED

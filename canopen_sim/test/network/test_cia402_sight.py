@@ -191,13 +191,17 @@ def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMo
     assert careless.axes == JOINTS
 
 
+@pytest.mark.parametrize('answers', [(), (0x580,)], ids=['SDO', 'no SDO'])
 @pytest.mark.parametrize('stop', ['halt', 'disable', 'quick_stop'])
-def test_a_stop_reaches_a_drive_that_cannot_be_seen(stop: str) -> None:
-    """It is sent at once, though nobody can confirm it: the answer is an error with the reason."""
+def test_a_stop_reaches_a_drive_that_cannot_be_seen(stop: str, answers: tuple[int, ...]) -> None:
+    """It is sent at once; where SDOs do not show the rest either, the answer is an error."""
     arm = Arm(OperationMode.CYCLIC_POSITION)
-    arm.lose(*TPDOS)
+    arm.lose(*TPDOS, *answers)
     arm.net.run(0.6)
-    with pytest.raises(DriveError, match='no TPDOs for'):
+    if answers:
+        with pytest.raises(DriveError, match='no TPDOs for'):
+            arm.net.do(BLIND, stop, preempt=True)
+    else:
         arm.net.do(BLIND, stop, preempt=True)
     device = arm.net.devices[BLIND].drive
     assert device is not None

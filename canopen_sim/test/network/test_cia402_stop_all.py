@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from drive_samples import bus_config, drive_config, PERIOD, SCALE
+from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from moving_drive import JOINT, MovingDrive, STANDING
 import pytest
 from virtual_network import VirtualNetwork
@@ -12,6 +12,8 @@ from virtual_network import VirtualNetwork
 from arm_canopen.cia402.stop_all import stop_all, StopReport
 from arm_canopen.master.remote_node import BootPhase
 from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.nmt import NmtCommand
+from canopen_sim.drive.drive import Drive as SimulatedDrive
 
 pytestmark = pytest.mark.slow
 
@@ -20,32 +22,56 @@ MOVES, RESTS, HOMES, WAITS, DIES = NAMES = ('moves', 'rests', 'homes', 'waits', 
 
 def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
     """A move, a homing, rest, no power; one without an answer keeps no other from it."""
-    net = VirtualNetwork(bus_config(*(drive_config(n, 2 + i) for i, n in enumerate(NAMES))))
+    writes = (*MOTION_WRITES, sdo_write(0x6099, 1, 5_000))
+    drives = (drive_config(name, 2 + n, sdo_writes=writes) for n, name in enumerate(NAMES))
+    net = VirtualNetwork(bus_config(*drives))
     net.boot()
     for name in (MOVES, RESTS, HOMES, DIES):
         net.do(name, 'init')
         net.select(name, OperationMode.PROFILE_POSITION)
-    homing = net.begin(HOMES, 'home')
-    net.commands[MOVES].set_target(3.0)
+    homing = net.commands[HOMES].run('home', net.commands[HOMES].home(17))
+    net.commands[MOVES].set_target(30.0)
     net.run(0.5)
     net.power_off(DIES)
-    net.run(2.0)
-    assert not net.drives[MOVES].view.stands
+    net.run(0.5)
+    assert {name for name in NAMES if name in net.devices and speed(net, name)} == {MOVES, HOMES}
+    assert not homing.done
     report = stop(net)
-    assert report.stopped[:1] == (MOVES,)
-    assert RESTS in report.standing
-    assert HOMES in (*report.stopped, *report.standing)
-    assert homing.done
+    assert (report.stopped, report.standing) == ((MOVES, HOMES), (RESTS,))
     assert report.unpowered == (WAITS,)
-    assert [text.split()[0] for text in report.failed] == [DIES]
-    assert str(report).startswith(f'NOT known to stand: {DIES} is not operational')
-    assert net.drives[MOVES].view.state is DriveState.OPERATION_ENABLED
-    here = motor(net)
-    net.run(2.0)
-    assert motor(net) == pytest.approx(here, abs=1e-3)
+    assert 'ended by halt' in str(homing.error)
+    assert str(report).startswith(f'NOT known to stand: {DIES} is not seen to come to rest')
+    enabled = [name for name in net.devices if state(net, name) is DriveState.OPERATION_ENABLED]
+    assert enabled == [MOVES, RESTS, HOMES]
+    for _ in range(200):
+        net.run(PERIOD)
+        assert all(speed(net, name) < STANDING for name in net.devices)
     again = stop(net)
-    assert again.stopped == ()
-    assert MOVES in again.standing
+    assert (again.stopped, again.standing) == ((), (MOVES, RESTS, HOMES))
+
+
+@pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
+def test_a_device_without_pdos_is_stopped_by_sdo_where_it_has_one(nmt: NmtCommand) -> None:
+    """Pre-operational it takes SDOs; stopped it takes none, so it is not known to stand."""
+    writes = (*MOTION_WRITES, sdo_write(0x6007, 0, 0), sdo_write(0x605A, 0, 6))
+    net = VirtualNetwork(bus_config(drive_config(MOVES, 2, sdo_writes=writes)))
+    net.boot()
+    net.do(MOVES, 'init')
+    net.select(MOVES, OperationMode.PROFILE_VELOCITY)
+    net.commands[MOVES].set_target(0.5)
+    net.run(0.5)
+    net.network.send_nmt(nmt, 2)
+    net.run(0.3)
+    report = stop(net)
+    if nmt is NmtCommand.STOP:
+        assert speed(net, MOVES) == pytest.approx(0.5)
+        assert report == StopReport((), (), (), report.failed)
+        assert report.failed[0].startswith(f'{MOVES} is not seen to come to rest; ')
+        assert 'NMT state STOPPED' in report.failed[0]
+        return
+    assert speed(net, MOVES) < STANDING
+    assert report == StopReport((MOVES,), (), (), ())
+    assert state(net, MOVES) is DriveState.QUICK_STOP_ACTIVE
 
 
 def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
@@ -68,7 +94,8 @@ def test_a_second_stop_does_not_spoil_the_answer_of_the_first() -> None:
 def test_a_quick_stop_in_progress_is_waited_for() -> None:
     """A halt leaves it alone; the answer comes when the motor stands, and not before."""
     moving = MovingDrive(option=6)  # stays in Quick Stop Active
-    moving.net.do(JOINT, 'quick_stop', preempt=True)
+    moving.net.begin(JOINT, 'quick_stop', preempt=True)
+    moving.net.run(3 * PERIOD)
     assert abs(moving.device.velocity) > 0.8 * SCALE
     report = stop(moving.net)
     assert abs(moving.device.velocity) < STANDING * SCALE
@@ -95,11 +122,11 @@ def test_what_does_not_come_to_rest_is_said(begins: str) -> None:
     if begins == 'fault':
         moving.device.raise_fault(0x2310, moving.net.now)
     else:
-        moving.net.do(JOINT, 'quick_stop', preempt=True)
+        moving.net.begin(JOINT, 'quick_stop', preempt=True)
     moving.net.run(3 * PERIOD)
     report = stop(moving.net)
     assert abs(moving.device.velocity) > 0.5 * SCALE
-    assert report.failed[0].startswith(f'{JOINT} is not seen to come to rest: ')
+    assert report.failed[0].startswith(f'{JOINT} is not seen to come to rest')
     assert report == StopReport((), (), (), report.failed)
 
 
@@ -109,7 +136,7 @@ def test_it_is_there_before_and_while_devices_boot() -> None:
     net.start()
     assert len(stop(net).failed) == 2
     net.run_until(lambda: net.drives[MOVES].node.phase is BootPhase.CONFIGURING)
-    assert f'NOT known to stand: {MOVES} is not operational' in str(stop(net))
+    assert f'NOT known to stand: {MOVES} is not known to stand, as it was never' in str(stop(net))
     net.run_until(net.all_ready)
     assert stop(net) == StopReport((), (), (MOVES, RESTS), ())
 
@@ -122,8 +149,18 @@ def stop(net: VirtualNetwork) -> StopReport:
     return report
 
 
-def motor(net: VirtualNetwork) -> float:
-    """Return where the motor that moved is in [rad]."""
-    drive = net.devices[MOVES].drive
+def simulated(net: VirtualNetwork, name: str) -> SimulatedDrive:
+    """Return the drive of a simulated device."""
+    drive = net.devices[name].drive
     assert drive is not None
-    return drive.position / SCALE
+    return drive
+
+
+def state(net: VirtualNetwork, name: str) -> DriveState:
+    """Return the state in which a simulated drive really is."""
+    return simulated(net, name).state
+
+
+def speed(net: VirtualNetwork, name: str) -> float:
+    """Return how fast a motor really turns in [rad/s]."""
+    return abs(simulated(net, name).velocity) / SCALE

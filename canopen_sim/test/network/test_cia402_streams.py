@@ -252,8 +252,8 @@ def test_nothing_is_called_stopped_that_moves(mode: OperationMode) -> None:
     assert (client.motor == pytest.approx(3.0, abs=0.01)) is moves
 
 
-def test_an_axis_that_does_not_stop_is_reported() -> None:
-    """Its RPDOs are lost, so it goes on at the last velocity that it received."""
+def test_an_axis_that_does_not_stop_is_stopped_by_sdo() -> None:
+    """Its RPDOs are lost, so it would go on at the last velocity that it received."""
     client = Publisher(OperationMode.PROFILE_VELOCITY)
     for _ in range(60):
         client.commands.stream_target(0.8)
@@ -261,5 +261,8 @@ def test_an_axis_that_does_not_stop_is_reported() -> None:
     client.net.wire.loses = lambda sender, frame: frame.can_id in (0x202, 0x302)
     client.net.run(4.0)
     (error,) = client.net.reported(Severity.ERROR)
-    assert 'has not come to rest' in error
+    assert 'although it was halted: quick stop' in error
+    here = client.motor
+    client.net.run(1.0)
+    assert client.motor == here
     assert not [text for text in client.net.reported() if 'stopped' in text]

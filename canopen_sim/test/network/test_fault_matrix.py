@@ -35,6 +35,7 @@ from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.nmt import NmtCommand
 from canopen_sim.device import Device
 from canopen_sim.drive.drive import Drive as SimulatedDrive
 from canopen_sim.fault import Fault as Deviation
@@ -50,6 +51,7 @@ CYCLE = 0.02  # [s] twice the usual one: half the frames to compute
 SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
 STANDING = 0.03  # [rad/s]
 CREEP = 0.002  # [rad] that a motor without torque may still roll
+STANDING = 0.01  # [rad/s]
 TORQUE = 200.0  # [per mille] of the rated one
 POSITION_MODES = [
     OperationMode.PROFILE_POSITION,
@@ -63,6 +65,7 @@ VELOCITY_MODES = [
 ]
 TORQUE_MODES = [OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE]
 MODES = [*POSITION_MODES, *VELOCITY_MODES, *TORQUE_MODES]
+HALTED_BY_DRIVE = [OperationMode.PROFILE_POSITION, *TORQUE_MODES]
 
 
 class Way(Enum):
@@ -488,7 +491,8 @@ def test_lost_pdos_in_motion(
 ) -> None:
     """A drive that cannot be seen is halted and refuses targets; one without RPDOs is reported.
 
-    Neither is disabled, and when the PDOs come again nothing moves before a new target.
+    A halt that does not reach it becomes a quick stop by SDO; else it stays enabled. When the PDOs
+    come again nothing moves before a new target.
     """
     arm = Arm()
     arm.move(mode)
@@ -503,25 +507,77 @@ def test_lost_pdos_in_motion(
         drive = arm.net.drives[name]
         causes = {text for text in arm.net.reported(Severity.ERROR) if f'{name}: stopped' in text}
         assert drive.control.accepts_targets is not silent
-        assert drive.control.halted is bool(causes) is (silent or mode in STREAMED), (
-            arm.net.story()
-        )
+        assert bool(causes) is (silent or mode in STREAMED), arm.net.story()
+        assert drive.control.halted is bool(causes) or not drive.control.acts
         if silent:
             with pytest.raises(DriveError, match='TPDOs'):
                 arm.net.commands[name].set_target(0.1)
-    if not deaf or mode in POSITION_MODES:  # else nothing that the master sends reaches them
-        arm.stands(*names)
-    elif not silent:
+    stopped_by_sdo = deaf and mode not in POSITION_MODES  # which end by themselves
+    if stopped_by_sdo:
         halts = [arm.net.begin(name, 'halt', preempt=True) for name in names]
-        arm.net.run(0.5)
-        assert not any(halt.done for halt in halts)  # none is commanded to stand while it moves
+        arm.net.run(0.4)
+        assert silent or not any(halt.done for halt in halts), 'commanded to stand, and moves'
+        arm.net.run(1.5)
+        assert all(SWITCHED_OFF.title in halt.result() for halt in halts)
+    arm.stands(*names)
     restore_bus(arm)
     arm.net.run(0.7)
     arm.stands(FAULTY, WITNESS)
     for name in (FAULTY, WITNESS):
+        if stopped_by_sdo and name in names:
+            assert arm.state(name) is SWITCHED_OFF
+            arm.net.do(name, 'enable')
         assert arm.state(name) is DriveState.OPERATION_ENABLED
         assert arm.net.drives[name].control.accepts_targets
     assert_accepts_targets(arm, mode)
+
+
+NO_HALT = (Deviation.HALT_IGNORED,)
+NO_STOP = (Deviation.HALT_IGNORED, Deviation.QUICK_STOP_IGNORED)
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize(
+    ('stop', 'ignored'),
+    [('halt', NO_HALT), ('halt', NO_STOP), ('quick_stop', NO_STOP), ('shutdown', NO_STOP)],
+    ids=['halt', 'halt and quick stop', 'quick stop', 'shutdown'],
+)
+def test_a_stop_that_the_drive_ignores(
+    stop: str, ignored: tuple[Deviation, ...], mode: OperationMode
+) -> None:
+    """A stronger one follows at once, and the answer tells in which state the motor stands."""
+    arm = Arm()
+    arm.move(mode)
+    if mode in POSITION_MODES:
+        arm.net.commands[FAULTY].set_target(50.0)
+        arm.net.run(0.1)
+    for fault in ignored:
+        arm.net.devices[FAULTY].faults.inject(FaultInjection(fault), arm.net.now)
+    begin = arm.net.now
+    answer = arm.net.do(FAULTY, stop, preempt=True)
+    assert abs(arm.simulated().velocity) / SCALE < STANDING
+    assert arm.net.now - begin < 2.5
+    assert arm.state().title in answer
+    halted = stop == 'halt' and mode not in HALTED_BY_DRIVE  # the master brakes its target itself
+    assert arm.state() is (DriveState.OPERATION_ENABLED if halted else SWITCHED_OFF)
+    arm.stands(FAULTY)
+    assert arm.state(WITNESS) is DriveState.OPERATION_ENABLED
+
+
+@pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
+@pytest.mark.parametrize('stop', ['halt', 'quick_stop', 'disable', 'shutdown'])
+def test_a_stop_in_pre_operational(stop: str, mode: OperationMode) -> None:
+    """The device takes SDOs, so its motor stands when the answer comes."""
+    arm = Arm()
+    arm.move(mode)
+    arm.net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+    arm.net.run(0.3)
+    assert arm.state() is DriveState.OPERATION_ENABLED
+    answer = arm.net.do(FAULTY, stop, preempt=True)
+    assert abs(arm.simulated().velocity) / SCALE < STANDING
+    assert SWITCHED_OFF.title in answer
+    assert arm.state() is SWITCHED_OFF
+    arm.stands(FAULTY)
 
 
 @pytest.mark.parametrize('mode', MODES, ids=lambda mode: mode.name)
