@@ -51,7 +51,6 @@ CYCLE = 0.02  # [s] twice the usual one: half the frames to compute
 SETTLING = 1.0  # [s] for a fault to be noticed and every ramp to end
 STANDING = 0.03  # [rad/s]
 CREEP = 0.002  # [rad] that a motor without torque may still roll
-STANDING = 0.01  # [rad/s]
 TORQUE = 200.0  # [per mille] of the rated one
 POSITION_MODES = [
     OperationMode.PROFILE_POSITION,
