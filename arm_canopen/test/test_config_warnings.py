@@ -94,20 +94,35 @@ def test_identifiers_of_an_eds_without_node_id(tmp_path: Path) -> None:
     assert 'node id' in warning.remedy
 
 
-def test_mappings_that_the_eds_does_not_know(tmp_path: Path) -> None:
-    """An enabled PDO whose default mapping names unknown objects is reported at its EDS line."""
+def with_default_mapping(*words: str) -> list[str]:
+    """Return the lines of the EDS with another default mapping of TPDO 2."""
     lines = eds_text().splitlines()
     start = lines.index('[1A01sub0]')
-    for offset, value in ((0, '1'), (1, '0x70000020')):
+    for offset, value in enumerate((str(len(words)), *words)):
         section = lines.index(f'[1A01sub{offset}]', start)
         place = next(i for i in range(section, len(lines)) if lines[i].startswith('DefaultValue'))
         lines[place] = f'DefaultValue={value}'
+    return lines
+
+
+def test_mappings_that_the_eds_does_not_know(tmp_path: Path) -> None:
+    """An enabled PDO whose default mapping names unknown objects is reported at its EDS line."""
+    lines = with_default_mapping('0x70000020')
     bus = load_text(tmp_path, eds='\n'.join(lines))
     (warning,) = bus.warnings
     assert warning.file.name == 'drive.eds'
     assert warning.line == lines.index('[1A01sub1]') + 1
     assert 'maps 0x7000:00, which is not there; taken as UNSIGNED32' in warning.message
     assert bus.nodes[0].tpdos[1].mapping[0].word == 0x7000_0020
+
+
+def test_a_flag_in_the_length_of_mapped_objects_is_ignored(tmp_path: Path) -> None:
+    """Bit 7 of it belongs to the vendor; that is reported once."""
+    lines = with_default_mapping('0x60410090', '0x606400A0')
+    bus = load_text(tmp_path, eds='\n'.join(lines))
+    (warning,) = bus.warnings
+    assert 'bit 7 of the length is set in 0x60410090' in warning.message
+    assert [mapped.word for mapped in bus.nodes[0].tpdos[1].mapping] == [0x6041_0010, 0x6064_0020]
 
 
 def test_warnings_of_an_eds_are_reported_once(tmp_path: Path) -> None:

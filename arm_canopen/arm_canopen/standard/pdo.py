@@ -21,6 +21,8 @@ Number = int | float
 SYNCHRONOUS_MAX = 240  # transmission types up to this one follow SYNC (CiA 301, tables 69 and 71)
 EVENT_DRIVEN = 254  # transmission types from which on a PDO has an event timer (CiA 301, table 72)
 
+MAPPED_LENGTH_MASK = 0x7F  # bit 7 of the length is a flag of the vendor in some devices
+
 STRUCT_CODES: dict[DataType, str] = {
     DataType.INTEGER8: 'b',
     DataType.INTEGER16: 'h',
@@ -58,6 +60,11 @@ class MappedObject:
     def word(self) -> int:
         """Entry of the mapping object: index, sub-index and length (CiA 301, figure 73)."""
         return self.index << 16 | self.subindex << 8 | self.bits
+
+
+def mapped_place(word: int) -> tuple[int, int, int]:
+    """Return index, sub-index and length in [bit] that an entry of a mapping object names."""
+    return word >> 16, word >> 8 & 0xFF, word & MAPPED_LENGTH_MASK
 
 
 class PdoCodec:

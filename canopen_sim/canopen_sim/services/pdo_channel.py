@@ -17,7 +17,7 @@ from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, RTR_FORBIDD
 from arm_canopen.standard.datatypes import bit_length, Value
 from arm_canopen.standard.dictionary import ObjectEntry
 from arm_canopen.standard.objects import PDO_BITS_MAX
-from arm_canopen.standard.pdo import MappedObject, PdoCodec, SYNCHRONOUS_MAX
+from arm_canopen.standard.pdo import mapped_place, MappedObject, PdoCodec, SYNCHRONOUS_MAX
 from arm_canopen.standard.sdo_abort import AbortCode
 
 from ..objects.cob_id_rules import check_cob_id
@@ -135,11 +135,12 @@ class PdoChannel(ABC):
         Raises:
             SdoAbortError: There is none, or it cannot be mapped to this PDO.
         """
-        variable = self._find(word >> 16, word >> 8 & 0xFF)
+        index, subindex, bits = mapped_place(word)
+        variable = self._find(index, subindex)
         entry = variable.entry
         if not isinstance(variable, Scalar) or not self._is_mappable(entry):
             raise refusal(AbortCode.NOT_MAPPABLE, entry)
-        if bit_length(entry.data_type) != word & 0xFF:
+        if bit_length(entry.data_type) != bits:
             raise refusal(AbortCode.NOT_MAPPABLE, entry)
         return variable
 

@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+import re
 
-from drive_samples import bus_config, drive_config, drive_dictionary
+from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config import load_eds
+from arm_canopen.config import load_bus, load_eds
+from arm_canopen.config.model.boot_plan import BootWrite
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
@@ -62,6 +65,36 @@ def test_it_has_no_mode_whose_object_is_missing() -> None:
     missing = (OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE, OperationMode.VELOCITY)
     assert not any(reported & mode.support_bit for mode in missing)
     assert reported & OperationMode.PROFILE_VELOCITY.support_bit
+
+
+def test_default_mappings_whose_lengths_have_a_flag_of_the_vendor_are_used(
+    tmp_path: Path,
+) -> None:
+    """Bit 7 of the length in 0x1600 and 0x1A00 is ignored: by boot, PDOs and the comparison."""
+
+    def flagged(match: re.Match[str]) -> str:
+        return f'DefaultValue={match[1]}{int(match[2], 16) | 0x80:02X}'
+
+    pattern = re.compile(r'DefaultValue=(0x60[0-9A-F]{4})(08|10|20)$', re.MULTILINE)
+    eds, count = pattern.subn(flagged, DRIVE_EDS.read_text())
+    assert count > 10
+    (tmp_path / 'drive.eds').write_text(eds)
+    (tmp_path / 'bus.yml').write_text(
+        'master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}\n'
+        'joint1: {node_id: 2, driver: "ros2_canopen::Cia402Driver", dcf: drive.eds,\n'
+        '  tpdo: {2: {transmission: 1}, 3: {transmission: 1}}, rpdo: {2: {enabled: true}, '
+        '3: {enabled: true}}}\n'
+    )
+    bus = load_bus(tmp_path / 'bus.yml')
+    net = VirtualNetwork(bus)
+    net.boot()
+    net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.PROFILE_POSITION)
+    net.commands[JOINT].set_target(0.3)
+    net.run(5.0)
+    assert net.drives[JOINT].view.position == pytest.approx(0.3, abs=2e-3)
+    held = net.result(net.network.nodes[JOINT].sdo.read(0x1A01, 1, 1.0))
+    assert BootWrite(0x1A01, 1, b'\x10\x00\x41\x60', 'tpdo').fits(held)
 
 
 def unmapped() -> VirtualNetwork:

@@ -14,6 +14,7 @@ from arm_canopen.standard.drive import Controlword, drive_state, mode_title
 from arm_canopen.standard.emcy import error_code_text, error_register_text
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
 from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+from arm_canopen.standard.pdo import mapped_place
 from arm_canopen.standard.sdo import fitted
 
 CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (
@@ -82,7 +83,8 @@ def _cob_id_text(cob_id: int) -> str:
 
 
 def _mapping_text(word: int) -> str:
-    return f'{object_address(word >> 16, word >> 8 & 0xFF)} ({word & 0xFF} bit)'
+    index, subindex, bits = mapped_place(word)
+    return f'{object_address(index, subindex)} ({bits} bit)'
 
 
 def _hex_text(number: int) -> str:

@@ -16,6 +16,7 @@ from ...standard.datatypes import DataType, encode
 from ...standard.dictionary import object_address
 from ...standard.nmt import ConsumerHeartbeatTime
 from ...standard.objects import Index, PDO_COUNT_MAX
+from ...standard.pdo import MAPPED_LENGTH_MASK
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
 from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
 from .pdo_direction import Direction, RPDO, TPDO
@@ -79,6 +80,12 @@ class BootWrite:
         is_timer = 0 <= number < PDO_COUNT_MAX and self.subindex == EVENT_TIMER_SUBINDEX
         return is_timer and not self.requested
 
+    @property
+    def _is_mapped(self) -> bool:
+        areas = (RPDO.mapping, TPDO.mapping)
+        in_area = any(0 <= self.index - first < PDO_COUNT_MAX for first in areas)
+        return in_area and self.subindex > 0
+
     def text(self, held: bytes | None = None) -> str:
         """Write the bits that count as a hexadecimal number: its own, or those of a device."""
         data = self.data if held is None else held
@@ -94,6 +101,8 @@ class BootWrite:
 
     def fits(self, held: bytes) -> bool:
         """Return whether a value of the device is what is wanted."""
+        if self._is_mapped and held:
+            held = bytes((held[0] & MAPPED_LENGTH_MASK,)) + held[1:]
         if self.mask is None or len(held) != len(self.data):
             return held == self.data
         return self.over(int.from_bytes(held, 'little')) == held

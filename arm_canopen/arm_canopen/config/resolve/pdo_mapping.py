@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from ...standard.datatypes import bit_length, DataType, SIGNED_BITS
 from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ...standard.objects import Index, is_signed, PDO_BITS_MAX
-from ...standard.pdo import MappedObject
+from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
 from ..findings import Findings, Place, RefusedError
 from ..model.pdo_direction import Direction, RPDO
 from ..read.device_keys import MAPPING_KEYS
@@ -73,6 +73,17 @@ def eds_mapping(
         if mapped is None:
             return ()
         mapping.append(mapped)
+    flagged = [
+        entry.default
+        for entry in used
+        if isinstance(entry.default, int) and entry.default & 0xFF & ~MAPPED_LENGTH_MASK
+    ]
+    if flagged:
+        findings.warning(
+            Place(eds.path, entries[0].line, key=f'[{entries[0].index:04X}]'),
+            f'bit 7 of the length is set in 0x{flagged[0]:08X}; it is ignored, also in others',
+            EDS_REMEDY,
+        )
     if sum(mapped.bits for mapped in mapping) > PDO_BITS_MAX:
         place = Place(eds.path, entries[0].line, key=f'[{entries[0].index:04X}]')
         findings.warning(place, 'the default mapping is longer than 64 bits', EDS_REMEDY)
@@ -83,7 +94,7 @@ def eds_mapping(
 def _from_word(
     word: int, dictionary: ObjectDictionary, place: Place, findings: Findings
 ) -> MappedObject | None:
-    index, subindex, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
+    index, subindex, bits = mapped_place(word)
     if index in DUMMY_TYPES and subindex == 0:
         return MappedObject(index, subindex, DataType(index))
     entry = dictionary.get(index, subindex)
