@@ -63,6 +63,13 @@ def halt(stick: Stick) -> None:
     stick.drives.source.released('panda_joint1', Refusal(RefusalCause.COMMANDED, 'halted'))
 
 
+def is_enabled(stick: Stick) -> None:
+    """Let somebody select the mode in which the drives follow, as ``--enable`` does."""
+    for name in stick.drives.source.axes:
+        selected = Refusal(RefusalCause.MODE_SELECTED, 'Cyclic synchronous position')
+        stick.drives.source.released(name, selected)
+
+
 def faults(stick: Stick) -> None:
     """Let a drive fault, and somebody reset it."""
     axis = stick.drives.axes[1]
@@ -73,7 +80,7 @@ def faults(stick: Stick) -> None:
 
 
 @pytest.mark.parametrize('pause', [0.0, 0.6, 3.0])
-@pytest.mark.parametrize('happens', [halt, faults])
+@pytest.mark.parametrize('happens', [halt, is_enabled, faults])
 def test_a_stick_that_is_held_moves_nothing_after_a_stop(
     happens: Callable[[Stick], None], pause: float
 ) -> None:
@@ -88,7 +95,8 @@ def test_a_stick_that_is_held_moves_nothing_after_a_stop(
     stick.push(0.2, 100)
     assert stick.position == pytest.approx(rest, abs=1e-6)
     assert len(stick.drives.attachments) == attached
-    assert 'lets go first' in stick.refusals[-1]
+    assert 'release and jog again' in stick.refusals[-1]
+    assert 'call its ~/cyclic_position_mode' not in stick.refusals[-1]  # it is selected
     stick.push(0.0)
     stick.push(0.2, 50)
     assert stick.position > rest + 0.02
@@ -144,7 +152,7 @@ def test_no_pause_is_letting_go(before: float, pauses: list[float]) -> None:
     holds.interrupt('halted', now)
     for pause in pauses:
         now += pause
-        with pytest.raises(NotReadyError, match='halted; a jog that was held before lets go'):
+        with pytest.raises(NotReadyError, match='halted; a jog that was held before moves'):
             holds.command('stick', now, is_zero=False)
     holds.command('stick', now, is_zero=True)
     holds.command('stick', now, is_zero=False)

@@ -54,8 +54,8 @@ class HoldToRun:
             reason = self._barred.get(client)
         if reason is not None:
             raise NotReadyError(
-                f'{reason}; a jog that was held before lets go first: send a zero, or call'
-                ' ~/start_servo'
+                f'{reason}; a jog that was held before moves nothing: release and jog again (send'
+                ' a zero between, or call ~/start_servo)'
             )
 
     def interrupt(self, reason: str, now: float) -> None:

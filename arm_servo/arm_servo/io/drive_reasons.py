@@ -28,7 +28,7 @@ REMEDIES: Mapping[RefusalCause, str] = {
     RefusalCause.NOT_ENABLED: 'call its ~/init',
     RefusalCause.MODE_CHANGE: MODE,
     RefusalCause.OTHER_MODE: MODE,
-    RefusalCause.MODE_SELECTED: MODE,
+    RefusalCause.MODE_SELECTED: f'{COMMAND} in mode 7 or 8',
     RefusalCause.HALTED: COMMAND,
     RefusalCause.SINGLE_TARGET: f'wait until it stands, or call its ~/halt; then {COMMAND}',
     RefusalCause.OTHER_SOURCE: COMMAND,
