@@ -133,6 +133,9 @@ TEXTS: dict[str, str] = {
     'index': 'object',
     'sub_index': 'its sub-index',
     'value': 'what is written, by the type of the EDS',
+    'timeout_ms': 'time-out of each SDO for this object, which is then not sent twice; without: '
+    '`boot_timeout` at boot and `sdo_timeout_ms` after it, for 0x1010 and 0x1011 10 s at least '
+    '(our own key)',
 }
 
 SECTIONS: tuple[tuple[str, str, tuple[Key, ...], type], ...] = (

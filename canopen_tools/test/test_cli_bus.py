@@ -294,9 +294,13 @@ def test_a_device_that_holds_something_else_is_reported(
     assert 'holds another value than 7' in captured.err
 
 
-@pytest.mark.usefixtures('runner')
-def test_a_command_is_not_read_back(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """0x1010 returns what the device can store, not what was written."""
+def test_a_command_is_not_read_back(
+    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """0x1010 returns what the device can store, not what was written; storing takes its time."""
+    slow = FaultInjection(Fault.SDO_DELAY, object=(0x1010, 1), delay=0.7)
+    inject = runner.host.devices[0].faults.inject
+    runner.call(lambda: inject(slow, time.monotonic())).result(DEADLINE)
     assert main(['write', '2', '0x1010:1', '0x65766173', '--type', 'u32', '--can', name]) == 0
     assert capsys.readouterr().out.endswith('was written\n')
 

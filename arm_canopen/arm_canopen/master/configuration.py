@@ -17,14 +17,12 @@ from ..config.model.boot_plan import (
     WATCH_KEY,
     watch_word,
 )
-from ..exceptions import SdoAbortError, SdoError
+from ..exceptions import SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.dictionary import object_address
-from ..standard.objects import Index, PDO_COUNT_MAX
+from ..standard.objects import Index, is_setting, PDO_COUNT_MAX
 from .events import EventKind, Severity
 from .remote_node import RemoteNode
 
-ONCE = (Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS)
-"""Written once: a device stores or restores its parameters with each write."""
 PDO_OBJECTS = frozenset(
     first + number
     for first in (
@@ -111,8 +109,19 @@ class Configurator:
             SdoError: The device refused, or does not answer.
         """
         self._on_write(object_address(write.index, write.subindex))
-        address, repeat = (write.index, write.subindex), write.index not in ONCE
-        await self._node.sdo.write(*address, write.data, self._sdo_timeout, repeat=repeat)
+        address, config = (write.index, write.subindex), self._node.config
+        timeout = config.write_timeout(*address, self._sdo_timeout)
+        own = config.write_of(*address)
+        repeat = is_setting(write.index) and (own is None or own.timeout is None)
+        try:
+            await self._node.sdo.write(*address, write.data, timeout, repeat=repeat)
+        except SdoTimeoutError as error:
+            if own is None:
+                raise
+            remedy = (
+                f'if it is slow at that, write timeout_ms: {round(5e3 * timeout)} to its entry'
+            )
+            raise SdoTimeoutError(f'{error}; {remedy} in {own.location.key or "sdo"}') from error
 
     async def read_number(self, index: int, subindex: int) -> int:
         """Read an object as an unsigned number.

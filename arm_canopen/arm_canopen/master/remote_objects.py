@@ -199,7 +199,8 @@ class RemoteObjects:
             refused: Promise[None] = Promise()
             refused.reject(error)
             return refused
-        return self.sdo.write(index, subindex, data, self.config.sdo_timeout, urgent=urgent)
+        timeout = self.config.write_timeout(index, subindex)
+        return self.sdo.write(index, subindex, data, timeout, urgent=urgent)
 
     def _object_downloaded(
         self, index: int, subindex: int, data: bytes, end: Promise[None]
@@ -259,7 +260,7 @@ class RemoteObjects:
         entry = find_object(self.config.dictionary, path)
         self.check_owner(entry.index)
         data = to_bytes(entry)
-        await self.sdo.write(*entry.address, data, self.config.sdo_timeout)
+        await self.sdo.write(*entry.address, data, self.config.write_timeout(*entry.address))
         return entry, data
 
     def forget(self, reason: str) -> None:

@@ -165,7 +165,8 @@ class DeviceNode(Node):
         def write() -> Promise[None]:
             device.objects.check_owner(index)
             data = bytes_from_raw(device.objects.entry(index, subindex).data_type, request.data)
-            return device.sdo.write(index, subindex, data, device.config.sdo_timeout)
+            timeout = device.config.write_timeout(index, subindex)
+            return device.sdo.write(index, subindex, data, timeout)
 
         return self._thread.run(write)
 

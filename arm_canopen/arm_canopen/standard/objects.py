@@ -37,6 +37,9 @@ class Index(IntEnum):
     RPDO_MAPPING = 0x1600
     TPDO_COMMUNICATION = 0x1800
     TPDO_MAPPING = 0x1A00
+    CONCISE_DCF = 0x1F22
+    PROGRAM_DATA = 0x1F50
+    PROGRAM_CONTROL = 0x1F51
 
     ABORT_CONNECTION_OPTION = 0x6007
     ERROR_CODE = 0x603F
@@ -127,6 +130,19 @@ COMMANDS = frozenset(
 OFFSETS = frozenset({Index.POSITION_OFFSET, Index.VELOCITY_OFFSET, Index.TORQUE_OFFSET})
 """Objects of the first axis of a drive that are added to its targets."""
 
+SLOW_WRITES: dict[int, float] = {
+    Index.STORE_PARAMETERS: 10.0,
+    Index.RESTORE_PARAMETERS: 10.0,
+    Index.CONCISE_DCF: 10.0,
+    Index.PROGRAM_DATA: 60.0,
+    Index.PROGRAM_CONTROL: 60.0,
+}
+"""Objects whose write a device answers when it has erased and written flash memory, and how long
+that takes at most in [s] (CiA 301, 7.5.2.13 and 7.5.2.14; CiA 302-3)."""
+SETTINGS = (range(0x1000, 0x1F00), range(0x6000, 0xA000))
+"""Objects of the standards, which are settings that may be written twice (CiA 301, table 10); what
+a write of others starts, only the vendor knows."""
+
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
 _CONTROLWORDS = frozenset(Index.CONTROLWORD + AXIS_OFFSET * axis for axis in range(AXES_MAX))
@@ -160,6 +176,25 @@ def is_signed(index: int, subindex: int) -> bool:
     """Return whether an object of any axis is a position, velocity or torque, which has a sign."""
     axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
     return 0 <= axis < AXES_MAX and (_PROFILE_AREA + offset, subindex) in _SIGNED
+
+
+def slow_timeout(index: int, usual: float) -> float:
+    """Return how long a device may take for the write of an object in [s].
+
+    Args:
+        index: Object index.
+        usual: How long it may take for any object in [s].
+    """
+    return max(usual, SLOW_WRITES.get(index, 0.0))
+
+
+def is_setting(index: int) -> bool:
+    """Return whether an object may be written twice."""
+    return (
+        any(index in area for area in SETTINGS)
+        and index not in SLOW_WRITES
+        and not is_controlword(index)
+    )
 
 
 def is_state(index: int) -> bool:

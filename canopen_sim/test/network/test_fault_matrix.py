@@ -29,6 +29,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import Refusal, RefusalCause
 from arm_canopen.can.frame import Frame
+from arm_canopen.config.model import SdoWrite
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import DriveError, SdoError
 from arm_canopen.master.events import EventKind, Severity
@@ -658,6 +659,54 @@ def test_a_device_that_deviates_is_driven(deviation: FaultInjection, said: str) 
     warnings = net.reported(Severity.WARNING)
     assert len(warnings) == bool(said), warnings
     assert re.search(said, ''.join(warnings))
+
+
+SAVE = int.from_bytes(b'save', 'little')
+VENDOR = 0x2100  # which may start something with each write
+
+
+@pytest.mark.parametrize(
+    ('index', 'subindex', 'timeout', 'delay', 'boots', 'sent'),
+    [
+        (0x1010, 1, None, 3.0, True, 1),
+        (VENDOR, 0, None, 1.0, True, 1),
+        (VENDOR, 0, None, 3.0, False, 1),
+        (VENDOR, 0, 5.0, 3.0, True, 1),
+        (0x6099, 1, 5.0, 3.0, True, 1),
+        (0x6099, 1, None, 0.5, True, 2),  # a setting may be written twice
+    ],
+)
+def test_an_object_that_takes_long_is_written_once(
+    index: int, subindex: int, *, timeout: float | None, delay: float, boots: bool, sent: int
+) -> None:
+    """In the time that bus.yml or the standard gives it; else the message names the key."""
+    drive = drive_config(FAULTY, NODE_ID)
+    vendor = ObjectEntry(VENDOR, 0, 'Start', DataType.UNSIGNED32)
+    write = SdoWrite(index, subindex, SAVE.to_bytes(4, 'little'), timeout)
+    drive = replace(
+        drive,
+        dictionary=ObjectDictionary([*drive.dictionary, vendor]),
+        sdo_writes=(*drive.sdo_writes, write),
+    )
+    net = VirtualNetwork(bus_config(drive))
+    slow = FaultInjection(Deviation.SDO_DELAY, object=(index, subindex), delay=delay)
+    net.devices[FAULTY].faults.inject(slow, net.now)
+    net.start()
+    net.run(4.0)
+    assert net.network.nodes[FAULTY].online is boots
+    request = bytes((0x23, index & 0xFF, index >> 8, subindex)) + write.data
+    attempts = sum('boot failed' in text for text in net.reported(Severity.WARNING))
+    assert net.frames(0x600 + NODE_ID).count(request) == sent + attempts, net.story()
+    assert boots or 'timeout_ms: 10000' in net.story()
+
+
+def test_storing_takes_its_time_after_the_boot_too() -> None:
+    """Flash memory is slower than the SDO time-out of other objects."""
+    net = VirtualNetwork(bus_config(drive_config(FAULTY, NODE_ID)))
+    slow = FaultInjection(Deviation.SDO_DELAY, object=(0x1010, 1), delay=3.0)
+    net.devices[FAULTY].faults.inject(slow, net.now)
+    net.boot()
+    net.result(net.network.nodes[FAULTY].objects.write_object(0x1010, 1, SAVE))
 
 
 @pytest.mark.parametrize('later', [False, True], ids=['at start', 'while it runs'])

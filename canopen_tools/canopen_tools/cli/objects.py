@@ -95,7 +95,7 @@ def write(options: argparse.Namespace) -> int:
 
         async def download() -> None:
             client = session.client(target.node_id, target.name, target.dictionary)
-            await client.write(*entry.address, data, target.timeout)
+            await client.write(*entry.address, data, target.write_timeout(entry))
 
         session.run(download())
         title = _title(target, entry)

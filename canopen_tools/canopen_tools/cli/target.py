@@ -16,6 +16,7 @@ from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.object_path import find_object, NUMBER
+from arm_canopen.standard.objects import slow_timeout
 
 from ..monitor.object_names import ObjectNames
 from .arguments import UsageError
@@ -36,6 +37,7 @@ class Target:
         dictionary: Its objects; without a file what the standards describe.
         described: A file describes them.
         timeout: Longest time for an answer in [s].
+        given_timeout: It was given on the command line, and counts for every object.
         bus: The bus, None without bus.yml.
         config: The device in bus.yml, None when it is not there.
     """
@@ -47,6 +49,15 @@ class Target:
     timeout: float
     bus: BusConfig | None = None
     config: NodeConfig | None = None
+    given_timeout: bool = False
+
+    def write_timeout(self, entry: ObjectEntry) -> float:
+        """Return the longest time for the answer to a write in [s]."""
+        if self.given_timeout:
+            return self.timeout
+        if self.config is not None:
+            return self.config.write_timeout(*entry.address)
+        return slow_timeout(entry.index, self.timeout)
 
     def entry(self, path: str, data_type: DataType | None = None) -> ObjectEntry:
         """Find an object by number or name.
@@ -108,6 +119,7 @@ def find_target(options: argparse.Namespace) -> Target:
         timeout,
         bus,
         config,
+        given_timeout=options.timeout is not None,
     )
 
 

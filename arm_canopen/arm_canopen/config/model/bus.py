@@ -11,7 +11,7 @@ from pathlib import Path
 from ...exceptions import CodecError, Problem
 from ...standard.datatypes import DataType, decode, Value
 from ...standard.dictionary import object_address, ObjectDictionary
-from ...standard.objects import AXIS_OFFSET, COMMANDS
+from ...standard.objects import AXIS_OFFSET, COMMANDS, slow_timeout
 from ...standard.pdo import MappedObject
 from .drive import DriveConfig
 from .identity import ANY_DEVICE, Identity
@@ -73,12 +73,14 @@ class SdoWrite:
         index: Object index.
         subindex: Sub-index.
         data: The value as it is sent.
+        timeout: How long the device may take for it in [s]; None as for any object.
         location: Where bus.yml has it.
     """
 
     index: int
     subindex: int
     data: bytes
+    timeout: float | None = None
     location: SourceLocation = field(default=SourceLocation(), compare=False)
 
 
@@ -156,6 +158,19 @@ class NodeConfig:
             if (write.index, write.subindex) == (index, subindex):
                 return write
         return None
+
+    def write_timeout(self, index: int, subindex: int, usual: float | None = None) -> float:
+        """Return how long the device may take for a write in [s].
+
+        Args:
+            index: Object index.
+            subindex: Sub-index.
+            usual: How long it may take for any object in [s]; None for :attr:`sdo_timeout`.
+        """
+        write = self.write_of(index, subindex)
+        if write is not None and write.timeout is not None:
+            return write.timeout
+        return slow_timeout(index, self.sdo_timeout if usual is None else usual)
 
     def value_after_boot(
         self, index: int, subindex: int = 0, data_type: DataType | None = None

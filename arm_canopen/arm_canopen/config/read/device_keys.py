@@ -3,9 +3,9 @@
 """The keys of a device that ros2_canopen and Lely's dcfgen know.
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
-differs, ``why`` says the reason. Five keys are our own: ``scale_eff_to_dev``,
-``scale_from_factor_group``, ``target_timeout_ms``, ``recovery`` and ``quirks``; of the master
-``time_period_ms``.
+differs, ``why`` says the reason. Six keys are our own: ``scale_eff_to_dev``,
+``scale_from_factor_group``, ``target_timeout_ms``, ``recovery``, ``quirks``, and ``timeout_ms`` of
+an entry of ``sdo``; of the master ``time_period_ms``.
 """
 
 from __future__ import annotations
@@ -165,6 +165,7 @@ SDO_KEYS: tuple[Key, ...] = (
     Key('index', Kind.INTEGER, 'index', low=1, high=U16_MAX, why='an object index has 16 bits'),
     Key('sub_index', Kind.INTEGER, 'subindex', low=0, high=U8_MAX, default=0),
     Key('value', Kind.BLOCK),
+    Key('timeout_ms', Kind.NUMBER, 'timeout', per_unit=MILLISECONDS, low=1, high=600_000),
 )
 
 MAPPING_KEYS: tuple[Key, ...] = SDO_KEYS[:2]

@@ -15,7 +15,7 @@ from ..model.pdo_direction import Direction, RPDO
 from ..read.device_keys import MAPPING_KEYS
 from ..read.document import YamlList
 from ..read.eds import DUMMY_TYPES, Eds
-from .sdo_list import find_entry, read_address
+from .sdo_list import find_entry, read_object
 
 SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}
 UNSIGNED_BY_BITS = {
@@ -145,10 +145,12 @@ def _mapped_objects(
     direction: Direction, entries: YamlList, eds: Eds, findings: Findings
 ) -> Iterator[MappedObject]:
     for item in entries.items:
-        address = read_address(item, MAPPING_KEYS, findings)
-        mapped = _checked(direction, address, eds, item.place, findings) if address else None
-        if mapped is not None:
-            yield mapped
+        values = read_object(item, MAPPING_KEYS, findings)
+        if values is not None:
+            address = values['index'], values['subindex']
+            mapped = _checked(direction, address, eds, item.place, findings)
+            if mapped is not None:
+                yield mapped
 
 
 def _checked(

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from ...exceptions import CodecError
 from ...standard.datatypes import (
@@ -82,12 +83,20 @@ class SdoReader:
     def _sdo_list(self, device: YamlMap) -> Iterator[SdoWrite | None]:
         entries = listing(device, 'sdo', self._findings)
         for item in entries.items if entries else ():
-            address = read_address(item, SDO_KEYS, self._findings)
-            if address is not None and isinstance(item, YamlMap):
+            values = read_object(item, SDO_KEYS, self._findings)
+            if values is not None and isinstance(item, YamlMap):
                 zero = Scalar(item.place, '0', ScalarKind.INTEGER)
-                yield self._write(address, item.entries.get('value', zero), item.place)
+                value = item.entries.get('value', zero)
+                address = values['index'], values['subindex']
+                yield self._write(address, value, item.place, values.get('timeout'))
 
-    def _write(self, address: tuple[int, int], value: Item, place: Place) -> SdoWrite | None:
+    def _write(
+        self,
+        address: tuple[int, int],
+        value: Item,
+        place: Place,
+        timeout: float | None = None,
+    ) -> SdoWrite | None:
         try:
             entry = _writable_entry(self._dictionary, *address)
         except RefusedError as reason:
@@ -98,14 +107,14 @@ class SdoReader:
         except RefusedError as reason:
             self._findings.refuse(value.place, reason)
             return None
-        return SdoWrite(*address, data, SourceLocation(place.line, place.key))
+        return SdoWrite(*address, data, timeout, SourceLocation(place.line, place.key))
 
 
-def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple[int, int] | None:
-    """Read ``{index, sub_index}`` of an entry of ``sdo`` or ``mapping``.
+def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[str, Any] | None:
+    """Read ``{index, sub_index}`` and more of an entry of ``sdo`` or ``mapping``.
 
     Returns:
-        Index and sub-index, None when the findings have the reason.
+        The values by field, None when the findings have the reason.
     """
     example = '{index: 0x6081, sub_index: 0}'
     if not isinstance(item, YamlMap):
@@ -116,9 +125,7 @@ def read_address(item: Item, keys: tuple[Key, ...], findings: Findings) -> tuple
     values = read_section(item, keys, findings)
     if 'index' not in item.entries:
         findings.error(item.place, "no 'index'", f'write {example}')
-    if 'index' not in values:
-        return None
-    return values['index'], values['subindex']
+    return values if 'index' in values else None
 
 
 def _writable_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:
