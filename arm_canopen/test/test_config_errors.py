@@ -103,7 +103,7 @@ DRIVERS = [
 ]
 
 REFUSED = [
-    Case('joint1', 'num_channels: 2 # <-', 'num_channels', 'no axis 1: 0x6840', 'use the EDS'),
+    Case('joint1', 'num_channels: 2 # <-', 'num_channels', 'has 1 of 2 axes', 'use the EDS'),
     Case('joint1', 'num_channels: 9 # <-', 'num_channels', 'out of range', '8 axes'),
     Case('joint1', 'channels: [] # <-', 'channels', '0 entries for 1 channels', 'as many'),
     Case('joint1', 'channel_names: [a, b] # <-', 'channel_names', '2 names for 1', 'as many'),

@@ -17,8 +17,8 @@ from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.resolve.pdo_mapping import is_fixed, mapping_slots
 from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.datatypes import bit_length
-from arm_canopen.standard.device_profile import profile_number
-from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard.device_profile import drive_axes, profile_number
+from arm_canopen.standard.dictionary import object_address, ObjectEntry
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.objects import AXIS_OFFSET, Index, PDO_BITS_MAX
 from arm_canopen.standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
@@ -122,10 +122,13 @@ def _kind(device: NewDevice, period_ms: int) -> Iterator[str]:
     if not device.is_drive:
         yield '# PDOs stay as the device has them'
         return
-    if dictionary.has_index(Index.CONTROLWORD + AXIS_OFFSET):
+    axes = drive_axes(dictionary)
+    if any(axes):
+        words = (object_address(Index.CONTROLWORD + AXIS_OFFSET * axis) for axis in axes)
         raise NewBusError(
-            f'{device.name}: {device.eds.path.name} has several axes (0x6840); write its channels'
-            ' by hand: num_channels and channel_names, one joint for each'
+            f'{device.name}: {device.eds.path.name} has axes at {", ".join(words)}; write them '
+            'by hand: num_channels and channel_names, one joint for each, and PDOs with their '
+            'objects'
         )
     mode, reason = _mode(device)
     yield f'position_mode: {int(mode)}  # {mode.title.lower()}: {reason}'

@@ -252,7 +252,7 @@ def test_several_axes_are_not_made_one(
     """It is said what to write."""
     monkeypatch.chdir(tmp_path)
     assert main(['new', f'arm={TWO_AXES}@2', '--turn', 'arm=1000']) == 1
-    assert 'several axes' in capsys.readouterr().err
+    assert 'has axes at 0x6040, 0x6840' in capsys.readouterr().err
     assert not (tmp_path / 'bus.yml').exists()
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 from .dictionary import ObjectDictionary
-from .objects import Index
+from .objects import AXES_MAX, AXIS_OFFSET, Index
 
 PROFILE_MASK = 0xFFFF  # bits of 0x1000 that hold the number of the profile (CiA 301, 7.5.2.1)
 
@@ -32,4 +32,14 @@ def is_drive(dictionary: ObjectDictionary) -> bool:
     number = profile_number(dictionary)
     if number:
         return number == DeviceProfile.DRIVE
-    return all(dictionary.has_index(index) for index in (Index.CONTROLWORD, Index.STATUSWORD))
+    return bool(drive_axes(dictionary))
+
+
+def drive_axes(dictionary: ObjectDictionary) -> tuple[int, ...]:
+    """Return the numbers, from 0, of the axes with a controlword and a statusword."""
+    words = (Index.CONTROLWORD, Index.STATUSWORD)
+    return tuple(
+        axis
+        for axis in range(AXES_MAX)
+        if all(dictionary.has_index(word + AXIS_OFFSET * axis) for word in words)
+    )

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+import re
 
 from drive_samples import DRIVE_EDS
 import pytest
@@ -39,11 +40,17 @@ nodes:
 X, Y = 'table_x', 'table_y'
 
 
-@pytest.fixture
-def net(tmp_path: Path) -> VirtualNetwork:
-    """A booted device with two axes."""
+@pytest.fixture(params=[0, 0x800, 0x1000], ids='first axis at 0x{:X} + 0x6000'.format)
+def net(tmp_path: Path, request: pytest.FixtureRequest) -> VirtualNetwork:
+    """A booted device with two axes; some have none where the first one belongs."""
+
+    def moved(match: re.Match[str]) -> str:
+        return f'{match[1]}{int(match[2], 16) + request.param:X}'
+
+    eds = tmp_path / 'table.eds'
     path = tmp_path / 'bus.yml'
-    path.write_text(BUS)
+    for target, text in ((eds, EDS.read_text()), (path, BUS.replace(str(EDS), eds.name))):
+        target.write_text(re.sub(r'(\[|0x)(6[0-9A-F]{3})', moved, text))
     net = VirtualNetwork(load_bus(path))
     net.boot()
     return net

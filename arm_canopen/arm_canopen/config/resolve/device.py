@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from ...standard.device_profile import drive_axes
 from ...standard.dictionary import object_address, ObjectDictionary
 from ...standard.objects import AXIS_OFFSET, Index
 from ..findings import Findings, Place
 from ..model.bus import NodeConfig
+from ..model.drive import DriveConfig
 from ..model.identity import Identity
 from ..model.pdo_direction import RPDO, TPDO
 from ..read.document import YamlMap
@@ -87,7 +89,7 @@ def read_device(
         poll_period=settings.poll_period,
         sdo_writes=SdoReader(eds.dictionary, findings).read(section),
         parameter_writes=parameter_writes(eds, findings),
-        axes=axes,
+        axes=_placed(axes, eds.dictionary),
         line=section.place.line,
     )
     _check_profile(config, section, findings)
@@ -138,8 +140,8 @@ def _default(dictionary: ObjectDictionary, index: int, subindex: int) -> int:
 
 def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
     """Refuse the drive profile's driver for a device that is no drive."""
-    missing = [index for index in DRIVE_OBJECTS if not config.dictionary.has_index(index)]
-    if config.is_drive and missing:
+    if config.is_drive and not drive_axes(config.dictionary):
+        missing = [index for index in DRIVE_OBJECTS if not config.dictionary.has_index(index)]
         names = ' and '.join(
             f'{object_address(index)} ({index.name.lower()})' for index in missing
         )
@@ -152,12 +154,25 @@ def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> 
 
 def _check_axes(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
     """Refuse more axes than the EDS has."""
-    for axis in config.axes[1:]:
-        index = Index.CONTROLWORD + AXIS_OFFSET * axis.channel
-        if config.is_drive and not config.dictionary.has_index(index):
-            findings.error(
-                section.entries['num_channels'].place,
-                f'the EDS has no axis {axis.channel}: {object_address(index)} (controlword) is '
-                'missing',
-                'correct num_channels, or use the EDS that fits the device',
-            )
+    present = drive_axes(config.dictionary)
+    if config.is_drive and 0 < len(present) < len(config.axes):
+        words = (object_address(Index.CONTROLWORD + AXIS_OFFSET * axis) for axis in present)
+        findings.error(
+            section.entries['num_channels'].place,
+            f'the EDS has {len(present)} of {len(config.axes)} axes, with the controlword '
+            f'{", ".join(words)}',
+            'correct num_channels, or use the EDS that fits the device',
+        )
+
+
+def _placed(
+    axes: tuple[DriveConfig, ...], dictionary: ObjectDictionary
+) -> tuple[DriveConfig, ...]:
+    """Return the axes with the objects of those that the device has, in their order.
+
+    Most have the first one at 0x6040; some have none there, or leave one out.
+    """
+    present = drive_axes(dictionary)
+    if len(present) < len(axes):
+        return axes
+    return tuple(replace(axis, channel=at) for axis, at in zip(axes, present, strict=False))

@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...standard.datatypes import bit_length, DataType, SIGNED_BITS
+from ...standard.device_profile import is_drive
 from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
-from ...standard.objects import Index, is_signed, PDO_BITS_MAX
+from ...standard.objects import is_signed, PDO_BITS_MAX
 from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
 from ..findings import Findings, Place, RefusedError
 from ..model.pdo_direction import Direction, RPDO
@@ -103,7 +104,7 @@ def _from_word(
     name = object_address(index, subindex)
     what = f'{name}, which is not there' if entry is None else f'{entry} with {bits} bits'
     # an object of a drive whose sign the standard knows is not read without it
-    signed = is_signed(index, subindex) and dictionary.has_index(Index.CONTROLWORD)
+    signed = is_signed(index, subindex) and is_drive(dictionary)
     data_type = (SIGNED_BY_BITS if signed else UNSIGNED_BY_BITS).get(bits)
     result = 'the PDO is ignored' if data_type is None else f'taken as {data_type.name}'
     findings.warning(place, f'maps {what}; {result}', EDS_REMEDY)
