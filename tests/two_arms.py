@@ -89,7 +89,7 @@ def write_two_arms(folder: Path) -> Path:
     metres = '    scale_{0}_from_dev: 0.000001\n    scale_{0}_to_dev: 1000000.0\n'
     nodes = ''.join(
         f'  {name}:\n    node_id: {number}\n'
-        + ((metres.format('pos') + metres.format('vel')) if name in SLIDING else '')
+        + (''.join(map(metres.format, ('pos', 'vel', 'acc'))) if name in SLIDING else '')
         for number, name in enumerate(DRIVES, 2)
     )
     (folder / 'bus.yml').write_text(f'{bus}nodes:\n{nodes}')

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from config_cases import added
-from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, load_text, write_bus
+from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, load_text, Row, write_bus
 from drive_samples import (
     SCALE,
 )
@@ -21,10 +21,11 @@ from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
 from arm_canopen.config import check_file
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.config.model.checks.drive_units import AxisUnits, UnitRule, velocity_unit
+from arm_canopen.config.model.checks.drive_units import AxisUnits, rate_units, UnitRule
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import ConfigError, DriveError
 from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard.objects import Index
 
 JOINT = 'joint1'
 POSITION, VELOCITY, TORQUE = (
@@ -124,21 +125,86 @@ def test_velocities_left_at_the_default(tmp_path: Path, piece: str, *, warns: bo
         assert 'rpm of the joint: -9.549297' in each.remedy
 
 
+IN_RPM = 'scale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472'
+
+
 @pytest.mark.parametrize(
-    ('piece', 'unit'),
+    ('piece', 'units'),
     [
-        ('mandatory: false', 1.0),
-        (POSITIONS, 1.0),
-        (f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5', 1.0),
-        (f'{POSITIONS}\nscale_vel_to_dev: -9.549\nscale_vel_from_dev: -0.10472', 6000.0),
-        ('scale_from_factor_group: true', 1.0),
+        ('mandatory: false', (1.0, 1.0)),
+        (POSITIONS, (1.0, 1.0)),
+        (
+            f'{POSITIONS}\nscale_vel_to_dev: 57295.8\nscale_vel_from_dev: 1.745329e-5',
+            (1.0, 1.0),
+        ),
+        (f'{POSITIONS}\n{IN_RPM}', (6000.0, 6000.0)),
+        (f'{POSITIONS}\n{IN_RPM}\nscale_acc_to_dev: 5729.58', (6000.0, 10.0)),
+        (f'{POSITIONS}\nscale_acc_from_dev: 1.745329e-6', (1.0, 0.1)),
+        ('scale_from_factor_group: true', (1.0, 1.0)),
     ],
 )
-def test_the_unit_of_velocities(tmp_path: Path, piece: str, unit: float) -> None:
-    """By the ratio of the scales, where velocities have one of their own."""
+def test_the_units_of_velocities_and_accelerations(
+    tmp_path: Path, piece: str, units: tuple[float, float]
+) -> None:
+    """By the ratio of the scales, where these have one of their own."""
     bus = load_text(tmp_path, added(JOINT, piece), eds=EDS)
     (node,) = bus.nodes
-    assert velocity_unit(bus, node, node.drive) == pytest.approx(unit, rel=1e-3)
+    assert rate_units(bus, node, node.drive) == pytest.approx(units, rel=1e-3)
+
+
+TENTHS_OF_RPM = 'sdo: [{index: 0x60A9, value: 0x00B44700}, {index: 0x60AA, value: 0xFFC00300}]'
+
+
+@pytest.mark.parametrize(
+    ('piece', 'acceleration', 'by'),
+    [
+        ('mandatory: false', 1000.0, ''),
+        (f'{POSITIONS}\n{IN_RPM}', -9.549, ''),
+        (f'{POSITIONS}\n{IN_RPM}\nscale_acc_to_dev: 95.49', 95.49, 'scale_acc_to_dev'),
+        (f'{POSITIONS}\n{IN_RPM}\n{TENTHS_OF_RPM}', -95.49, '0x60A9, 0x60AA'),
+        ('scale_from_factor_group: true', 100_000.0, ''),
+    ],
+)
+def test_what_one_is_of_accelerations(
+    tmp_path: Path, piece: str, acceleration: float, by: str
+) -> None:
+    """By bus.yml, by the drive, or assumed, with a warning beside a scale of velocities."""
+    rows = (
+        Row(0x60A9, 0, 'SI unit velocity', 7, 'rw', '0'),
+        Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0'),
+        Row(0x6083, 0, 'Profile acceleration', 7, 'rw', '3000'),
+    )
+    eds = eds_text((*DRIVE_ROWS, *FACTOR_ROWS, *rows))
+    report = check_file(write_bus(tmp_path, added(JOINT, piece), eds=eds))
+    (units,) = report.units
+    assert units.acceleration == pytest.approx(acceleration, rel=1e-4)
+    assert units.acceleration_by == by
+    assert units.motion[Index.PROFILE_ACCELERATION] == pytest.approx(
+        3000.0 / abs(acceleration), rel=1e-4
+    )
+    found = [each for each in report.warnings if '1.0 per s2 is assumed' in each.message]
+    assert len(found) == (not by and units.rule is not UnitRule.UPSTREAM)
+
+
+@pytest.mark.parametrize(
+    ('piece', 'remedy'),
+    [
+        ('offset_pos_from_dev: 0.5', 'write offset_pos_to_dev: 28647.89'),
+        ('offset_pos_to_dev: 100', 'write offset_pos_to_dev: 0 '),
+        ('offset_pos_from_dev: 0.5\noffset_pos_to_dev: 28647.89', ''),
+        ('offset_pos_from_dev: 0.5\noffset_pos_to_dev: -28647.89', '28647.89'),
+        ('mandatory: false', ''),
+    ],
+)
+def test_offsets_that_do_not_cancel_are_a_warning(tmp_path: Path, piece: str, remedy: str) -> None:
+    """A target at the position that is shown would move the axis, as far as the warning says."""
+    text = added(JOINT, f'{POSITIONS}\n{RATES}\n{piece}')
+    report = check_file(write_bus(tmp_path, text, eds=EDS))
+    found = [each for each in report.warnings if 'do not cancel' in each.message]
+    assert len(found) == bool(remedy)
+    for each in found:
+        assert 'offset_pos' in each.key
+        assert remedy in each.remedy
 
 
 @pytest.mark.parametrize('key', ['scale_pos_to_dev', 'scale_vel_to_dev'])

@@ -107,12 +107,16 @@ TEXTS: dict[str, str] = {
     'scale_vel_to_dev': 'device velocity per user velocity',
     'scale_pos_from_dev': 'user units per increment',
     'scale_vel_from_dev': 'user velocity per device velocity',
+    'scale_acc_to_dev': 'device acceleration per user acceleration; without: by the drive (0x60A9 '
+    'with 0x60AA, or 0x6097), else its velocity units per second (our own key)',
+    'scale_acc_from_dev': 'user acceleration per device acceleration; without: the inverse of the '
+    'other (our own key)',
     'scale_from_factor_group': 'positions in rad by the factor group of the drive (0x608F, '
-    '0x6091, 0x6092, 0x6096), in the place of the scales (our own key)',
+    '0x6091, 0x6092, 0x6096, 0x60A8, 0x60A9), in the place of the scales (our own key)',
     'scale_eff_to_dev': 'device torque per user effort (our own key)',
     'scale_eff_from_dev': 'user effort per device torque; without: the inverse of the other',
     'offset_pos_to_dev': 'added to a target in increments',
-    'offset_pos_from_dev': 'added to a position in user units',
+    'offset_pos_from_dev': 'added to a position in user units; `offset_pos_to_dev` takes it back',
     'switching_state': 'state in which the mode is switched: 2 to 5 of CiA 402',
     'homing_timeout_seconds': 'longest time for homing [s]',
     'position_mode': 'mode for positions: 1, 7 or 8; its objects are checked, services select it',

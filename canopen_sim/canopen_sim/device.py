@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from arm_canopen.can.frame import Frame
+from arm_canopen.config.model.factor_group import FactorGroup
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
 from arm_canopen.standard.device_profile import is_drive
 from arm_canopen.standard.dictionary import ObjectDictionary
@@ -16,7 +17,7 @@ from arm_canopen.standard.objects import AXES_MAX, AXIS_OFFSET, Index
 from arm_canopen.standard.sdo import Abort
 
 from .drive.drive import Drive
-from .drive.rate import INCREMENTS_PER_SECOND
+from .drive.rate import INCREMENTS_PER_SECOND, RateUnits
 from .drive.servo import ServoModel
 from .drive.shared_errors import SharedErrors
 from .faults.injector import FaultInjector
@@ -69,7 +70,7 @@ class Device:
         servo: ServoModel | None = None,
         handlers_changed: Callable[[], None] | None = None,
         memory: ParameterMemory | None = None,
-        velocity_units: Mapping[int, float] = INCREMENTS_PER_SECOND,
+        rate_units: RateUnits = INCREMENTS_PER_SECOND,
     ) -> None:
         """Build a device that is switched off.
 
@@ -82,8 +83,8 @@ class Device:
             servo: Time constants of the motor.
             handlers_changed: Called when :attr:`handlers` is another mapping.
             memory: What it keeps without power; by default what lasts as long as the object.
-            velocity_units: What 1 of the velocities of an axis is in [inc/s], by its number; 1
-                where it is left out.
+            rate_units: What 1 of the velocities of an axis is in [inc/s], and of its accelerations
+                in [inc/s^2], by its number; by the EDS where it is left out.
 
         Raises:
             ValueError: The node id is out of range.
@@ -102,15 +103,13 @@ class Device:
         self._nmt = NmtSlave(self.node_id, self, boot_time)
         self._errors = EmcyProducer(self.store, self._send)
         self._sync = SyncConsumer(self.store, self._on_sync, self._on_sync_length, self._subscribe)
-        self.drives = self._build_drives(servo or ServoModel(), velocity_units)
+        self.drives = self._build_drives(servo or ServoModel(), rate_units)
         self._build_services()
         self.faults = FaultInjector(self, self._line)
         self._powered_parts = self._timed_parts()
         self._parts = self._powered_parts
 
-    def _build_drives(
-        self, servo: ServoModel, velocity_units: Mapping[int, float]
-    ) -> tuple[Drive, ...]:
+    def _build_drives(self, servo: ServoModel, rate_units: RateUnits) -> tuple[Drive, ...]:
         shared = SharedErrors(self._errors)
         return tuple(
             Drive(
@@ -119,12 +118,21 @@ class Device:
                 self._sync,
                 servo,
                 number=axis,
-                velocity_unit=velocity_units.get(axis, 1.0),
+                rate_units=rate_units.get(axis) or self._own_rate_units(axis),
             )
             for axis in range(AXES_MAX)
             if is_drive(self.store.dictionary)
             and (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
         )
+
+    def _own_rate_units(self, axis: int) -> tuple[float, float]:
+        """Return the units of velocities and accelerations that the EDS says."""
+
+        def default(index: int, subindex: int) -> int | None:
+            entry = self.store.dictionary.get(index + axis * AXIS_OFFSET, subindex)
+            return entry.default if entry is not None and isinstance(entry.default, int) else None
+
+        return FactorGroup.read(default).rate_units
 
     def _build_services(self) -> None:
         node_id, store, send, nmt = self.node_id, self.store, self._send, self._nmt

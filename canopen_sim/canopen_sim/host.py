@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.lss import UNCONFIGURED
 
 from .device import Device
-from .drive.rate import INCREMENTS_PER_SECOND
+from .drive.rate import INCREMENTS_PER_SECOND, RateUnits
 from .drive.servo import ServoModel
 from .objects.parameter_memory import ParameterMemory
 from .services.rpdo import Handler
@@ -61,7 +61,7 @@ class DeviceHost:
         boot_time: float = 0.0,
         servo: ServoModel | None = None,
         memory: ParameterMemory | None = None,
-        velocity_units: Mapping[int, float] = INCREMENTS_PER_SECOND,
+        rate_units: RateUnits = INCREMENTS_PER_SECOND,
     ) -> Device:
         """Add a device, switched off; the next :meth:`advance` starts it.
 
@@ -71,7 +71,8 @@ class DeviceHost:
             boot_time: How long its start takes in [s].
             servo: Time constants of the motor.
             memory: What it keeps without power.
-            velocity_units: What 1 of the velocities of an axis is in [inc/s], by its number.
+            rate_units: What 1 of the velocities of an axis is in [inc/s], and of its accelerations
+                in [inc/s^2], by its number.
 
         Raises:
             ValueError: The node id is out of range, or another device has it.
@@ -90,7 +91,7 @@ class DeviceHost:
             boot_time=boot_time,
             servo=servo,
             memory=memory,
-            velocity_units=velocity_units,
+            rate_units=rate_units,
             handlers_changed=self._outdate,
         )
         self.devices.append(device)

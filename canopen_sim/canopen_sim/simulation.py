@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from arm_canopen import BusConfig, CanopenError, load_bus, open_bus
-from arm_canopen.config.model.checks.drive_units import reported_increments, velocity_unit
+from arm_canopen.config.model.checks.drive_units import rate_units, reported_increments
 
 from .host import DeviceHost
 from .node_id_check import NodeIdCheck
@@ -46,7 +46,7 @@ def add_devices(
             node.node_id,
             node.dictionary,
             memory=None if memory is None else memory(node.node_id),
-            velocity_units={axis.channel: velocity_unit(bus, node, axis) for axis in axes},
+            rate_units={axis.channel: rate_units(bus, node, axis) for axis in axes},
         )
         drives = {drive.number: drive for drive in device.drives}
         for axis in axes:

@@ -80,7 +80,7 @@ class Rig:
         node_id: int = NODE_ID,
         boot_time: float = 0.0,
         power: bool = True,
-        velocity_unit: float = 1.0,
+        rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Connect a device, and switch it on."""
         self.now = 100.0
@@ -91,7 +91,7 @@ class Rig:
             drive_dictionary() if dictionary is None else dictionary,
             self._sent,
             boot_time=boot_time,
-            velocity_units={0: velocity_unit},
+            rate_units={0: rate_units},
         )
         if power:
             self.device.advance(self.now)

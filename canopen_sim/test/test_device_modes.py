@@ -78,7 +78,7 @@ def test_without_a_mode_the_axis_is_held() -> None:
 )
 def test_velocities_in_another_unit(mode: int, target: int, actual: int, word: int) -> None:
     """A drive that counts rpm turns that much faster, and reports what it was given."""
-    rig = Rig(velocity_unit=50.0)  # 3000 increments per turn: 50 inc/s are 1 rpm
+    rig = Rig(rate_units=(50.0, 50.0))  # 3000 increments per turn: 50 inc/s are 1 rpm
     limits = ((0x607F, 60), (0x6080, 0), (0x6083, 40), (0x6084, 40))
     for index, value in limits:
         rig.put(index, value)
@@ -93,7 +93,7 @@ def test_velocities_in_another_unit(mode: int, target: int, actual: int, word: i
 
 def test_a_move_in_another_unit_takes_its_time() -> None:
     """By 0x6081 and its ramps: 3000 increments at 10 rpm of 50 inc/s are more than 6 s."""
-    rig = Rig(velocity_unit=50.0)
+    rig = Rig(rate_units=(50.0, 50.0))
     for index, value in ((0x607F, 60), (0x6081, 10), (0x6083, 1000), (0x6084, 1000)):
         rig.put(index, value)
     rig.enable(1)

@@ -202,6 +202,7 @@ def _units(device: NewDevice) -> Iterator[str]:
         yield f'scale_pos_from_dev: {1.0 / units.scale!r}'
         yield f'scale_vel_to_dev: {velocity!r}  # {why}'
         yield f'scale_vel_from_dev: {1.0 / velocity!r}'
+        yield _acceleration(device, velocity)
         if units.scale < 0.0:
             yield 'scale_eff_to_dev: -1.0  # torque turns with the position'
             yield 'scale_eff_from_dev: -1.0'
@@ -210,6 +211,8 @@ def _units(device: NewDevice) -> Iterator[str]:
     elif says_units(factors):
         turn, source = factors.position_scale * TURN, device.source(*FACTOR_OBJECTS.values())
         yield f'scale_from_factor_group: true  # read from the drive; {turn:g} a turn by {source}'
+        if factors.acceleration_ratio is None:  # else it is read from the drive, too
+            yield _acceleration(device, factors.velocity_scale)
     else:
         eds = device.eds.path.name
         speaker = f'neither the drive nor {eds} does' if device.found else f'{eds} does'
@@ -219,6 +222,15 @@ def _units(device: NewDevice) -> Iterator[str]:
             f' --turn {device.name}=INCREMENTS for a turn of the joint with its gear, or'
             f' --metre {device.name}=INCREMENTS'
         )
+
+
+def _acceleration(device: NewDevice, velocity: float) -> str:
+    """Write the scale of accelerations, by that of velocities."""
+    ratio, objects = device.factors.acceleration_ratio, device.factors.acceleration_objects
+    why = 'velocity units per second, where the manual says nothing else for 0x6083'
+    if ratio is not None:
+        why = f'by {", ".join(f"0x{index:04X}" for index in objects)} of {device.source(*objects)}'
+    return f'scale_acc_to_dev: {velocity * (ratio or 1.0)!r}  # {why}'
 
 
 def _pdos(device: NewDevice, direction: Direction, wanted: Sequence[_Wanted]) -> Iterator[str]:

@@ -9,21 +9,13 @@ from dataclasses import dataclass, field, replace
 import math
 
 from arm_canopen.config.model.checks.drive_units import is_coarse
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, UNSET
+from arm_canopen.config.model.si_unit import NamedUnit, position_unit, RPM
 from arm_canopen.config.read.eds import Eds
 from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.device_profile import is_drive
 from arm_canopen.standard.drive import OperationMode
 from arm_canopen.standard.objects import Index
-
-from .si_unit import (
-    NamedUnit,
-    position_unit,
-    RPM,
-    SI_UNIT_POSITION,
-    SI_UNIT_VELOCITY,
-    velocity_unit,
-)
 
 TURN = 2.0 * math.pi
 """A turn in [rad]."""
@@ -31,8 +23,6 @@ SAME = 0.01
 """Share by which two scales may differ and still say the same."""
 FAR = 10.0
 """How many times the increments of the factor group somebody may say without being asked."""
-UNSET = 1.0
-"""Ratio of 0x6096 that nobody has set."""
 
 
 class NewBusError(CanopenError):
@@ -92,16 +82,12 @@ class NewDevice:
     @property
     def factors(self) -> FactorGroup:
         """The factor group by what the drive holds, else by the defaults of its EDS."""
-
-        def value(index: Index) -> float | None:
-            return ratio(self.number(index, 1), self.number(index, 2))
-
-        return FactorGroup(**{name: value(index) for name, index in FACTOR_OBJECTS.items()})
+        return FactorGroup.read(self.number)
 
     @property
     def velocity_unit(self) -> NamedUnit | None:
         """What 0x60A9 names; None where it names nothing."""
-        return velocity_unit(self.number(SI_UNIT_VELOCITY))
+        return self.factors.velocity_unit
 
     @property
     def has_open_units(self) -> bool:
@@ -114,7 +100,8 @@ class NewDevice:
         named, units = self.velocity_unit, _position_units(self) if self.is_drive else None
         if named is None or units is None or self.rpm is not None or _is_of_joint(self, units):
             return ''
-        who = f'{self.name}: 0x60A9 of {self.source(SI_UNIT_VELOCITY)} has {named.text} as unit'
+        source = self.source(Index.SI_UNIT_VELOCITY)
+        who = f'{self.name}: 0x60A9 of {source} has {named.text} as unit'
         correct = 'or correct 0x60A9 in the EDS by the manual'
         if named.slides:
             return f'{who}, and the joint turns; give --metre where it slides, {correct}'
@@ -150,7 +137,7 @@ def said_units(device: NewDevice) -> Units | None:
         return _with_turns(device, units, device.rpm)
     if named is None or not _is_of_joint(device, units):
         return units
-    said = f'0x60A9 of {device.source(SI_UNIT_VELOCITY)}: its unit is {named.text}'
+    said = f'0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)}: its unit is {named.text}'
     return replace(units, velocity=_velocity(named, units.scale), velocity_said=said)
 
 
@@ -207,7 +194,7 @@ def _position_units(device: NewDevice) -> Units | None:
     """
     if device.units is not None:
         return device.units
-    position = position_unit(device.values.get((SI_UNIT_POSITION, 0)))
+    position = position_unit(device.values.get((Index.SI_UNIT_POSITION, 0)))
     if position is not None:
         per = 'm' if position.slides else 'rad'
         said = f'0x60A8 of the drive: its unit is {position.text}; per {per}'
@@ -255,9 +242,9 @@ def _with_turns(device: NewDevice, units: Units, turns: float) -> Units:
         formula = f'60 * {turns:g}' + ('' if units.slides else ' / (2 pi)')
         said = f'rpm, {said}: {formula}'
     else:
-        said = f'{unit.text} by 0x60A9 of {device.source(SI_UNIT_VELOCITY)}, {said}'
+        said = f'{unit.text} by 0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)}, {said}'
     if named is not None and not is_angle:
-        said += f'; 0x60A9 of {device.source(SI_UNIT_VELOCITY)} has {named.text}'
+        said += f'; 0x60A9 of {device.source(Index.SI_UNIT_VELOCITY)} has {named.text}'
     return replace(units, velocity=turns * per / unit.size, velocity_said=said)
 
 

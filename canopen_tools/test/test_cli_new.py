@@ -183,8 +183,6 @@ A_TURN = 628_318.5  # [inc] by the factor group of the sample
     ('rows', 'options', 'velocity', 'words'),
     [
         # the factor group says what the joint is in increments, and a turn is one of the joint
-        ([RPM], [], 60 / TURN, '0x60A9 of the EDS: its unit is 1 turns/min'),
-        ([DEGREES], [], 360 / TURN, '1 deg/s'),
         ([RPM], ['--turn', f'arm=-{A_TURN}'], -60 / TURN, '1 turns/min'),
         # somebody else says it, and what turns so fast
         ([RPM], ['--turn', 'arm=1000', '--rpm', 'arm=26'], 26 * 60 / TURN, '# rpm, 26 turns'),
@@ -225,11 +223,28 @@ def test_an_epos4_is_asked_for_its_gear(
     assert made.drive.scale_pos_to_dev == shipped.drive.scale_pos_to_dev
 
 
-def test_what_the_master_reads_from_the_drive_is_not_written_out(tmp_path: Path) -> None:
-    """Increments per second are what the factor group means without 0x6096."""
-    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, COUNTS]), tmp_path / 'bus.yml'
+@pytest.mark.parametrize('row', [COUNTS, RPM, DEGREES])
+def test_what_the_master_reads_from_the_drive_is_not_written_out(tmp_path: Path, row: Row) -> None:
+    """The factor group says what the positions are of, and 0x60A9 the velocities."""
+    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, row]), tmp_path / 'bus.yml'
     assert main(['new', f'arm={eds}@5', '--output', str(bus_yml)]) == 0
-    assert 'scale_from_factor_group: true' in bus_yml.read_text()
+    text = bus_yml.read_text()
+    assert 'scale_from_factor_group: true' in text
+    assert 'scale_vel_to_dev' not in text
+    assert '# velocity units per second' in text
+    assert 'scale_acc_to_dev' in text
+
+
+RPM_PER_S = Row(0x60AA, 0, 'SI unit acceleration', 7, 'rw', '0xFFC00300')
+
+
+def test_accelerations_have_the_unit_that_the_eds_names(tmp_path: Path) -> None:
+    """0.1 rpm/s beside rpm: ten times the scale of velocities."""
+    eds, bus_yml = written(tmp_path, 'drive.eds', [*SAMPLE, RPM, RPM_PER_S]), tmp_path / 'bus.yml'
+    assert main(['new', f'arm={eds}@5', '--turn', f'arm={A_TURN}', '--output', str(bus_yml)]) == 0
+    (node,) = load_bus(bus_yml).nodes
+    assert node.drive.scale_acc_to_dev == pytest.approx(600 / TURN)
+    assert 'by 0x60A9, 0x60AA of the EDS' in bus_yml.read_text()
 
 
 def test_the_target_is_that_of_the_mode(tmp_path: Path) -> None:

@@ -19,10 +19,10 @@ import pytest
 from arm_canopen import CanopenMaster, load_bus, open_bus
 from arm_canopen.config import load_eds
 from arm_canopen.config.model.identity import Identity
+from arm_canopen.config.model.si_unit import position_unit, POSITIONS, TIMES, velocity_unit
 from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 from canopen_tools.eds_match import match_eds, NoMatchError, SeveralMatchError
-from canopen_tools.si_unit import position_unit, POSITIONS, TIMES, velocity_unit
 
 LISTEN = ('--listen', '0.1')
 DEADLINE = 20.0  # [s]

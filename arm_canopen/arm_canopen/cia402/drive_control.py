@@ -91,6 +91,11 @@ class DriveControl:
         )
 
     @property
+    def shows_mode(self) -> bool:
+        """Whether the drive displays the selected mode, and has been sent what holds it there."""
+        return self._mode_shown is self.mode and (self._objects.mode_display == self.mode.number)
+
+    @property
     def accepts_targets(self) -> bool:
         """Whether a target of the selected mode would be executed."""
         return self.refusal is None
@@ -111,7 +116,7 @@ class DriveControl:
             return Refusal(RefusalCause.FAULT, view.error)
         if not self.goal is view.state is DriveState.OPERATION_ENABLED:
             return Refusal(RefusalCause.NOT_ENABLED, view.state.title)
-        if self._objects.mode_display != self.mode.number:
+        if not self.shows_mode:
             return Refusal(RefusalCause.MODE_CHANGE, mode_title(self._objects.mode_display))
         return None
 
@@ -157,7 +162,7 @@ class DriveControl:
             self._mode_shown = self._mode_led = self.mode
             return False
         actual = self._view.actual()
-        target = self._objects.held_position(held.number)
+        target = self._objects.held_position(held.number, self._view.parameters.offsets)
         if isinstance(held, CyclicPosition) and target is not None:
             actual = actual._replace(position_inc=target)
         held.preload(actual)
@@ -214,7 +219,10 @@ class DriveControl:
         Raises:
             DriveError: It is beyond; the message names the limits.
         """
-        check_target(self._view.name, self.mode, self._view.parameters, self._view.units, target)
+        view = self._view
+        check_target(
+            view.name, self.mode, view.parameters, view.units, target, position=view.position
+        )
 
     def step(self, command: Command, now: float, period: float) -> tuple[Command, int]:
         """Advance the mode by a cycle, and let targets leave before what makes them act.

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 import math
 
 from ..master.process_image import SentRpdo, Writer
@@ -164,12 +165,24 @@ class DriveObjects:
         writer = self._node.objects.writer(self.at(index), subindex)
         return None if writer.by_sdo and (entry is None or not entry.access.writable) else writer
 
-    def held_position(self, mode: OperationMode) -> int | None:
-        """Target of a cyclic position mode that the RPDOs carry in [inc], None when none does."""
+    def held_position(self, mode: OperationMode, offsets: Mapping[int, int]) -> int | None:
+        """Position that a cyclic mode commands by RPDO in [inc], None when none carries it.
+
+        Args:
+            mode: The mode.
+            offsets: What the drive was read to hold in its offsets.
+        """
         interpolated = mode is OperationMode.INTERPOLATED_POSITION
         place = (Index.INTERPOLATION_DATA, 1) if interpolated else (Index.TARGET_POSITION, 0)
         value = self._node.image.commanded(self.at(place[0]), place[1])
-        return None if value is None else int(value)
+        if value is None:
+            return None
+        return int(value) + (0 if interpolated else self.offset(Index.POSITION_OFFSET, offsets))
+
+    def offset(self, index: Index, offsets: Mapping[int, int]) -> int:
+        """Return what the drive adds to a target: as the RPDOs carry it, else as it was read."""
+        value = self._node.image.commanded(self.at(index))
+        return offsets.get(index, 0) if value is None else int(value)
 
     def must_lead(self, index: int, subindex: int = 0) -> bool:
         """Whether an object has to leave a cycle before the controlword that commands it."""

@@ -28,8 +28,9 @@ POWERED = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which it may move under power, and falls or coasts when that goes."""
 LOOK_PERIOD = 0.02  # [s] between two readings by SDO of what TPDOs do not show
 LOOK_AGE_MAX = 0.5  # [s] of such a reading
-REST_SHARE = 0.01  # share of the profile velocity below which an axis counts as standing
-REST_MIN, REST_MAX = 0.002, 0.02  # [unit/s] between which that lies: noise, and what still moves
+REST_SHARE = 0.002  # share of the profile velocity below which an axis counts as standing
+REST_TIME = 0.004  # [s] within which one that counts as standing could stop
+NOISE_DEV = 2  # units of 0x606C, and increments within the window, that noise of sensors may be
 
 
 class DriveView:
@@ -147,8 +148,16 @@ class DriveView:
 
     @property
     def rest_speed(self) -> float:
-        """Speed in user units per second up to which it counts as standing."""
-        return max(REST_MIN, min(REST_MAX, REST_SHARE * self.parameters.profile.velocity))
+        """Speed up to which the axis counts as standing, in user units per second.
+
+        By its own limits, and not below what its sensors resolve.
+        """
+        profile, units = self.parameters.profile, self.units
+        noise = abs(units.rate_from_device(NOISE_DEV / self._estimate.window))
+        if self.objects.velocity is not None:
+            noise = max(noise, abs(units.velocity_from_device(NOISE_DEV)))
+        slow = min(REST_SHARE * profile.velocity, REST_TIME * profile.deceleration)
+        return max(slow, noise)
 
     @property
     def effort(self) -> float:

@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterator
 
 from ..standard.drive import OperationMode
 from ..standard.objects import Index
+from ..standard.target_objects import TARGET_OBJECTS
 from .cyclic_position import CyclicPosition, InterpolatedPosition
 from .drive_objects import DriveObjects
 from .modes import Homing, Mode, NoMode
 from .parameters import DriveParameters
 from .position_modes import ProfilePosition
 from .rate_modes import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
+from .target_offset import OFFSET_OBJECTS, OffsetTarget
 from .units import Units
 
 
@@ -32,26 +34,44 @@ def build_modes(
         warn: Takes a warning in words.
     """
     modes: list[Mode] = [NoMode(), Homing()]
-    modes += _profile_modes(objects, units, warn)
+    modes += _profile_modes(objects, units, parameters, warn)
     modes += _cyclic_modes(objects, units, parameters)
     return {mode.number: mode for mode in modes}
 
 
 def _profile_modes(
-    objects: DriveObjects, units: Units, warn: Callable[[str], None]
+    objects: DriveObjects,
+    units: Units,
+    parameters: Callable[[], DriveParameters],
+    warn: Callable[[str], None],
 ) -> Iterator[Mode]:
     """Yield the modes whose targets are single values, which may go by SDO."""
-    position = objects.profile_target_writer(OperationMode.PROFILE_POSITION)
+
+    def target(mode: OperationMode, cyclic: OperationMode) -> OffsetTarget | None:
+        """Return the target of a mode, which a cyclic mode adds an offset to until it is left."""
+        writer, offset = objects.profile_target_writer(mode), OFFSET_OBJECTS[cyclic]
+        if writer is None:
+            return None
+        return OffsetTarget(
+            writer,
+            lambda: (
+                objects.offset(offset, parameters().offsets)
+                if objects.mode_display == cyclic
+                else 0
+            ),
+        )
+
+    position = target(OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION)
     if position is not None:
         leads = objects.must_lead(Index.TARGET_POSITION)
         yield ProfilePosition(units, position, warn, target_leads=leads)
     vl_target = objects.profile_target_writer(OperationMode.VELOCITY)
     if vl_target is not None:
         yield Velocity(units, vl_target)
-    velocity = objects.profile_target_writer(OperationMode.PROFILE_VELOCITY)
+    velocity = target(OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY)
     if velocity is not None:
         yield ProfileVelocity(units, velocity)
-    torque = objects.profile_target_writer(OperationMode.PROFILE_TORQUE)
+    torque = target(OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
     if torque is not None:
         yield ProfileTorque(units, torque)
 
@@ -60,15 +80,22 @@ def _cyclic_modes(
     objects: DriveObjects, units: Units, parameters: Callable[[], DriveParameters]
 ) -> Iterator[Mode]:
     """Yield the modes with a target in each cycle, which only an RPDO can carry."""
-    position = objects.target_writer(Index.TARGET_POSITION)
+
+    def target(mode: OperationMode) -> OffsetTarget | None:
+        writer, offset = objects.target_writer(TARGET_OBJECTS[mode][0]), OFFSET_OBJECTS[mode]
+        if writer is None:
+            return None
+        return OffsetTarget(writer, lambda: objects.offset(offset, parameters().offsets))
+
+    position = target(OperationMode.CYCLIC_POSITION)
     if position is not None:
         yield CyclicPosition(units, position, lambda: parameters().profile)
     interpolation = objects.target_writer(Index.INTERPOLATION_DATA, 1)
     if interpolation is not None:
         yield InterpolatedPosition(units, interpolation, lambda: parameters().profile)
-    velocity = objects.target_writer(Index.TARGET_VELOCITY)
+    velocity = target(OperationMode.CYCLIC_VELOCITY)
     if velocity is not None:
         yield CyclicVelocity(units, velocity, lambda: parameters().profile.acceleration)
-    torque = objects.target_writer(Index.TARGET_TORQUE)
+    torque = target(OperationMode.CYCLIC_TORQUE)
     if torque is not None:
         yield CyclicTorque(units, torque, lambda: parameters().torque_slope)

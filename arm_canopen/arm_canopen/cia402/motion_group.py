@@ -19,6 +19,7 @@ from .refusal import Refusal, RefusalCause
 HAND_OVER_MARGIN = 2.0  # cycles of profile velocity from the set-point that a stream may start
 SPEED_MARGIN = 1.5  # share of the greatest speed (0x607F) above which a step is a jump
 DEFAULT_SPEED_MARGIN = 10.0  # the same of the profile velocity, for drives without one
+RANGE_TIME = 0.25  # [s] in which those may cross their range (0x607D), too
 BY_CLIENTS = (RefusalCause.COMMANDED, RefusalCause.MODE_SELECTED, RefusalCause.SINGLE_TARGET)
 
 
@@ -196,4 +197,5 @@ def _greatest_speed(drive: Drive) -> float:
     parameters = drive.view.parameters
     if parameters.speed_limit is not None:
         return SPEED_MARGIN * parameters.speed_limit
-    return DEFAULT_SPEED_MARGIN * parameters.profile.velocity
+    low, high = parameters.position_limits or (0.0, 0.0)
+    return max(DEFAULT_SPEED_MARGIN * parameters.profile.velocity, (high - low) / RANGE_TIME)

@@ -4,20 +4,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from ..config.model.drive import DriveConfig
-from ..config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from ..config.model.factor_group import ACCELERATION_ADDRESSES, FACTOR_ADDRESSES, FactorGroup
 from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..master.remote_node import RemoteNode
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
 from .setpoint_profile import ProfileLimits
+from .target_offset import OFFSET_OBJECTS
 from .units import Units
 
 READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has its time
-DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without 0x6081: slow, but moving
-DEFAULT_ACCELERATION = 1.0  # [unit/s^2] for drives without 0x6083
+SPEED_SHARE = 0.1  # share of 0x607F with which drives without 0x6081 move
+RANGE_TIME = 10.0  # [s] in which those without 0x607F, too, cross their range (0x607D)
+RAMP_TIME = 0.5  # [s] in which drives without 0x6083 get to their profile velocity
+DEFAULT_VELOCITY = 0.5  # [unit/s] for drives without any of these: slow, but moving
+DEFAULT_ACCELERATION = DEFAULT_VELOCITY / RAMP_TIME  # [unit/s^2]
 DEFAULT_PROFILE = ProfileLimits(DEFAULT_VELOCITY, DEFAULT_ACCELERATION, DEFAULT_ACCELERATION)
 NO_WINDOW = (0, 0xFFFF_FFFF)  # values of 0x6065 with which nothing is monitored
 DEFAULT_TORQUE_SLOPE_DEV = 1000.0  # [device units/s]: from 0 to the rated torque in a second
@@ -34,6 +39,7 @@ REFRESHED = frozenset(
         Index.PROFILE_DECELERATION,
         Index.QUICK_STOP_DECELERATION,
         Index.TORQUE_SLOPE,
+        *OFFSET_OBJECTS.values(),
     }
 )
 """Objects of the first axis that are read again when this master has written one of them."""
@@ -56,6 +62,8 @@ class DriveParameters:
             from 0x6087.
         profile_velocity_inc: 0x6081 in device units; None when the drive has none, or a PDO
             carries it.
+        offsets: What the drive adds to the targets of its cyclic modes (0x60B0 to 0x60B2) in
+            device units, by object of the first axis.
         units: In words, where the units come from.
     """
 
@@ -69,6 +77,7 @@ class DriveParameters:
     quick_stop_deceleration: float = DEFAULT_ACCELERATION
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
     profile_velocity_inc: int | None = None
+    offsets: Mapping[int, int] = field(default_factory=dict)
     units: str = 'bus.yml'
 
     def supports(self, mode: OperationMode) -> bool:
@@ -91,11 +100,11 @@ class ParameterReader:
         self._config = config
         self._units = units
         self._offset = AXIS_OFFSET * config.channel
-        self._units_from = '' if config.scale_from_factor_group else 'bus.yml'
+        self._units_from = ''
 
     def forget(self) -> None:
         """Read the units again; they do not change while a device runs."""
-        self._units_from = '' if self._config.scale_from_factor_group else 'bus.yml'
+        self._units_from = ''
 
     async def read(self) -> DriveParameters:
         """Read all of them.
@@ -111,19 +120,21 @@ class ParameterReader:
         window = await self._read(Index.FOLLOWING_ERROR_WINDOW)
         speed = await self._read(Index.MAX_PROFILE_VELOCITY)
         speed_limit = abs(units.velocity_commanded(speed)) if speed else None
-        profile = replace(await self._profile(), speed_limit=speed_limit or 0.0)
+        position_limits = await self._position_limits()
+        profile = await self._profile(speed_limit, position_limits)
         quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
         return DriveParameters(
             supported_modes=await self._read(Index.SUPPORTED_MODES),
             homing_method=await self._read(Index.HOMING_METHOD) or 0,
-            position_limits=await self._position_limits(),
+            position_limits=position_limits,
             speed_limit=speed_limit,
             effort_limit=abs(units.effort_commanded(effort)) if effort else None,
             following_window=self._following_window(window),
             profile=profile,
-            quick_stop_deceleration=self._in_units(quick_stop, profile.deceleration),
+            quick_stop_deceleration=self._acceleration(quick_stop, profile.deceleration),
             torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
             profile_velocity_inc=await self._profile_velocity(),
+            offsets={index: await self._read(index) or 0 for index in OFFSET_OBJECTS.values()},
             units=self._units_from,
         )
 
@@ -133,9 +144,11 @@ class ParameterReader:
         Raises:
             SdoError: It does not answer.
         """
-        return FactorGroup(
-            **{name: await self._ratio(index) for name, index in FACTOR_OBJECTS.items()}
-        )
+        return await self._factor_group(FACTOR_ADDRESSES)
+
+    async def _factor_group(self, addresses: Sequence[tuple[int, int]]) -> FactorGroup:
+        held = {address: await self._read(*address) for address in addresses}
+        return FactorGroup.read(lambda index, subindex: held.get((index, subindex)))
 
     async def _profile_velocity(self) -> int | None:
         if self._node.image.mapped_output(Index.PROFILE_VELOCITY + self._offset) is not None:
@@ -156,44 +169,61 @@ class ParameterReader:
             return None
         return abs(window / self._units.position_scale)
 
-    async def _profile(self) -> ProfileLimits:
-        velocity = await self._read(Index.PROFILE_VELOCITY)
+    async def _profile(
+        self, speed_limit: float | None, position_limits: tuple[float, float] | None
+    ) -> ProfileLimits:
+        """Read the limits of a profile; what the drive does not say follows from its others."""
+        velocity_dev = await self._read(Index.PROFILE_VELOCITY)
         acceleration = await self._read(Index.PROFILE_ACCELERATION)
         deceleration = await self._read(Index.PROFILE_DECELERATION)
-
+        if velocity_dev:
+            velocity = abs(self._units.velocity_commanded(velocity_dev))
+        elif speed_limit is not None:
+            velocity = SPEED_SHARE * speed_limit
+        elif position_limits is not None:
+            velocity = (position_limits[1] - position_limits[0]) / RANGE_TIME
+        else:
+            velocity = DEFAULT_VELOCITY
+        default = velocity / RAMP_TIME
         return ProfileLimits(
-            velocity=self._in_units(velocity, DEFAULT_VELOCITY),
-            acceleration=self._in_units(acceleration, DEFAULT_ACCELERATION),
-            deceleration=self._in_units(deceleration or acceleration, DEFAULT_ACCELERATION),
+            velocity=min(velocity, speed_limit or velocity),
+            acceleration=self._acceleration(acceleration, default),
+            deceleration=self._acceleration(deceleration or acceleration, default),
+            speed_limit=speed_limit or 0.0,
         )
 
-    def _in_units(self, value: int | None, default: float) -> float:
-        """Convert a rate or its change to user units; a drive without it has the default."""
-        return abs(self._units.velocity_commanded(value)) if value else default
+    def _acceleration(self, value: int | None, default: float) -> float:
+        """Convert an acceleration to user units; a drive without it has the default."""
+        return abs(self._units.acceleration_from_device(value)) if value else default
 
     async def _read_units(self) -> str:
         """Take the units of the factor group (CiA 402-2, clause 8); report where they are from."""
-        factors = await self.factor_group()
-        scale, velocity_scale = factors.position_scale, factors.velocity_scale
-        if not scale:
-            raise SdoError(
-                'scale_from_factor_group is true in bus.yml, and the drive has neither 0x6092 '
-                'nor 0x608F; write scale_pos_to_dev and the other scales instead'
-            )
-        self._units.use(
-            replace(
-                self._config,
+        config, source = self._config, 'bus.yml'
+        if not config.scale_from_factor_group and config.scale_acc_from_dev is not None:
+            return source
+        addresses = FACTOR_ADDRESSES if config.scale_from_factor_group else ACCELERATION_ADDRESSES
+        factors = await self._factor_group(addresses)
+        if config.scale_from_factor_group:
+            scale, velocity_scale = factors.position_scale, factors.velocity_scale
+            if not scale:
+                raise SdoError(
+                    'scale_from_factor_group is true in bus.yml, and the drive has neither 0x6092 '
+                    'nor 0x608F; write scale_pos_to_dev and the other scales instead'
+                )
+            objects = ', '.join(f'0x{index:04X}' for index in factors.position_objects)
+            source = f'the drive ({objects}): {scale:g} per rad'
+            config = replace(
+                config,
                 scale_pos_to_dev=scale,
                 scale_pos_from_dev=1.0 / scale,
                 scale_vel_to_dev=velocity_scale,
                 scale_vel_from_dev=1.0 / velocity_scale,
             )
-        )
-        return f'the drive (0x608F, 0x6091, 0x6092, 0x6096): {scale:g} per rad'
-
-    async def _ratio(self, index: int) -> float | None:
-        """Read numerator and denominator; None when the drive has no such object."""
-        return ratio(await self._read(index, 1), await self._read(index, 2))
+        if config.scale_acc_from_dev is None:
+            scale = config.scale_vel_to_dev * (factors.acceleration_ratio or 1.0)
+            config = replace(config, scale_acc_to_dev=scale, scale_acc_from_dev=1.0 / scale)
+        self._units.use(config)
+        return source
 
     async def _read(self, index: int, subindex: int = 0) -> int | None:
         profile_index = index + self._offset

@@ -304,7 +304,7 @@ class DriveSequences:
             await self._end_halt_at_rest(acting)
             control.select(mode)
         await self.until(
-            shown,
+            lambda: control.shows_mode,
             timeout,
             f'mode {mode.number.title} in 0x6061',
             'does its switching_state in bus.yml fit?',

@@ -24,7 +24,7 @@ def clamp(value: float, largest: int) -> int:
 
 
 class Units:
-    """Converts positions, velocities and torques of one drive.
+    """Converts positions, velocities, accelerations and torques of one drive.
 
     To the device: ``position * scale_pos_to_dev + offset_pos_to_dev`` and
     ``velocity * scale_vel_to_dev``; from it: ``position * scale_pos_from_dev +
@@ -91,6 +91,11 @@ class Units:
     def velocity_raw(self, velocity: float) -> float:
         """Convert a velocity to device units, whether or not an object can hold it."""
         return velocity * self._config.scale_vel_to_dev
+
+    def acceleration_from_device(self, acceleration_dev: float) -> float:
+        """Convert a device acceleration to user units per second squared."""
+        scale = self._config.scale_acc_from_dev
+        return acceleration_dev * (1.0 / self._config.scale_vel_to_dev if scale is None else scale)
 
     def rate_from_device(self, rate_inc: float) -> float:
         """Convert the rate of a position in [inc/s] to user units per second."""

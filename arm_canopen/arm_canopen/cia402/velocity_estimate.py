@@ -11,7 +11,11 @@ FLICKER_INC = 1  # [inc] by which an encoder at rest may change
 
 
 class VelocityEstimate:
-    """The rate of 0x6064 over a short window."""
+    """The rate of 0x6064 over a short window.
+
+    Attributes:
+        window: Its length in [s].
+    """
 
     def __init__(self, poll_period: float = 0.0) -> None:
         """Begin without positions.
@@ -20,7 +24,7 @@ class VelocityEstimate:
             poll_period: Time between two positions that are read by SDO in [s]; 0 where a PDO
                 carries them.
         """
-        self._window = max(WINDOW, 2.5 * poll_period)
+        self.window = max(WINDOW, 2.5 * poll_period)
         self._positions: deque[tuple[float, float]] = deque()
 
     def note(self, now: float, position_inc: float, stamp: float | None = None) -> None:
@@ -34,12 +38,12 @@ class VelocityEstimate:
         """
         positions = self._positions
         if stamp is not None and positions and stamp <= positions[-1][0]:
-            if now - positions[-1][0] <= self._window:
+            if now - positions[-1][0] <= self.window:
                 return
         elif stamp is not None:
             now = stamp
         positions.append((now, position_inc))
-        while len(positions) > 2 and positions[1][0] <= now - self._window:
+        while len(positions) > 2 and positions[1][0] <= now - self.window:
             positions.popleft()
 
     def clear(self) -> None:
@@ -51,7 +55,7 @@ class VelocityEstimate:
         """Whether the positions span enough time to tell motion from rest."""
         if len(self._positions) < 2:
             return False
-        return self._positions[-1][0] - self._positions[0][0] >= 0.5 * self._window
+        return self._positions[-1][0] - self._positions[0][0] >= 0.5 * self.window
 
     @property
     def rate(self) -> float:

@@ -80,7 +80,8 @@ class ReplayedAxis:
         objects = self.view.objects
         interpolated = objects.mode_display == OperationMode.INTERPOLATED_POSITION
         target = objects.held_position(
-            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION
+            OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION,
+            self.view.parameters.offsets,
         )
         return math.nan if target is None else self.view.units.position_commanded(target)
 

@@ -68,7 +68,7 @@ class Drive:
         model: ServoModel,
         *,
         number: int = 0,
-        velocity_unit: float = 1.0,
+        rate_units: tuple[float, float] = (1.0, 1.0),
     ) -> None:
         """Work on the objects of a device.
 
@@ -78,13 +78,13 @@ class Drive:
             clock: What is known of SYNC.
             model: Time constants of the motor.
             number: Of the axis in its device, from 0.
-            velocity_unit: What 1 of its velocities is in [inc/s].
+            rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
         """
         self.deadline = NEVER
         self.faults: set[int] = set()
         self.causes: set[Fault] = set()
         self.number = number
-        self._objects = objects = DriveObjects(store, number, velocity_unit)
+        self._objects = objects = DriveObjects(store, number, rate_units)
         self._errors = errors
         self._clock = clock
         self._axis = Axis(model)

@@ -18,6 +18,17 @@ from .rate import Rate
 Bind: TypeAlias = Callable[..., Integer]
 BindRate: TypeAlias = Callable[..., Integer | Rate]
 
+ACCELERATIONS = frozenset(
+    {
+        Index.PROFILE_ACCELERATION,
+        Index.PROFILE_DECELERATION,
+        Index.QUICK_STOP_DECELERATION,
+        Index.HOMING_ACCELERATION,
+        Index.MAX_ACCELERATION,
+        Index.MAX_DECELERATION,
+    }
+)
+"""Objects in the unit of accelerations; the ramps of mode 2 are velocities over times."""
 NOMINAL_TORQUE = 1000  # [0.1 % of the rated torque]
 NO_TORQUE_LIMIT = 0xFFFF
 NO_WINDOW = 0xFFFF_FFFF  # 0x6065 and 0x6067: not monitored
@@ -32,22 +43,24 @@ class DriveObjects:
     Those that a dictionary lacks get a harmless value and stay invisible.
     """
 
-    def __init__(self, store: ObjectStore, axis: int = 0, velocity_unit: float = 1.0) -> None:
+    def __init__(
+        self, store: ObjectStore, axis: int = 0, rate_units: tuple[float, float] = (1.0, 1.0)
+    ) -> None:
         """Bind them.
 
         Args:
             store: Objects of the device.
             axis: Number of the axis from 0; those of axis n stand 0x800 n further on.
-            velocity_unit: What 1 of its velocities is in [inc/s], and of its accelerations in
-                [inc/s^2].
+            rate_units: What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2].
         """
 
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
             return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
 
         def rate(index: int, subindex: int = 0, *, default: int = 0) -> Integer | Rate:
+            unit = rate_units[index in ACCELERATIONS]
             variable = bind(index, subindex, default=default)
-            return variable if velocity_unit == 1.0 else Rate(variable, velocity_unit)
+            return variable if unit == 1.0 else Rate(variable, unit)
 
         self._bind_states(bind)
         self._bind_actual_values(bind, rate)
@@ -218,10 +231,10 @@ class DriveObjects:
         low, high = self.limit_low.value, self.limit_high.value
         return (low, high) if low < high else (float('-inf'), float('inf'))
 
-    def within_limits(self, position: float) -> float:
-        """Return the position, or the software limit that is in its way."""
+    def within_limits(self, position: float, start: float) -> float:
+        """Return the position, or the limit that ends the way to it from a start."""
         low, high = self.position_limits()
-        return min(max(position, low), high)
+        return min(max(position, min(low, start)), max(high, start))
 
 
 def _ramp(profile: Integer | Rate, maximum: Integer | Rate) -> float:

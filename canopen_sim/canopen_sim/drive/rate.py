@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 from ..objects.object_store import Integer
 
-INCREMENTS_PER_SECOND: Mapping[int, float] = {}
-"""Units of velocity by axis, of a device whose axes all count [inc/s]."""
+RateUnits: TypeAlias = Mapping[int, tuple[float, float]]
+"""By axis: what 1 of its velocities is in [inc/s], and of its accelerations in [inc/s^2]."""
+INCREMENTS_PER_SECOND: RateUnits = {}
+"""Of a device whose axes all count [inc/s]."""
 
 
 class Rate:

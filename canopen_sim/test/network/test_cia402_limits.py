@@ -8,6 +8,7 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen.cia402.motion import Setpoint
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import DriveError
@@ -80,6 +81,31 @@ def test_limits_are_in_the_units_of_targets() -> None:
     assert reported.profile.velocity == pytest.approx(1.0)
     with pytest.raises(DriveError, match='software limits'):
         net.commands[JOINT].set_target(0.9)
+
+
+def test_an_axis_beyond_its_limits_is_led_back() -> None:
+    """From 1.05 with limits of 1: towards them in any step, never further out or across."""
+    net = VirtualNetwork(bus_config(with_writes((0x607D, 1, -10_000), (0x607D, 2, 10_000))))
+    simulated = net.devices[JOINT].drive
+    assert simulated is not None
+    simulated.count_from(10_500)
+    net.boot()
+    net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    drive = net.drives[JOINT]
+    net.run(0.5)
+    assert simulated.position == pytest.approx(10_500, abs=1)  # enabling moves nothing
+    for position in (1.06, -1.04):
+        with pytest.raises(DriveError, match='software limits'):
+            drive.stream(Setpoint(position))
+        with pytest.raises(DriveError, match='software limits'):
+            net.commands[JOINT].set_target(position)
+    for step in range(1, 150):
+        drive.stream(Setpoint(1.05 - 0.001 * step))
+        net.run(PERIOD)
+    assert simulated.position == pytest.approx(9_010, abs=20)
+    with pytest.raises(DriveError, match='software limits'):
+        drive.stream(Setpoint(1.001))
 
 
 @pytest.mark.parametrize('option', [2, 6])

@@ -8,10 +8,20 @@ below the target that holds it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 import struct
 
-from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
+from drive_samples import (
+    bus_config,
+    drive_config,
+    every_mode,
+    MOTION_WRITES,
+    pdo,
+    PERIOD,
+    SCALE,
+    sdo_write,
+)
 import pytest
 from virtual_network import VirtualNetwork
 
@@ -232,6 +242,44 @@ def test_factors_that_contradict_each_other_move_nothing(mode: OperationMode) ->
     loaded.enable(mode)
     loaded.net.run(1.0)
     assert loaded.position == pytest.approx(7_000, abs=SAG_INC + 1)
+
+
+@pytest.mark.parametrize('mapped', [False, True])
+@pytest.mark.parametrize(
+    ('mode', 'offset', 'value'),
+    [
+        (OperationMode.CYCLIC_POSITION, 0x60B0, 1_000),
+        (OperationMode.CYCLIC_VELOCITY, 0x60B1, 2_000),
+        (OperationMode.CYCLIC_TORQUE, 0x60B2, 300),
+    ],
+)
+def test_an_offset_of_the_drive_moves_nothing(
+    mode: OperationMode, offset: int, value: int, *, mapped: bool
+) -> None:
+    """Each enable and each switch holds where the drive is, whatever it adds to its target."""
+    config = every_mode(drive_config(JOINT, NODE_ID))
+    if mapped:
+        config = replace(config, rpdos=(*config.rpdos, pdo(4, 0x500 + NODE_ID, (offset, 0))))
+    writes = (*MOTION_WRITES, sdo_write(offset, 0, value))
+    net = VirtualNetwork(bus_config(replace(config, sdo_writes=writes)))
+    net.boot()
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    for _ in range(2):
+        net.do(JOINT, 'init')
+        net.select(JOINT, mode)
+        net.run(1.0)
+        net.select(JOINT, OperationMode.PROFILE_POSITION)
+        net.select(JOINT, mode)
+        net.run(1.0)
+        assert drive.position == pytest.approx(0.0, abs=1)
+        net.do(JOINT, 'disable')
+    net.do(JOINT, 'init')
+    net.select(JOINT, mode)
+    if mode is OperationMode.CYCLIC_POSITION:
+        net.commands[JOINT].set_target(0.5)
+        net.run(3.0)
+        assert drive.position == pytest.approx(5_000, abs=1)
 
 
 @pytest.mark.parametrize('cycles', range(12))

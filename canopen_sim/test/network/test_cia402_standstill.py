@@ -110,6 +110,66 @@ def test_the_velocity_is_that_of_the_position_where_no_pdo_carries_it() -> None:
     assert net.drives[JOINT].view.velocity == pytest.approx(0.5, rel=0.02)
 
 
+METRE = 1_000_000.0  # [inc/m]
+METRES = {
+    f'scale_{what}_{way}_dev': METRE if way == 'to' else 1 / METRE
+    for what in ('pos', 'vel')
+    for way in ('to', 'from')
+}
+
+
+def sliding(*writes: tuple[int, int, int]) -> VirtualNetwork:
+    """Return an enabled network with one drive that counts micrometres, and holds these values."""
+    config = drive_config(
+        JOINT,
+        NODE_ID,
+        scales=METRES,
+        sdo_writes=tuple(sdo_write(*write) for write in ((0x60C2, 1, 10), *writes)),
+    )
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    net.do(JOINT, 'init')
+    return net
+
+
+def test_rest_is_by_the_limits_of_the_axis() -> None:
+    """A joint in metres with 2 m/s is not at rest at 20 mm/s."""
+    ramps = ((index, 0, 2_000_000) for index in (0x6083, 0x6084, 0x6085))
+    net = sliding((0x607F, 0, 4_000_000), (0x6081, 0, 2_000_000), *ramps)
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.commands[JOINT].set_target(0.018)
+    net.run(1.0)
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    assert drive.velocity / METRE == pytest.approx(0.018, rel=0.02)
+    assert not net.drives[JOINT].view.stands
+    net.do(JOINT, 'halt')
+    assert abs(drive.velocity) / METRE <= 0.004
+
+
+@pytest.mark.parametrize(
+    ('writes', 'speed_limit'),
+    [
+        ([(0x607F, 0, 200_000)], 0.02),  # a tenth of its greatest speed
+        ([(0x607F, 0, 0), (0x607D, 1, 0), (0x607D, 2, 40_000)], 0.004),  # its range in 10 s
+        ([(0x607F, 0, 10_000), (0x6081, 0, 50_000)], 0.01),  # never above its greatest speed
+    ],
+)
+def test_the_speed_of_single_targets_is_by_the_limits_of_the_axis(
+    writes: list[tuple[int, int, int]], speed_limit: float
+) -> None:
+    """Where 0x6081 does not say it; half a metre per second is none for an axis of 40 mm."""
+    ramps = ((index, 0, 1_000_000) for index in (0x6083, 0x6084))
+    net = sliding((0x6081, 0, 0), *ramps, *writes)
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    net.commands[JOINT].set_target(0.03)
+    fastest = 0.0
+    for _ in range(100):
+        net.run(PERIOD)
+        fastest = max(fastest, net.drives[JOINT].view.velocity)
+    assert fastest == pytest.approx(speed_limit, rel=0.02)
+
+
 def test_noise_is_standstill() -> None:
     """A slow profile and an encoder that flickers: a halt ends, and the mode can be switched."""
     net = VirtualNetwork(bus_config(with_profile_velocity(500)))

@@ -6,7 +6,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from drive_samples import bus_config, drive_config, drive_dictionary, sdo_write, with_defaults
+from drive_samples import (
+    bus_config,
+    drive_config,
+    drive_dictionary,
+    MOTION_WRITES,
+    SCALE,
+    sdo_write,
+    with_defaults,
+)
 import pytest
 from virtual_network import VirtualNetwork
 
@@ -14,6 +22,8 @@ from arm_canopen.cia402.motion import Setpoint
 from arm_canopen.config.model.drive import DriveConfig
 from arm_canopen.exceptions import DriveError
 from arm_canopen.master.events import Severity
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.drive import OperationMode
 
 JOINT = 'joint1'
@@ -78,6 +88,61 @@ def test_a_drive_with_profile_velocity_0_refuses_targets() -> None:
     net.commands[JOINT].set_target(0.5)
     net.run(5.0)
     assert net.drives[JOINT].view.position == pytest.approx(0.5, abs=1e-3)
+
+
+TENTHS = {'scale_vel_to_dev': 10 * SCALE, 'scale_vel_from_dev': 0.1 / SCALE}  # 0.1 inc/s
+TENS = {'scale_acc_to_dev': SCALE / 10, 'scale_acc_from_dev': 10 / SCALE}  # 10 inc/s^2
+
+
+@pytest.mark.parametrize(
+    ('scales', 'objects'),
+    [
+        (TENTHS | TENS, {}),
+        (TENTHS, {(0x60A9, 0): 0xFFB5_0300, (0x60AA, 0): 0x01B5_5700}),
+        (
+            TENTHS,
+            {(0x6096, 1): 10, (0x6096, 2): 1, (0x6097, 1): 1, (0x6097, 2): 100},
+        ),
+    ],
+    ids=['bus.yml', 'SI units', 'factor group'],
+)
+def test_accelerations_have_a_unit_of_their_own(
+    scales: dict[str, float], objects: dict[tuple[int, int], int]
+) -> None:
+    """A stop of 10 counts/s^2 beside velocities of 0.1 counts/s is as short as the drive can."""
+    writes = (
+        *(write for write in MOTION_WRITES if write.index == 0x60C2),
+        sdo_write(0x607F, 0, 300_000),  # 3 rad/s
+        sdo_write(0x6081, 0, 100_000),  # 1 rad/s
+        *(sdo_write(index, 0, 5_000) for index in (0x6083, 0x6084, 0x6085)),  # 5 rad/s^2
+    )
+    known = drive_dictionary().for_node(2)
+    dictionary = ObjectDictionary(
+        [
+            *with_defaults(known, objects),
+            *(
+                ObjectEntry(*address, 'Unit', DataType.UNSIGNED32, default=value)
+                for address, value in objects.items()
+                if known.get(*address) is None
+            ),
+        ]
+    )
+    config = drive_config(JOINT, 2, scales=scales, sdo_writes=writes, dictionary=dictionary)
+    units = {} if objects else {0: (0.1, 10.0)}
+    net = VirtualNetwork(bus_config(config), rate_units=units)
+    net.boot()
+    net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.CYCLIC_POSITION)
+    assert net.drives[JOINT].view.parameters.profile.deceleration == pytest.approx(5.0)
+    assert net.drives[JOINT].view.parameters.quick_stop_deceleration == pytest.approx(5.0)
+    net.commands[JOINT].set_target(20.0)
+    net.run(2.0)
+    drive = net.drives[JOINT].view
+    assert drive.velocity == pytest.approx(1.0, rel=0.02)
+    begin, at = net.now, drive.position
+    net.do(JOINT, 'halt')
+    assert net.now - begin < 0.5
+    assert drive.position - at == pytest.approx(0.1, abs=0.03)
 
 
 def test_a_factor_group_that_the_drive_does_not_have_is_said() -> None:

@@ -27,6 +27,7 @@ from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import OperationMode
 from canopen_sim.device import Device
+from canopen_sim.drive.rate import INCREMENTS_PER_SECOND, RateUnits
 from canopen_sim.drive.servo import ServoModel
 
 FRAME_TIME = 0.00012  # [s] a frame of 8 bytes at 1 Mbit/s
@@ -125,6 +126,7 @@ class VirtualNetwork:
         absent: Iterable[str] = (),
         dictionaries: Mapping[str, ObjectDictionary] | None = None,
         servo: ServoModel | None = None,
+        rate_units: RateUnits = INCREMENTS_PER_SECOND,
         beside_master: bool = False,
     ) -> None:
         """Connect everything and switch the devices on; the master waits for :meth:`start`.
@@ -134,6 +136,7 @@ class VirtualNetwork:
             absent: Names of devices that are not there (yet).
             dictionaries: What devices really have, where it is not what ``config`` says.
             servo: Time constants of the motors.
+            rate_units: Units of velocities and accelerations of every device, as of Device.
             beside_master: Another master is meant to be on the bus, too.
         """
         self.now = START
@@ -147,6 +150,7 @@ class VirtualNetwork:
         self._config = config
         self._dictionaries = dict(dictionaries or {})
         self._servo = servo
+        self._rate_units = rate_units
         self._beside_master = beside_master
         self.replace_master()
         for node in config.nodes:
@@ -191,6 +195,7 @@ class VirtualNetwork:
             self._dictionaries.get(name, node.dictionary),
             lambda frame: self.wire.put(self.now, name, frame),
             servo=self._servo,
+            rate_units=self._rate_units,
         )
         self.devices[name] = device
         self.connect(name, device)

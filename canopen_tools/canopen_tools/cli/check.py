@@ -10,7 +10,12 @@ from itertools import groupby
 from pathlib import Path
 
 from arm_canopen.config import check_file
-from arm_canopen.config.model.checks.drive_units import AxisUnits, MOTION_OBJECTS, UnitRule
+from arm_canopen.config.model.checks.drive_units import (
+    ACCELERATION_KEY,
+    AxisUnits,
+    MOTION_OBJECTS,
+    UnitRule,
+)
 from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
 from arm_canopen.standard.objects import Index
 
@@ -88,12 +93,13 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
             f'{axis.increments:g}',
             '?' if axis.radians is None else f'{axis.radians:.4g}',
             f'{axis.velocity:g}',
+            _acceleration(axis),
             _rule(axis),
         )
         for axis in units
     ]
-    head = ('1.0 of', 'increments', 'rad', 'velocity units', 'by')
-    print_table(head, rows, right='increments,rad,velocity units')
+    head = ('1.0 of', 'increments', 'rad', 'velocity units', 'acceleration units', 'by')
+    print_table(head, rows, right='increments,rad,velocity units,acceleration units')
     if any(axis.radians is not None and f'{axis.radians:.4g}' != '1' for axis in units):
         print_line(
             'rad: how far 1.0 is by the factor group of the EDS: 1 where 1.0 is a radian, '
@@ -103,6 +109,12 @@ def _print_units(units: Sequence[AxisUnits]) -> None:
         print_line(
             '?: the EDS has no factor group (0x608F, 0x6091, 0x6092) that says how many rad it is'
         )
+
+
+def _acceleration(axis: AxisUnits) -> str:
+    """Return the scale of accelerations, with who says it where bus.yml does not."""
+    by = axis.acceleration_by or 'assumed'
+    return f'{axis.acceleration:g}' + ('' if by == ACCELERATION_KEY else f' ({by})')
 
 
 def _rule(axis: AxisUnits) -> str:

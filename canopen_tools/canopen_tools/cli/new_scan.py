@@ -11,7 +11,7 @@ from pathlib import Path
 import re
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS
+from arm_canopen.config.model.factor_group import FACTOR_ADDRESSES
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.config.read.eds import Eds, load_eds
 from arm_canopen.exceptions import ConfigError, SdoError
@@ -26,7 +26,6 @@ from ..eds_match import (
     SeveralMatchError,
 )
 from ..new_device import NewBusError, NewDevice
-from ..si_unit import SI_UNIT_POSITION, SI_UNIT_VELOCITY
 from .arguments import node_id, UsageError
 from .output import print_line
 from .scan import find_devices, Found
@@ -40,9 +39,7 @@ UNCOMPRESSED = 0  # value of 0x1022 for text as it is
 TIMEOUT = 0.5  # [s] of an answer
 FACTS: tuple[tuple[int, int], ...] = (
     (Index.SUPPORTED_MODES, 0),
-    *((index, subindex) for index in FACTOR_OBJECTS.values() for subindex in (1, 2)),
-    (SI_UNIT_POSITION, 0),
-    (SI_UNIT_VELOCITY, 0),
+    *FACTOR_ADDRESSES,
 )
 """Objects in which a drive itself says what its EDS may leave open."""
 

@@ -10,7 +10,7 @@ import math
 
 from arm_canopen import CanopenMaster, OperationMode
 from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, ratio
+from arm_canopen.config.model.factor_group import FactorGroup
 from arm_canopen.exceptions import DriveError, ObjectError, SdoError
 from arm_canopen.standard.objects import AXIS_OFFSET, Index
 from arm_canopen.standard.target_objects import CYCLIC_MODES
@@ -64,9 +64,7 @@ def read_facts(master: CanopenMaster, axis: DriveConfig, speed: float) -> AxisFa
             return None
         return value if isinstance(value, int) else None
 
-    factors = FactorGroup(
-        **{name: ratio(read(index, 1), read(index, 2)) for name, index in FACTOR_OBJECTS.items()}
-    )
+    factors = FactorGroup.read(read)
     if axis.scale_from_factor_group:
         axis = _by_factors(axis, factors)
     low, high = (read(Index.SOFTWARE_POSITION_LIMIT, subindex) for subindex in (1, 2))

@@ -28,11 +28,16 @@ class DriveConfig:
         channel: Number of the axis from 0; its objects lie 0x800 * channel above those of the
             first (CiA 402-2, 7.2).
         scale_from_factor_group: Positions are in rad and velocities in rad/s by the drive's factor
-            group (0x608F, 0x6091, 0x6092, 0x6096); the scales are read from the drive.
+            group (0x608F, 0x6091, 0x6092, 0x6096, 0x60A8, 0x60A9); the scales are read from the
+            drive.
         scale_pos_to_dev: Device increments per user unit (usually rad).
         scale_vel_to_dev: Device velocity units per user unit per second.
         scale_pos_from_dev: User units per device increment.
         scale_vel_from_dev: User units per second per device velocity unit.
+        scale_acc_to_dev: Device acceleration units per user unit per second squared; None where
+            bus.yml does not say it: then by the drive (0x60A9 with 0x60AA, or 0x6097), else its
+            velocity units per second.
+        scale_acc_from_dev: User units per second squared per device acceleration unit; likewise.
         scale_eff_to_dev: Device units of torque per user unit of effort.
         scale_eff_from_dev: User units of effort per device unit of torque.
         offset_pos_to_dev: Added to a target after scaling, in [inc].
@@ -55,6 +60,8 @@ class DriveConfig:
     scale_vel_to_dev: float = 1000.0
     scale_pos_from_dev: float = 0.001
     scale_vel_from_dev: float = 0.001
+    scale_acc_to_dev: float | None = None
+    scale_acc_from_dev: float | None = None
     scale_eff_to_dev: float = 1.0
     scale_eff_from_dev: float = 1.0
     offset_pos_to_dev: float = 0.0

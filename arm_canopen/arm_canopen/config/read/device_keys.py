@@ -3,9 +3,9 @@
 """The keys of a device that ros2_canopen and Lely's dcfgen know.
 
 Names, units and defaults are theirs, so that their files can be read unchanged. Where a default
-differs, ``why`` says the reason. Six keys are our own: ``scale_eff_to_dev``,
-``scale_from_factor_group``, ``target_timeout_ms``, ``recovery``, ``quirks``, and ``timeout_ms`` of
-an entry of ``sdo``; of the master ``time_period_ms``.
+differs, ``why`` says the reason. Our own are ``scale_acc_to_dev``, ``scale_acc_from_dev``,
+``scale_eff_to_dev``, ``scale_from_factor_group``, ``target_timeout_ms``, ``recovery``, ``quirks``,
+and ``timeout_ms`` of an entry of ``sdo``; of the master ``time_period_ms``.
 """
 
 from __future__ import annotations
@@ -129,6 +129,8 @@ DRIVE_KEYS: tuple[Key, ...] = (
     Key('scale_vel_to_dev', Kind.NUMBER, 'scale_vel_to_dev', zero=False),
     Key('scale_pos_from_dev', Kind.NUMBER, 'scale_pos_from_dev', zero=False),
     Key('scale_vel_from_dev', Kind.NUMBER, 'scale_vel_from_dev', zero=False),
+    Key('scale_acc_to_dev', Kind.NUMBER, 'scale_acc_to_dev', zero=False),
+    Key('scale_acc_from_dev', Kind.NUMBER, 'scale_acc_from_dev', zero=False),
     Key('scale_from_factor_group', Kind.BOOLEAN, 'scale_from_factor_group'),
     Key('scale_eff_to_dev', Kind.NUMBER, 'scale_eff_to_dev', zero=False),
     Key('scale_eff_from_dev', Kind.NUMBER, 'scale_eff_from_dev', zero=False),

@@ -102,12 +102,14 @@ def _with_scales(
 ) -> DriveConfig:
     """Return an axis with the values of a section, be it of its device or of its channel."""
     _check_one_rule(section, values, findings)
-    axis = replace(drive, **_with_inverse_effort(values))
-    for what in ('pos', 'vel', 'eff'):
+    axis = replace(drive, **_with_inverses(values))
+    for what in ('pos', 'vel', 'acc', 'eff'):
         keys = (f'scale_{what}_to_dev', f'scale_{what}_from_dev')
         given = [section.entries[key].place for key in keys if key in section.entries]
+        if not given:
+            continue
         product = getattr(axis, keys[0]) * getattr(axis, keys[1])
-        if given and abs(product - 1) > SCALE_TOLERANCE:
+        if abs(product - 1) > SCALE_TOLERANCE:
             findings.warning(
                 given[0],
                 f'{keys[0]} times {keys[1]} is {product:g}, not 1: targets and feedback have '
@@ -140,10 +142,15 @@ def _check_one_rule(section: YamlMap, values: dict[str, Any], findings: Findings
         )
 
 
-def _with_inverse_effort(values: dict[str, Any]) -> dict[str, Any]:
-    """Let an effort be read in the unit in which it is commanded, unless bus.yml says both."""
-    scale = values.get('scale_eff_to_dev')
-    return values if scale is None else {'scale_eff_from_dev': 1.0 / scale} | values
+def _with_inverses(values: dict[str, Any]) -> dict[str, Any]:
+    """Add the scales that bus.yml gives in the other direction only, of our own keys."""
+    inverses = (
+        ('scale_eff_from_dev', 'scale_eff_to_dev'),
+        ('scale_acc_from_dev', 'scale_acc_to_dev'),
+        ('scale_acc_to_dev', 'scale_acc_from_dev'),
+    )
+    added = {key: 1.0 / values[given] for key, given in inverses if given in values}
+    return added | values
 
 
 def _policy(item: Item, text: str, findings: Findings) -> RecoveryPolicy:

@@ -110,7 +110,7 @@ class ProfilePosition(Mode):
         target = float(self.objects.target_position.value)
         if word & RELATIVE:
             target += self._preceding
-        within = self.objects.within_limits(target)
+        within = self.objects.within_limits(target, self.axis.demand.position)
         velocity = float(self.objects.profile_velocity.value)
         return SetPoint(
             within, self.objects.profile(velocity), within != target, bool(word & BLEND)

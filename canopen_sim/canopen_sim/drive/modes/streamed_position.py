@@ -36,10 +36,10 @@ class StreamedPosition(Streamed):
 
     def go(self, wanted: int, period: float, now: float) -> bool:
         """Go to a position within a period; return whether the motion has changed."""
-        target = self.objects.within_limits(wanted)
-        self.limited = target != wanted
         axis = self.axis
         axis.advance(now)
+        target = self.objects.within_limits(wanted, axis.demand.position)
+        self.limited = target != wanted
         if axis.arrived and axis.demand.position == target:
             return False
         axis.follow(plan_line(axis.demand.position, target, max(period, PERIOD_MIN), now))

@@ -16,11 +16,13 @@ from ...findings import Findings
 from ..boot_plan import is_requested
 from ..bus import BusConfig, NodeConfig
 from ..drive import DriveConfig
-from ..factor_group import FACTOR_OBJECTS, FactorGroup, ratio, REVOLUTION
+from ..factor_group import FactorGroup, REVOLUTION
 from .subject import Subject
 
 POSITION_KEY, VELOCITY_KEY = 'scale_pos_to_dev', 'scale_vel_to_dev'
+ACCELERATION_KEY = 'scale_acc_to_dev'
 FACTOR_KEY = 'scale_from_factor_group'
+OFFSET_FROM_KEY, OFFSET_TO_KEY = 'offset_pos_from_dev', 'offset_pos_to_dev'
 POSITION_TOLERANCE = 0.01
 """User units (rad, m) by which a position may miss its target because increments are whole."""
 COARSE_SCALE = 1.0
@@ -33,7 +35,8 @@ MOTION_OBJECTS = (
     Index.PROFILE_DECELERATION,
     Index.QUICK_STOP_DECELERATION,
 )
-"""What the moves of a drive's own are made with, in its units of velocity (per second)."""
+"""What the moves of a drive's own are made with: velocities, and then accelerations."""
+ACCELERATION_OBJECTS = MOTION_OBJECTS[2:]
 SECONDS_PER_MINUTE = 60.0
 MIN_RADIANS = 0.1
 """Turn of the shaft in [rad] for 1 rad or 1 m of the joint, below which the scale is doubted: it
@@ -58,6 +61,9 @@ class AxisUnits:
         rule: Where its scale comes from.
         increments: Position increments of 1.0; 0 when it is unknown.
         velocity: Device velocity units of 1.0 per second.
+        acceleration: Device acceleration units of 1.0 per second squared.
+        acceleration_by: Who says that; empty where it is assumed that the drive counts velocity
+            units per second.
         radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
             does not have it.
         factors: Objects of the factor group that say it.
@@ -69,6 +75,8 @@ class AxisUnits:
     rule: UnitRule
     increments: float
     velocity: float
+    acceleration: float
+    acceleration_by: str
     radians: float | None
     factors: tuple[Index, ...] = ()
     motion: Mapping[Index, float] = field(default_factory=dict)
@@ -85,18 +93,34 @@ def axis_units(subject: Subject, axis: DriveConfig) -> AxisUnits:
         subject.bus.locations and is_requested(subject.bus, subject.node, POSITION_KEY)
     ):
         rule = UnitRule.UPSTREAM
+    acceleration, by = axis.scale_acc_to_dev, ACCELERATION_KEY
+    if acceleration is None:
+        acceleration = velocity * (factors.acceleration_ratio or 1.0)
+        by = ', '.join(f'0x{index:04X}' for index in factors.acceleration_objects)
     per_radian = factors.position_scale
-    radians = increments / per_radian if per_radian else None
-    motion = _motion(subject, axis, velocity)
-    name = axis.name or subject.node.name
-    return AxisUnits(name, rule, increments, velocity, radians, factors.position_objects, motion)
+    return AxisUnits(
+        name=axis.name or subject.node.name,
+        rule=rule,
+        increments=increments,
+        velocity=velocity,
+        acceleration=acceleration,
+        acceleration_by=by,
+        radians=increments / per_radian if per_radian else None,
+        factors=factors.position_objects,
+        motion=_motion(subject, axis, velocity, acceleration),
+    )
 
 
-def _motion(subject: Subject, axis: DriveConfig, scale: float) -> dict[Index, float]:
-    """Return what an axis moves with, by its velocity scale; accelerations are in units of it."""
+def _motion(
+    subject: Subject, axis: DriveConfig, velocity: float, acceleration: float
+) -> dict[Index, float]:
+    """Return what an axis moves with, in user units."""
     held = {index: subject.value(index + AXIS_OFFSET * axis.channel) for index in MOTION_OBJECTS}
+    scales = {index: acceleration if index in ACCELERATION_OBJECTS else velocity for index in held}
     return {
-        index: value / abs(scale) for index, value in held.items() if value is not None and scale
+        index: value / abs(scales[index])
+        for index, value in held.items()
+        if value is not None and scales[index]
     }
 
 
@@ -126,16 +150,27 @@ def reported_increments(
     return round(scaled)
 
 
-def velocity_unit(bus: BusConfig, node: NodeConfig, axis: DriveConfig) -> float:
-    """Return what 1 of the velocities of an axis is in [inc/s], by the ratio of its scales.
+def rate_units(bus: BusConfig, node: NodeConfig, axis: DriveConfig) -> tuple[float, float]:
+    """Return what 1 of the velocities and of the accelerations of an axis is in [inc/s], [inc/s2].
 
-    It is 1 where velocities have no scale of their own, as most drives count increments.
+    By the ratio of its scales; where bus.yml does not give them, by the EDS (0x6096, 0x6097,
+    0x60A9, 0x60AA), and 1 where neither says it, as most drives count increments.
     """
-    units = axis_units(Subject(bus, node, Findings()), axis)
-    is_default = units.velocity == DriveConfig().scale_vel_to_dev
-    if not units.velocity or (is_default and units.rule is not UnitRule.FACTOR_GROUP):
-        return 1.0
-    unit = abs(units.increments / units.velocity)
+    subject = Subject(bus, node, Findings())
+    units, (velocity, acceleration) = (
+        axis_units(subject, axis),
+        _factor_group(subject, axis).rate_units,
+    )
+    ratio = velocity / acceleration
+    if units.velocity and units.velocity != DriveConfig().scale_vel_to_dev:
+        velocity = abs(units.increments / units.velocity)
+    acceleration = velocity / ratio
+    if axis.scale_acc_to_dev is not None:
+        acceleration = abs(units.increments / axis.scale_acc_to_dev)
+    return _plain(velocity), _plain(acceleration)
+
+
+def _plain(unit: float) -> float:
     return 1.0 if math.isclose(unit, 1.0, rel_tol=SAME_SCALE) else unit
 
 
@@ -153,6 +188,8 @@ def check_units(subject: Subject) -> None:
             continue
         _check_coarse(subject, units)
         _check_velocity_default(subject, axis, units)
+        _check_acceleration(subject, units)
+        _check_offsets(subject, axis, units)
         _check_against_factors(subject, units)
         _check_profile_velocity(subject, axis)
 
@@ -188,6 +225,38 @@ def _check_velocity_default(subject: Subject, axis: DriveConfig, units: AxisUnit
         f'counts increments per second moves at {default / abs(position):.4g} where 1.0 is asked',
         f'write {VELOCITY_KEY}: {position:g} (increments per second: the same as {POSITION_KEY}; '
         f'rpm of the joint: {in_rpm:.7g}, of the motor: times its gear), and its inverse',
+    )
+
+
+def _check_acceleration(subject: Subject, units: AxisUnits) -> None:
+    """Say when neither bus.yml nor the EDS says in what the drive counts accelerations."""
+    if units.acceleration_by or units.rule is UnitRule.UPSTREAM:
+        return  # the default of ros2_canopen assumes all of them
+    subject.findings.warning(
+        subject.place(VELOCITY_KEY),
+        f'{units.name}: 1.0 per s2 is assumed to be {units.acceleration:g} device units of '
+        'acceleration, velocity units per second: where the drive counts others, its ramps and '
+        'stops are longer or shorter than the master believes',
+        f'write {ACCELERATION_KEY}: {units.acceleration:g} where the manual says so for 0x6083, '
+        'else what it says',
+    )
+
+
+def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> None:
+    """Say when a target at the position that is shown would move the axis."""
+    if not units.increments:
+        return
+    to_dev, from_dev = axis.offset_pos_to_dev, axis.offset_pos_from_dev
+    increment = 1.0 / abs(units.increments)
+    jump = from_dev + to_dev / units.increments
+    if abs(jump) <= max(increment, SAME_SCALE * abs(from_dev)):
+        return
+    subject.findings.warning(
+        subject.place(OFFSET_FROM_KEY if from_dev else OFFSET_TO_KEY),
+        f'{units.name}: {OFFSET_FROM_KEY} {from_dev:g} and {OFFSET_TO_KEY} {to_dev:g} do not '
+        f'cancel: a target at the position that is shown moves the axis by {jump:g}',
+        f'write {OFFSET_TO_KEY}: {-from_dev * units.increments:.10g} '
+        f'(-{OFFSET_FROM_KEY} * {POSITION_KEY})',
     )
 
 
@@ -243,9 +312,4 @@ def _check_profile_velocity(subject: Subject, axis: DriveConfig) -> None:
 
 def _factor_group(subject: Subject, axis: DriveConfig) -> FactorGroup:
     offset = AXIS_OFFSET * axis.channel
-    return FactorGroup(
-        **{
-            name: ratio(subject.value(index + offset, 1), subject.value(index + offset, 2))
-            for name, index in FACTOR_OBJECTS.items()
-        }
-    )
+    return FactorGroup.read(lambda index, subindex: subject.value(index + offset, subindex))

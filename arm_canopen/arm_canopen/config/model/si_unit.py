@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The units that a drive names in 0x60A8 and 0x60A9 (CiA 402-2), as CiA 303-2 codes them: pure.
+"""The units that a drive names in 0x60A8, 0x60A9 and 0x60AA (CiA 402-2), coded by CiA 303-2: pure.
 
 Bits 24 to 31 are a power of ten, 16 to 23 the unit of the position, 8 to 15 that of the time.
 """
@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 import math
 
-SI_UNIT_POSITION, SI_UNIT_VELOCITY = 0x60A8, 0x60A9
 PLAIN_TIME = 0x03  # second
 TIMES: dict[int, tuple[float, str]] = {
     PLAIN_TIME: (1.0, 's'),
@@ -19,6 +18,8 @@ TIMES: dict[int, tuple[float, str]] = {
     0x48: (3600.0, 'h'),
 }
 """Length in [s] and name of the units of time."""
+SQUARED_TIMES: dict[int, tuple[float, str]] = {0x57: (1.0, 's2')}
+"""Units of time of an acceleration; the others divide a velocity."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,8 @@ POSITIONS: dict[int, LengthUnit] = {
 """Units that say how far they are; increments (0xB5) and steps (0xAC) do not."""
 VELOCITIES = {**POSITIONS, 0xB5: LengthUnit(1.0, 'increments', counts=True)}
 """Those of velocities, for which it matters that they are increments."""
+RATES = {0xC0: LengthUnit(2.0 * math.pi / 60.0, 'rpm')}
+"""Units of a velocity that an acceleration has above its unit of time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,17 @@ def velocity_unit(value: int | None) -> NamedUnit | None:
     if value is None or time is None:
         return None
     return _named(value, VELOCITIES, time[0], f'/{time[1]}')
+
+
+def acceleration_unit(value: int | None) -> NamedUnit | None:
+    """Return what 0x60AA says, also increments; None where it is not there, or says nothing."""
+    if value is None:
+        return None
+    code = (value >> 8) & 0xFF
+    for units, times in ((VELOCITIES, SQUARED_TIMES), (RATES, TIMES)):
+        if code in times and (named := _named(value, units, times[code][0], f'/{times[code][1]}')):
+            return named
+    return None
 
 
 def _named(
