@@ -30,7 +30,7 @@ def run(arguments: Sequence[str]) -> int:
             return 0
         target = options.output or options.model
         _write(options.model, target, document)
-        digest = onnx_file.digest(target)
+        digest = onnx_file.read_model(target).digest
     except (QuadControllerError, OSError) as error:
         sys.stdout.write(f'{error}\n')
         return 1
@@ -51,7 +51,7 @@ def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> Co
     Raises:
         PolicyError: Something cannot be read.
     """
-    document = read_metadata(OnnxNetwork(model).metadata)
+    document = read_metadata(OnnxNetwork(model, new_weights=True).metadata)
     top = ContractDocument({})
     for text in settings:
         top = setting(text).over(top)
@@ -70,10 +70,13 @@ def _write(model: Path, target: Path, document: ContractDocument) -> None:
         PolicyError: Its weights lie in files that are not beside the target.
         OSError: It cannot be written.
     """
-    data = onnx_file.with_metadata(model.read_bytes(), CONTRACT_KEY, document.to_yaml())
-    sides = onnx_file.side_files(model, data)
-    if sides and target.resolve().parent != model.resolve().parent:
-        names = ', '.join(side.name for side in sides)
+    read = onnx_file.read_model(model)
+    data = onnx_file.with_metadata(read.data, CONTRACT_KEY, document.to_yaml())
+    if read.sides:
+        # exports that were renamed may share the name of their side file
+        data = onnx_file.with_metadata(data, onnx_file.SIDES_KEY, read.sides_digest)
+    if read.sides and target.resolve().parent != model.resolve().parent:
+        names = ', '.join(read.sides)
         raise PolicyError(f'the weights of {model} lie in {names}: write --output beside them')
     part = target.with_name(f'{target.name}.part')
     part.write_bytes(data)

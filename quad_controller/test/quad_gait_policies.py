@@ -44,19 +44,22 @@ class FakeNetwork:
         self.inputs: tuple[Port, ...] = (('obs', FLOAT, (1, 11 + 3 * joints)),)
         self.outputs: tuple[Port, ...] = (('actions', FLOAT, (1, joints)),)
         self.digest = 'abc'
+        self.warnings: tuple[str, ...] = ()
         self.action: Floats = np.zeros((1, joints), np.float32)
+        self.blind = False
         self.asked: list[Floats] = []
 
-    def recur(self, _states: tuple[RecurrentState, ...]) -> None:
+    def recur(self, _states: tuple[RecurrentState, ...], _actions: str = '') -> None:
         """Have no states."""
 
     def reset(self) -> None:
         """Have nothing to forget."""
 
     def run(self, observation: Floats) -> Floats:
-        """Answer."""
+        """Answer, with a trace of the observation."""
         self.asked.append(observation.copy())
-        return self.action
+        trace = 0.0 if self.blind else 1e-12 * float(observation.sum())
+        return np.add(self.action, trace, dtype=np.float32)
 
 
 def write_policy(path: Path, values: Mapping[str, str], width: int = 47) -> Path:

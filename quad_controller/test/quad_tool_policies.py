@@ -102,10 +102,11 @@ def mjlab() -> Tool:
                     'actions',
                 ]
             ),
-            'observation_terms_scale': '0.2,None,None,2.0,[' + ', '.join(['0.05'] * 12) + '],None',
-            'observation_terms_clip': 'None,None,None,(-0.5, 0.5),None,None',
-            'observation_terms_history_length': '0,0,0,3,0,0',
-            'observation_terms_flatten_history_dim': 'True,True,True,True,True,True',
+            'observation_terms_scale': joined([0.2, 1.0, 1.0, 2.0])
+            + f',{";".join(["0.050"] * 12)},1.000',
+            'observation_terms_clip': '-inf;inf,-inf;inf,-inf;inf,-0.500;0.500,-inf;inf,-inf;inf',
+            'observation_terms_history_length': joined([0, 0, 0, 3, 0, 0]),
+            'observation_terms_flatten_history_dim': joined([1] * 6),
         },
         settings={'period': 0.02, 'observation.terms.base_ang_vel.frame': 'base'},
         width=3 + 3 + 3 + 3 * 12 + 12 + 12,

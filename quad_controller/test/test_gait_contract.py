@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 import yaml
 
@@ -19,8 +20,10 @@ from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.document import document_of, flatten, read_yaml
 from quad_controller.policy.contract.files import read_contract_file
+from quad_controller.policy.contract.model import RecurrentState
 from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.load import load_policy, LoadedPolicy
+from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import GravitySource, PolicyOptions
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import normalized
@@ -118,16 +121,67 @@ def test_a_changed_side_file_changes_the_digest(tmp_path: Path) -> None:
     tool = TOOLS['rl_sar']()
     path = tmp_path / 'policy.onnx'
     write_network(tool, path, external=True)
-    assert run(attached(tool, tmp_path)) == 0
-    first = load(path).digest
+    read = attached(tool, tmp_path)
+    assert run(read) == 0
+    first = load(path)
     side = tmp_path / 'policy.onnx.data'
-    data = bytearray(side.read_bytes())
+    before = side.read_bytes()
+    data = bytearray(before)
     data[8] ^= 1
     side.write_bytes(data)
-    assert load(path).digest != first
+    with pytest.raises(PolicyError, match='are not those'):
+        load(path)
+    assert run(read) == 0
+    assert load(path).digest != first.digest
     path.write_bytes(path.read_bytes().replace(b'policy.onnx.data', b'../icy.onnx.data'))
     with pytest.raises(PolicyError, match='outside of its folder'):
         load(path)
+
+
+def test_weights_that_are_overwritten_do_not_count(tmp_path: Path) -> None:
+    """A new export is copied over the old one while the robot walks."""
+    tool = TOOLS['playground']()
+    path, side = tmp_path / 'policy.onnx', tmp_path / 'policy.onnx.data'
+    write_network(tool, path, external=True)
+    assert run(attached(tool, tmp_path)) == 0
+    network = OnnxNetwork(path)
+    network.recur((RecurrentState('h_in', 'h_out'),))
+    seen = np.ones((1, tool.width), np.float32)
+    before = network.run(seen)
+    with side.open('r+b') as stream:  # in place, as `cp` does
+        stream.write(bytes(len(side.read_bytes())))
+    network.reset()
+    assert np.array_equal(network.run(seen), before)
+
+
+@pytest.mark.parametrize('external', [False, True])
+def test_weights_that_are_no_numbers_are_refused(external: bool, tmp_path: Path) -> None:
+    """ONNX Runtime answers ordinary numbers for an LSTM whose weights are NaN."""
+    tool = TOOLS['playground']()
+    path = tmp_path / 'policy.onnx'
+    weight, _ = write_network(tool, path, external=external)
+    part = tmp_path / 'policy.onnx.data' if external else path
+    first = weight.tobytes()[:4]
+    part.write_bytes(part.read_bytes().replace(first, np.float32(np.nan).tobytes(), 1))
+    with pytest.raises(PolicyError, match='weights of weight are not finite'):
+        OnnxNetwork(path)
+
+
+def test_the_output_of_the_actions_is_named(tmp_path: Path) -> None:
+    """A whole actor-critic has a value, too; the refusal names the ports and the key."""
+    tool = TOOLS['rl_sar']()
+    path = tmp_path / 'policy.onnx'
+    write_network(tool, path)
+    model = onnx.load(path)
+    value = onnx.helper.make_tensor_value_info('value', onnx.TensorProto.FLOAT, ['batch', 12])
+    model.graph.node.append(onnx.helper.make_node('Abs', ['actions'], ['value']))
+    model.graph.output.insert(0, value)
+    onnx.save_model(model, path)
+    assert run(attached(tool, tmp_path)) == 0
+    with pytest.raises(PolicyError, match=r'value tensor.*actions tensor[^|]*\n.*action\.output'):
+        load(path)
+    assert run([*attached(tool, tmp_path), '--set', 'action.output=actions']) == 0
+    assert load(path).contract.action.output == 'actions'
 
 
 def test_the_table_has_values_and_origins(
@@ -288,7 +342,8 @@ def test_contacts_of_feet_are_observed_in_the_order_of_the_training(tmp_path: Pa
         *(f'observation_terms_{each}' for each in ('scale', 'clip', 'history_length')),
         'observation_terms_flatten_history_dim',
     )
-    more = {names: 'foot_contact', scales: 'None', clips: 'None', lengths: '0', flat: 'True'}
+    more = {names: 'foot_contact', scales: '1.000', clips: '-inf;inf'}
+    more |= {lengths: '0.000', flat: '1.000'}
     order = ['fr_foot', 'fl_foot', 'br_foot', 'bl_foot']
     tool = replace(
         tool,

@@ -63,12 +63,15 @@ def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedP
          'open: period: time between two steps'),
         ({'observation_names': TERMS.replace('phase', 'tempo')}, 'terms.tempo.source: one of'),
         ({'observation_names': TERMS.replace('phase', 'cmd')}, 'has cmd twice'),
-        ({'observation_terms_history_length': '[1, 3, 1]'}, 'has 3 entries for 7 terms'),
+        ({'observation_terms_history_length': '1.000,3.000,1.000'}, 'has 3 entries for 7 terms'),
         ({'observation_terms_history_length': '1,1,1,1,2,1,1'}, 'input'),
         ({'observation_terms_history_length': '1,1,1,1,2,1,1',
           'observation_terms_flatten_history_dim': 'False'}, 'must be flat'),
+        ({'observation_terms_history_length': '1,1,1,1,2.000,1,1',
+          'observation_terms_flatten_history_dim': '1,1,1,1,0.000,1,1'}, 'must be flat'),
         ({'observation_terms_scale': '0.25,1.0'}, 'has 2 entries for 7 terms'),
         ({'observation_terms_scale': 'a,1,1,1,1,1,1'}, 'is not a list'),
+        ({'observation_terms_scale': '1,1,1,1,1,0.000,1'}, 'joint_vel.scale: 0: the policy'),
         ({'imu_frame': 'sideways'}, 'must be one of base, yawed'),
         ({'phase_period': '-1.0'}, 'phase_period -1.0 must be within 0.1 to 5'),
         ({'phase_period': '0.000001'}, 'phase_period'),
@@ -107,6 +110,20 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
             if fits
             else f'loop_rate: {rate:g} Hz instead of 50 Hz ({VENDOR}), or several times that'
         )
+
+
+def test_small_scales_are_rounded_by_the_exporter() -> None:
+    """Three decimals are all that it writes."""
+    report = str(check(FakeNetwork(metadata(observation_terms_scale='1,1,1,1,1,0.005,1'))).report)
+    assert '0.005, with three decimals: up to 10% off' in report
+
+
+def test_an_answer_that_depends_on_nothing_is_refused() -> None:
+    """Weights that training has driven to zero, or to what ONNX Runtime hides."""
+    network = FakeNetwork(metadata())
+    network.blind = True
+    with pytest.raises(PolicyError, match='another observation'):
+        check(network)
 
 
 def test_keys_that_are_not_understood_are_reported() -> None:
@@ -152,10 +169,10 @@ def test_the_frame_of_the_imu_is_not_guessed() -> None:
         {'joint_names': joined([f'robot/{name}' for name in JOINTS])},
         {'action_scale': joined([0.25] * 12)},
         {'observation_names': MJLAB_TERMS},
-        {'observation_terms_scale': 'None, 1.0, 1, [1.0, 1.0], None, 1, 1',
-         'observation_terms_history_length': '[0, 1, 1, 0, 1, 1, 1]'},
-        {'observation_terms_clip': 'None,(-inf, inf),None,None,None,None,None',
-         'clip_obs': '100.0', 'observation_terms_flatten_history_dim': 'True,True'},
+        {'observation_terms_scale': '1.000,1.000,1,1.000;1.000,1,1,1',
+         'observation_terms_history_length': '0.000,1.000,1,0,1,1,1'},
+        {'observation_terms_clip': ','.join(['-inf;inf'] * 7),
+         'clip_obs': '100.0', 'observation_terms_flatten_history_dim': ','.join(['1.000'] * 7)},
         {'step_dt': '0.020', 'dims': '47,512,256,12', 'num_obs': '47', 'action_dim': '12'},
     ],
 )  # fmt: skip

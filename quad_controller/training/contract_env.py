@@ -76,8 +76,9 @@ class NoNetwork:
     inputs: tuple[Port, ...] = ()
     outputs: tuple[Port, ...] = ()
     digest = ''
+    warnings: tuple[str, ...] = ()
 
-    def recur(self, states: tuple[RecurrentState, ...]) -> None:
+    def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
         """Have none."""
 
     def reset(self) -> None:

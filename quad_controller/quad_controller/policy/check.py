@@ -12,6 +12,7 @@ from quad_description import Quadruped, Targets
 
 from .contract.declared import Declared
 from .contract.document import ContractDocument
+from .contract.mjlab import FILE as METADATA
 from .contract.mjlab import VENDOR
 from .contract.model import PolicyContract
 from .gains import gain_rows, ServoResponse
@@ -27,6 +28,8 @@ WARM_UP = 20
 TIMED_RUNS = 100
 MAX_LATENCY_RATIO = 0.25  # of the period
 PROBES, PROBE = 20, 0.1  # changes of an observation, and their deviation
+ROUNDED = 0.01  # a scale below is more than 5 % off where it has three decimals
+STATES = 'several: recurrent states are named as recurrence: {h_in: h_out, c_in: c_out}'
 MIN_NEWEST = 0.1  # share of what the oldest step of a history does that the newest must do
 
 
@@ -56,13 +59,19 @@ def check_contract(
         servo: How the servos of the robot follow; None when nobody knows.
     """
     count = len(contract.joint_names)
-    inputs, outputs = observation_ports(network, contract.recurrence)
+    inputs, outputs = observation_ports(network, contract.recurrence, contract.action.output)
     terms = ' + '.join(
         f'{term.name} {term.width}' + (f' x {term.history}' if term.history > 1 else '')
         for term in contract.terms
     )
     yield _shape('input', inputs, contract.width, terms)
+    if len(inputs) > 1:
+        yield Row('input', 'one', STATES, Verdict.REFUSE)
     yield _shape('output', outputs, count, f'{count} joints')
+    if len(outputs) > 1:
+        yield Row('output', 'one', 'several: name it with action.output', Verdict.REFUSE)
+    for warning in network.warnings:
+        yield Row('weights', 'in the file', warning, Verdict.WARN)
     yield from _recurrent(network, contract)
     yield from _sizes('observation', declared.observation_sizes, contract.width)
     yield from _sizes('action', declared.action_sizes, count)
@@ -72,6 +81,7 @@ def check_contract(
     largest = max((abs(scale) for scale in contract.action.scale), default=0.0)
     fits = all(0.0 < abs(scale) <= MAX_SCALE for scale in contract.action.scale)
     yield _row('action.scale', f'up to {MAX_SCALE:g} rad, not 0', f'{largest:g}', fits)
+    yield from _scales(contract, document)
     yield from gain_rows(contract.gains, servo, period)
     yield from _commands(contract)
     if declared.unknown:
@@ -109,7 +119,7 @@ def check_answers(
     # all zero is no state of a robot (gravity has a direction): finite numbers will do
     finite = bool(np.isfinite(run(np.zeros_like(standing))).all())
     yield _row('answer to all zero', 'numbers', 'numbers' if finite else 'NaN', finite)
-    action = run(standing)
+    action = run(standing).copy()
     raw = action[0]
     if contract.action.clip is not None:
         raw = np.clip(raw, *np.array(contract.action.clip, np.float32).T)
@@ -119,6 +129,10 @@ def check_answers(
     fits = largest < MAX_RESTING_ACTION
     expected = f'below {MAX_RESTING_ACTION:g} rad off the stand'
     yield _row('targets standing', expected, f'{largest:.3f} rad', fits)
+    draw = np.random.default_rng(0).normal(size=standing.shape)
+    moved = run(standing + (PROBE * draw).astype(np.float32))
+    differs = not np.array_equal(action, moved)
+    yield _row('another observation', 'another answer', 'yes' if differs else 'no', differs)
     first = run(standing).copy()
     same = bool(np.array_equal(first, run(standing), equal_nan=True))
     yield _row('the same answer twice', 'yes', 'yes' if same else 'no', same)
@@ -166,7 +180,7 @@ def _shape(
     meaning: str,
 ) -> Row:
     """Compare the one input or output with its width."""
-    found = ', '.join(f'{kind} {list(shape)}' for _, kind, shape in ports)
+    found = ', '.join(f'{name} {kind} {list(shape)}' for name, kind, shape in ports)
     fits = (
         len(ports) == 1
         and ports[0][1] == FLOAT
@@ -218,6 +232,19 @@ def _rates(
         expected = f'{1.0 / step:g} Hz ({key})' if step > 0.0 else f'{step:g} s ({key})'
         found = f'{1.0 / period:g} Hz'
         yield _row('loop_rate', f'{expected}, or several times that', found, fits)
+
+
+def _scales(contract: PolicyContract, document: ContractDocument) -> Iterator[Row]:
+    """Refuse a scale of 0, and warn of those that three decimals have rounded."""
+    for term in contract.terms:
+        name = f'observation.terms.{term.name}.scale'
+        least = min(map(abs, term.scale), default=1.0)
+        if least == 0.0:
+            found = '0: the policy would not observe it; exporters write 0.0004 as 0.000'
+            yield Row(name, 'not 0', found, Verdict.REFUSE)
+        elif least < ROUNDED and document.origins.get(name) == METADATA:
+            found = f'{least:g}, with three decimals: up to {0.0005 / least:.0%} off'
+            yield Row(name, f'{ROUNDED:g} or more', found, Verdict.WARN)
 
 
 def _commands(contract: PolicyContract) -> Iterator[Row]:

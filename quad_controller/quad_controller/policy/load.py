@@ -169,7 +169,7 @@ def validate_policy(
         servo=options.servo,
     )
     checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
-    network.recur(contract.recurrence)
+    network.recur(contract.recurrence, contract.action.output)
     runner = PolicyRunner(
         name, network, contract, robot, options=options, period=period, clock=computing_clock
     )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What ONNX Runtime does not show of a file: its side files; and metadata, written into it.
+"""Reads an ONNX file with its side files once, checks its weights, and writes metadata into it.
 
 An ONNX file is a message of protocol buffers (onnx.proto): weights may lie in other files beside
 it (``external_data``), and metadata are entries of a repeated field, so that one more entry is
@@ -9,9 +9,14 @@ some bytes at the end. The package onnx, 20 MB, would do the same; a robot does 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 import hashlib
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from ..exceptions import PolicyError
 
@@ -20,32 +25,90 @@ MODEL_GRAPH, MODEL_METADATA = 7, 14
 GRAPH_NODE, GRAPH_INITIALIZER = 1, 5
 NODE_ATTRIBUTE = 5
 ATTRIBUTE_TENSOR, ATTRIBUTE_GRAPH, ATTRIBUTE_TENSORS, ATTRIBUTE_GRAPHS = 5, 6, 10, 11
-TENSOR_EXTERNAL_DATA = 13
+TENSOR_TYPE, TENSOR_NAME, TENSOR_RAW, TENSOR_EXTERNAL_DATA = 2, 8, 9, 13
+FLOATS = {1: '<f4', 10: '<f2', 11: '<f8'}  # types of tensors
+FLOAT_DATA = {1: 4, 11: 10}  # where numbers of a type stand that are not raw
 ENTRY_KEY, ENTRY_VALUE = 1, 2
+
+SIDES_KEY = 'weights_sha256'
+"""Metadata key of the digest of the side files that belong to a model."""
 
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5  # wire types
 FIXED_SIZES = {FIXED64: 8, FIXED32: 4}
 
 
-def digest(path: Path) -> str:
-    """Return the SHA-256 of a file, with that of each file that its weights lie in.
+@dataclass(frozen=True, slots=True)
+class OnnxModel:
+    """A model as it was read once: what happens to its files later does not count.
+
+    Attributes:
+        data: Its file.
+        sides: Files that its weights lie in, by the names that the model has for them.
+    """
+
+    data: bytes
+    sides: Mapping[str, bytes]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the file, with that of each side file."""
+        if not self.sides:
+            return hashlib.sha256(self.data).hexdigest()
+        whole = hashlib.sha256(hashlib.sha256(self.data).digest())
+        for name, side in self.sides.items():
+            whole.update(Path(name).name.encode())
+            whole.update(hashlib.sha256(side).digest())
+        return whole.hexdigest()
+
+    @property
+    def sides_digest(self) -> str:
+        """SHA-256 of the side files alone; empty where there is none."""
+        whole = hashlib.sha256(b''.join(self.sides.values()))
+        return whole.hexdigest() if self.sides else ''
+
+    def not_finite(self) -> list[str]:
+        """Name the tensors with a weight that is not finite."""
+        try:
+            return [
+                name
+                for tensor in _tensors(memoryview(self.data))
+                for name, weights in [self._weights(tensor)]
+                if not np.isfinite(weights).all()
+            ]
+        except (IndexError, ValueError):
+            return []  # no ONNX; ONNX Runtime says so better
+
+    def _weights(self, tensor: memoryview) -> tuple[str, npt.NDArray[Any]]:
+        fields = [(number, content) for number, _, content, _ in _fields(tensor)]
+        parts = dict(fields)
+        kind, _ = _varint(parts[TENSOR_TYPE], 0)
+        name = bytes(parts.get(TENSOR_NAME, b'')).decode()
+        if kind not in FLOATS:
+            return name, np.zeros(0)
+        if TENSOR_EXTERNAL_DATA in parts:
+            place = dict(_entry(content) for number, content in fields
+                         if number == TENSOR_EXTERNAL_DATA)  # fmt: skip
+            start, side = int(place.get('offset', 0)), self.sides[place['location']]
+            raw = side[start : start + int(place.get('length', len(side)))]
+        else:
+            raw = bytes(
+                parts.get(TENSOR_RAW) or parts.get(FLOAT_DATA.get(kind, 0), memoryview(b''))
+            )
+        return name, np.frombuffer(raw, FLOATS[kind])
+
+
+def read_model(path: Path) -> OnnxModel:
+    """Read a model and the files that its weights lie in.
 
     Raises:
         PolicyError: A file cannot be read, or lies outside of the folder of the first one.
     """
     data = _read(path)
-    sides = side_files(path, data)
-    if not sides:
-        return hashlib.sha256(data).hexdigest()
-    whole = hashlib.sha256(hashlib.sha256(data).digest())
-    for side in sides:
-        whole.update(side.name.encode())
-        whole.update(hashlib.sha256(_read(side)).digest())
-    return whole.hexdigest()
+    return OnnxModel(data, {name: _read(file) for name, file in side_files(path, data).items()})
 
 
-def side_files(path: Path, data: bytes) -> list[Path]:
-    """Return the files that the weights of a model lie in, each once.
+def side_files(path: Path, data: bytes) -> dict[str, Path]:
+    """Return the files that the weights of a model lie in, by their names in the model.
 
     Raises:
         PolicyError: A name leads out of the folder of the model.
@@ -53,10 +116,10 @@ def side_files(path: Path, data: bytes) -> list[Path]:
     try:
         names = sorted(set(_locations(memoryview(data))))
     except (IndexError, ValueError):
-        return []  # no ONNX; ONNX Runtime says so better
+        return {}  # no ONNX; ONNX Runtime says so better
     folder = path.resolve().parent
-    files = [(folder / name).resolve() for name in names]
-    for name, file in zip(names, files, strict=True):
+    files = {name: (folder / name).resolve() for name in names}
+    for name, file in files.items():
         if folder not in file.parents:
             raise PolicyError(f'policy {path}: its weights lie in {name!r}, outside of its folder')
     return files
@@ -75,28 +138,27 @@ def with_metadata(data: bytes, key: str, value: str) -> bytes:
 
 
 def _locations(model: memoryview) -> Iterator[str]:
+    for tensor in _tensors(model):
+        for entry in _each(tensor, TENSOR_EXTERNAL_DATA):
+            key, value = _entry(entry)
+            if key == 'location':
+                yield value
+
+
+def _tensors(model: memoryview) -> Iterator[memoryview]:
     for graph in _each(model, MODEL_GRAPH):
-        yield from _graph_locations(graph)
+        yield from _graph_tensors(graph)
 
 
-def _graph_locations(graph: memoryview) -> Iterator[str]:
-    for tensor in _each(graph, GRAPH_INITIALIZER):
-        yield from _tensor_locations(tensor)
+def _graph_tensors(graph: memoryview) -> Iterator[memoryview]:
+    yield from _each(graph, GRAPH_INITIALIZER)
     for node in _each(graph, GRAPH_NODE):
         for attribute in _each(node, NODE_ATTRIBUTE):
             for number in (ATTRIBUTE_TENSOR, ATTRIBUTE_TENSORS):
-                for tensor in _each(attribute, number):
-                    yield from _tensor_locations(tensor)
+                yield from _each(attribute, number)
             for number in (ATTRIBUTE_GRAPH, ATTRIBUTE_GRAPHS):
                 for inner in _each(attribute, number):
-                    yield from _graph_locations(inner)
-
-
-def _tensor_locations(tensor: memoryview) -> Iterator[str]:
-    for entry in _each(tensor, TENSOR_EXTERNAL_DATA):
-        key, value = _entry(entry)
-        if key == 'location':
-            yield value
+                    yield from _graph_tensors(inner)
 
 
 def _each(message: memoryview, wanted: int) -> Iterator[memoryview]:
@@ -111,7 +173,7 @@ def _entry(entry: memoryview) -> tuple[str, str]:
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, memoryview, int]]:
-    """Yield number, start, content and end of each field; numbers have no content.
+    """Yield number, start, content and end of each field.
 
     Raises:
         ValueError: It is no message of protocol buffers.
@@ -122,7 +184,7 @@ def _fields(message: memoryview) -> Iterator[tuple[int, int, memoryview, int]]:
         start = place
         tag, place = _varint(message, place)
         number, kind = tag >> 3, tag & 7
-        content = message[:0]
+        content = message[place:]
         if kind == VARINT:
             _, place = _varint(message, place)
         elif kind == BYTES:

@@ -265,6 +265,7 @@ def _action(section: _Section, joints: int, defaults: tuple[float, ...]) -> Acti
         clip=section.optional('clip', _pairs(joints), None),
         target_clip=section.optional('target_clip', _pairs(joints), None),
         low_pass=section.optional('low_pass', _number(0.0, 1000.0), 0.0),
+        output=section.optional('output', str, ''),
     )
     section.end()
     return action

@@ -2,18 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The metadata of an ONNX file, as mjlab's exporter and the vendor's training write them.
 
-All values are texts; lists are joined by commas, numbers have three decimals (mjlab,
-rl/exporter_utils.py). Newer exporters print nested lists as Python does, and have scales, clips
-and histories of the terms. A joint may have a prefix like ``robot/``. No exporter writes the frame
-of the IMU, the period of the phase, or the rate; :data:`OWN_KEYS` are ours.
+All values are texts; lists are joined by commas, numbers and flags have three decimals (mjlab,
+rl/exporter_utils.py). From 1.5.1 on it writes scales, clips and histories of the terms, too; the
+numbers of one term are joined by semicolons, and ``-inf;inf`` is no clip. A joint may have a
+prefix like ``robot/``. No exporter writes the frame of the IMU, the period of the phase, or the
+rate; :data:`OWN_KEYS` are ours.
 """
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping
 import math
-import re
 from typing import Any
 
 from ...exceptions import PolicyError
@@ -109,12 +108,16 @@ def _terms(values: Mapping[str, str]) -> dict[str, Values]:
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
         raise PolicyError(f'metadata observation_names has {", ".join(repeated)} twice')
-    columns = {
-        name: _entries(values, f'observation_terms_{key}', len(names))
-        for key, name in (('scale', 'scale'), ('clip', 'clip'), ('history_length', 'history'))
+    scales, clips, histories = (
+        _entries(values, f'observation_terms_{key}', len(names))
+        for key in ('scale', 'clip', 'history_length')
+    )
+    columns: dict[str, list[Any]] = {
+        'scale': [entry[0] if entry and len(entry) == 1 else entry for entry in scales],
+        'clip': [None if entry == [-math.inf, math.inf] else entry for entry in clips],
+        # 0 is how the exporter writes that there is none
+        'history': [(entry[0] if entry else 0) or None for entry in histories],
     }
-    # 0 is how exporters write that there is none
-    columns['history'] = [entry or None for entry in columns['history']]
     terms: dict[str, Values] = {}
     for place, name in enumerate(names):
         term = dict(MJLAB.get(name, {}))
@@ -162,25 +165,29 @@ def _assumed(known: Values) -> Values:
 
 def _layouts(values: Mapping[str, str]) -> list[str]:
     """Return what is said of a history that is not flat."""
-    text = values.get('observation_terms_flatten_history_dim', '')
-    histories = _flat(values.get('observation_terms_history_length', ''))
-    if 'False' not in text or not any(word.isdigit() and int(word) > 1 for word in histories):
+    key = 'observation_terms_flatten_history_dim'
+    text = values.get(key, '')
+    flags = [word.strip().lower() in {'false', '0', '0.000'} for word in text.split(',')]
+    histories = _words(values.get('observation_terms_history_length', ''))
+    stacked = [word.replace('.', '', 1).isdigit() and float(word) > 1 for word in histories]
+    if len(flags) != len(stacked):
+        flags = [any(flags)] * len(stacked)
+    if not any(left and right for left, right in zip(flags, stacked, strict=True)):
         return []
-    return [f'metadata observation_terms_flatten_history_dim = {text}: a history must be flat']
+    return [f'metadata {key} = {text}: a history must be flat']
 
 
-def _entries(values: Mapping[str, str], key: str, count: int) -> list[Any]:
-    """Return one entry for each term; None where the file has no such key."""
+def _entries(values: Mapping[str, str], key: str, count: int) -> list[list[float] | None]:
+    """Return the numbers of each term; None where the file has no such key."""
     if key not in values:
         return [None] * count
-    # Python prints an infinite number as a name
-    text = re.sub(r'\binf\b', '1e999', values[key])
     try:
-        entries = ast.literal_eval(f'[{text}]')
-    except (SyntaxError, ValueError):
-        raise PolicyError(f'metadata {key} {values[key]!r} is not a list') from None
-    if len(entries) == 1 and isinstance(entries[0], list):
-        entries = list(entries[0])
+        entries = [[float(word) for word in entry.split(';')] for entry in _words(values[key])]
+    except ValueError:
+        raise PolicyError(
+            f'metadata {key} {values[key]!r} is not a list of numbers (commas between terms, '
+            f'semicolons between the numbers of one term)'
+        ) from None
     if len(entries) != count:
         raise PolicyError(
             f'metadata {key} {values[key]!r} has {len(entries)} entries for {count} terms'
@@ -189,25 +196,7 @@ def _entries(values: Mapping[str, str], key: str, count: int) -> list[Any]:
 
 
 def _words(text: str) -> list[str]:
-    return [word.strip() for word in _flat(text)]
-
-
-def _flat(text: str) -> list[str]:
-    """Take a list apart, whether it is joined by commas or printed by Python."""
-    if '[' not in text and '(' not in text:
-        return text.split(',')
-    try:
-        tree = ast.literal_eval(text)
-    except (SyntaxError, ValueError):
-        return [text]
-    flat, waiting = [], [tree]
-    while waiting:
-        item = waiting.pop(0)
-        if isinstance(item, (list, tuple)):
-            waiting[:0] = item
-        else:
-            flat.append(str(item))
-    return flat
+    return [word.strip() for word in text.split(',')]
 
 
 def _numbers(values: Mapping[str, str], key: str) -> list[float]:

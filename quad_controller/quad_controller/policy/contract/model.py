@@ -145,6 +145,7 @@ class ActionContract:
         clip: Range of each raw action; what was clipped is the last action. None for none.
         target_clip: Range of each target in [rad]; None for none.
         low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
+        output: Name of the output that holds it; empty where there is one only.
     """
 
     scale: tuple[float, ...]
@@ -152,6 +153,7 @@ class ActionContract:
     clip: tuple[tuple[float, float], ...] | None = None
     target_clip: tuple[tuple[float, float], ...] | None = None
     low_pass: float = 0.0
+    output: str = ''
 
 
 @dataclass(frozen=True, slots=True)
