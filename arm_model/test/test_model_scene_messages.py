@@ -248,7 +248,7 @@ def test_links_that_a_matrix_does_not_name_keep_what_they_had() -> None:
         (lambda m: setattr(m.pose.position, 'x', float('nan')), "'box': position"),
         (lambda m: setattr(m.pose, 'orientation', Quaternion(w=2.0)), 'its length is 2, not 1'),
         (lambda m: setattr(m.primitives[0], 'dimensions', [0.1, -0.2, 0.3]), 'positive'),
-        (lambda m: setattr(m, 'meshes', [MeshMessage()]), "'box'.*points"),
+        (lambda m: setattr(m, 'meshes', [MeshMessage()]), "'box'.*corners"),
     ],
 )
 def test_what_is_not_usable_is_refused(

@@ -54,7 +54,7 @@ from moveit_msgs.srv import (
 import numpy as np
 from planning_messages import box, panda
 import pytest
-from shape_msgs.msg import SolidPrimitive
+from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import String
 from std_srvs.srv import Empty
 
@@ -409,7 +409,7 @@ def test_goals_and_path_constraints_of_what_is_held(
         release = ApplyPlanningScene.Request(scene=change)
         assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
         change.robot_state.attached_collision_objects = []
-        change.world.collision_objects = [CollisionObject(operation=CollisionObject.REMOVE)]
+        change.world.collision_objects = [remove_all()]
         assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
 
 
@@ -479,6 +479,45 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
         assert outcome() == touching
         assert whole_scene(rig).allowed_collision_matrix == before
     apply(rig, world=cup(CollisionObject.REMOVE))
+
+
+def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
+    """Of a mesh of many vertices few corners around all; nothing where only the robot moves."""
+    monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
+    collisions = rig.client.listen(PlanningScene, '/collision_scene', LATCHED)
+    draw = np.random.default_rng(0).normal(size=(3000, 3))
+    points = 0.2 * draw / np.linalg.norm(draw, axis=1, keepdims=True)
+    rock = CollisionObject(id='rock', pose=PoseMessage(position=Point(y=0.9)))
+    rock.header.frame_id = BASE
+    faces = np.arange(3000).reshape(-1, 3).tolist()
+    rock.meshes = [
+        Mesh(
+            vertices=[Point(x=x, y=y, z=z) for x, y, z in points.tolist()],
+            triangles=[MeshTriangle(vertex_indices=face) for face in faces],
+        )
+    ]
+    apply(rig, world=PlanningSceneWorld(collision_objects=[rock]))
+
+    def rocks(scenes: list[PlanningScene]) -> list[Mesh]:
+        return [each.meshes[0] for each in scenes[-1].world.collision_objects] if scenes else []
+
+    rig.client.spin_until(lambda: bool(rocks(collisions) and rocks(monitored)), 30.0, 'the rock')
+    assert len(rocks(monitored)[0].vertices) == 3000
+    hull = np.array([(each.x, each.y, each.z) for each in rocks(collisions)[0].vertices])
+    assert len(hull) <= 300
+    directions = np.random.default_rng(1).normal(size=(200, 3))
+    assert ((hull @ directions.T).max(axis=0) >= (points @ directions.T).max(axis=0) - 1e-9).all()
+    before, shown = len(collisions), len(monitored)
+    rig.positions[JOINTS[0]] += 0.2
+    rig.client.spin_until(lambda: len(monitored) > shown, 30.0, 'the robot at rest elsewhere')
+    apply(rig, world=PlanningSceneWorld(collision_objects=[remove_all()]))
+    rig.client.spin_until(lambda: not rocks(collisions), 30.0, 'the scene without the rock')
+    assert len(collisions) == before + 1
+
+
+def remove_all() -> CollisionObject:
+    """Return what removes all objects."""
+    return CollisionObject(operation=CollisionObject.REMOVE)
 
 
 def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> None:

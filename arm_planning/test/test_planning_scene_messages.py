@@ -37,10 +37,15 @@ import pytest
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 
 from arm_model import AllowedCollisionMatrix, Clearances
-from arm_model.ros import allowed_collisions
+from arm_model.ros import allowed_collisions, apply_planning_scene
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros.scene_changes import apply_attached, apply_object, apply_scene, scene_for
-from arm_planning.ros.scene_messages import matrix_message, object_message, scene_message
+from arm_planning.ros.scene_messages import (
+    collision_message,
+    matrix_message,
+    object_message,
+    scene_message,
+)
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 
 READY = panda().positions(
@@ -114,6 +119,26 @@ def test_a_whole_scene_comes_back_as_it_was(
     assert numbers_of(back) == pytest.approx(numbers_of(sent), abs=1e-9)
     assert texts_of(back) == texts_of(sent)
     assert list(twice.scene.pairs) == list(once.scene.pairs)
+
+
+@settings(deadline=None, max_examples=20)
+@given(thing=objects('thing'), held=objects('held'))
+def test_controllers_make_the_scene_that_the_planner_has(
+    thing: ObjectMessage, held: ObjectMessage
+) -> None:
+    """Of what is published for them; objects with meshes, attached ones too."""
+    message = PlanningScene(link_padding=[LinkPadding(link_name=TIP, padding=0.01)])
+    message.world.collision_objects = [thing]
+    message.robot_state.attached_collision_objects = [
+        AttachedCollisionObject(link_name=TIP, object=held)
+    ]
+    planned = edited(message)
+    sent = collision_message(planned, panda().name)
+    assert not any(mesh.triangles for each in sent.world.collision_objects for mesh in each.meshes)
+    made = apply_planning_scene(panda().scene, sent, READY)
+    distances = (Clearances(each).least(READY, math.inf) for each in (planned.scene, made))
+    # two planes have no distance
+    assert next(distances) == pytest.approx(next(distances), abs=1e-6, nan_ok=True)
 
 
 @given(

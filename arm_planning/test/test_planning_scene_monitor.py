@@ -25,9 +25,10 @@ class TickingNode(QuietNode):
         self.receive: dict[str, Callable[[Any], None]] = {}
         self.tick: Callable[[], None] = lambda: None
 
-    def create_publisher(self, *_: Any) -> Any:
-        """Keep what is published."""
-        return SimpleNamespace(publish=self.published.append)
+    def create_publisher(self, _kind: Any, topic: str, _qos: Any) -> Any:
+        """Keep what is published for viewers."""
+        is_shown = topic == 'monitored_planning_scene'
+        return SimpleNamespace(publish=self.published.append if is_shown else lambda _: None)
 
     def create_subscription(
         self, _kind: Any, topic: str, callback: Any, _depth: Any, **_: Any

@@ -21,6 +21,7 @@ class Listener:
         drives: The drives of each arm.
         errors: What was logged as an error.
         warnings: What was warned of.
+        publishers: Of scenes for controllers.
         made: The listener.
     """
 
@@ -28,13 +29,15 @@ class Listener:
         self.drives = drives
         self.errors: list[str] = []
         self.warnings: list[str] = []
+        self.publishers = 0
         logger = SimpleNamespace(
             error=lambda text, **_: self.errors.append(text), warning=self.warnings.append
         )
         node: Any = SimpleNamespace(
             get_logger=lambda: logger,
-            create_subscription=lambda *_: None,
+            create_subscription=lambda *_, **__: None,
             create_timer=lambda *_: None,
+            count_publishers=lambda _topic: self.publishers,
         )
         self._now = 0.0
         self._worker = SteppedWorker()

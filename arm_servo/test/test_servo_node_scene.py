@@ -11,6 +11,7 @@ from geometry_msgs.msg import Point, Pose
 from model_robots import table, texts
 from moveit_msgs.msg import CollisionObject, LinkPadding, PlanningScene, PlanningSceneWorld
 import pytest
+from rclpy.serialization import serialize_message
 from servo_drives import Drives
 from servo_scenes import Listener
 from shape_msgs.msg import SolidPrimitive
@@ -59,6 +60,18 @@ def test_scenes_count_once_the_arm_is_known_and_a_wrong_one_does_not() -> None:
     assert objects(drives) == {'box'}
     assert "'cup': no frame 'nowhere'" in listener.errors[0]
     assert 'the scene before counts' in listener.errors[0]
+
+
+def test_the_scene_of_another_move_group_counts_where_there_is_no_other() -> None:
+    """Where ours is there, its meshes are not even read."""
+    drives = started(arm())
+    listener = Listener(drives)
+    listener.publishers = 1
+    listener.made._take_foreign(b'no message')
+    listener.publishers = 0
+    listener.made._take_foreign(serialize_message(message('box')))
+    listener.run()
+    assert objects(drives) == {'box'}
 
 
 def test_padding_of_a_scene_counts_for_the_arm() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from moveit_msgs.msg import (
@@ -52,6 +53,9 @@ ADD, REMOVE, APPEND, MOVE = (  # in Python a constant of the type byte is bytes
         ObjectMessage.MOVE,
     )
 )
+
+MAX_CORNERS = 300
+"""Corners of the hull of a mesh at most: a controller makes it in less than a millisecond."""
 
 LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]] = {
     SolidPrimitive.BOX: (
@@ -471,10 +475,24 @@ def _prism(message: SolidPrimitive, dimensions: list[float], name: str) -> Shape
 
 
 def _mesh(message: MeshMessage, name: str) -> Shape:
+    vertices = [(point.x, point.y, point.z) for point in message.vertices]
     try:
-        return Mesh([(point.x, point.y, point.z) for point in message.vertices])
+        return hull_of(np.array(vertices, dtype=np.float64).tobytes())
     except SceneError as error:
         raise SceneError(f'object {name!r}: {error}') from error
+
+
+@lru_cache(maxsize=64)
+def hull_of(vertices: bytes) -> Mesh:
+    """Return the hull of a mesh; a scene that is sent again and again has the same ones.
+
+    Args:
+        vertices: Its corners as numbers in double precision.
+
+    Raises:
+        SceneError: They are no points, or not finite.
+    """
+    return Mesh(np.frombuffer(vertices).reshape(-1, 3), MAX_CORNERS)
 
 
 def _plane(message: PlaneMessage, _name: str) -> Shape:

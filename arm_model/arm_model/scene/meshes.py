@@ -149,11 +149,13 @@ def _unit(path: Path) -> float:
         return 1.0
 
 
-def convex(points: Array) -> Native:
+def convex(points: Array, most: int | None = None) -> Native:
     """Return the convex hull of points as a shape of coal.
 
     Args:
         points: The points in [m] (m, 3); flat ones are made a little thick.
+        most: Corners of the hull at most; one with more gets a hull around it that has as many.
+            None for any number.
 
     Raises:
         MeshError: There is no point, or one is not finite.
@@ -162,9 +164,12 @@ def convex(points: Array) -> Native:
         raise MeshError('a mesh needs corners, and finite ones')
     solid = _with_volume(np.asarray(points, dtype=np.float64))
     try:
-        return _convex(solid)
+        hull = _convex(solid)
     except RuntimeError:  # a corner has more neighbours than coal can count
-        return _convex(_around(solid))
+        return _convex(_around(solid, MAX_CORNERS))
+    if most is not None and hull.num_points > most:
+        return _convex(_around(hull.points(), most))
+    return hull
 
 
 def _convex(points: Array) -> Native:
@@ -174,14 +179,14 @@ def _convex(points: Array) -> Native:
     return coal.Convex.convexHull(corners, True, 'Qt')
 
 
-def _around(points: Array) -> Array:
+def _around(points: Array, most: int) -> Array:
     """Return few points whose hull is around many, and hardly larger.
 
     They are the outermost ones in evenly spread directions, moved away from their middle until
     all others are within.
     """
-    steps = np.arange(MAX_CORNERS)
-    height = 1.0 - 2.0 * (steps + 0.5) / MAX_CORNERS
+    steps = np.arange(most)
+    height = 1.0 - 2.0 * (steps + 0.5) / most
     width, turns = np.sqrt(1.0 - height**2), GOLDEN_ANGLE * steps
     directions = np.stack((width * np.cos(turns), width * np.sin(turns), height))
     scale = np.ptp(points, axis=0)  # of a long thing the sides count as well as the ends

@@ -80,11 +80,12 @@ class Mesh:
 
     __slots__ = ('hull', 'points')
 
-    def __init__(self, points: Sequence[Sequence[float]] | Array) -> None:
+    def __init__(self, points: Sequence[Sequence[float]] | Array, most: int | None = None) -> None:
         """Make the hull.
 
         Args:
             points: Points in [m] (m, 3); what lies within their hull does not count.
+            most: Corners of the hull at most; None for any number.
 
         Raises:
             SceneError: They are no points, or not finite.
@@ -93,7 +94,7 @@ class Mesh:
         if array.ndim != 2 or array.shape[1] != 3:
             raise SceneError(f'a mesh needs points of three numbers, not an array {array.shape}')
         try:
-            self.hull = convex(array)
+            self.hull = convex(array, most)
         except MeshError as error:
             raise SceneError(str(error)) from error
         self.hull.computeLocalAABB()

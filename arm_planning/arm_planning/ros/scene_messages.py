@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import Transform, TransformStamped, Vector3
@@ -44,6 +45,22 @@ ALL_COMPONENTS = (1 << 10) - 1
 """All bits of moveit_msgs/PlanningSceneComponents."""
 
 
+def collision_message(snapshot: SceneSnapshot, robot_name: str) -> SceneMessage:
+    """Return a scene as controllers take it: of meshes the corners of the hulls that count.
+
+    Args:
+        snapshot: The scene.
+        robot_name: Name of the robot's model.
+    """
+    bare = {name: ObjectDetails() for name in snapshot.details}
+    message = scene_message(replace(snapshot, details=bare), robot_name, StateMessage())
+    held = message.robot_state.attached_collision_objects
+    for thing in (*message.world.collision_objects, *(each.object for each in held)):
+        for mesh in thing.meshes:
+            mesh.triangles = []
+    return message
+
+
 def scene_message(
     snapshot: SceneSnapshot,
     robot_name: str,
@@ -73,13 +90,14 @@ def scene_message(
     if components & has.ALLOWED_COLLISION_MATRIX:
         message.allowed_collision_matrix = matrix_message(snapshot.scene.allowed)
     if components & has.LINK_PADDING_AND_SCALING:
+        scene = snapshot.scene  # a link without a shape may carry something
         message.link_padding = [
-            LinkPadding(link_name=link, padding=snapshot.scene.padding.get(link, 0.0))
-            for link in snapshot.scene.link_shapes
+            LinkPadding(link_name=link, padding=scene.padding.get(link, 0.0))
+            for link in {**scene.link_shapes, **scene.padding}
         ]
         message.link_scale = [
-            LinkScale(link_name=link, scale=snapshot.scene.scale.get(link, 1.0))
-            for link in snapshot.scene.link_shapes
+            LinkScale(link_name=link, scale=scene.scale.get(link, 1.0))
+            for link in {**scene.link_shapes, **scene.scale}
         ]
     if components & has.OBJECT_COLORS:
         message.object_colors = _colors(snapshot.colors)

@@ -29,7 +29,12 @@ from ..exceptions import PlanningCode, PlanningError
 from .robot_groups import RobotGroups
 from .robot_state import joints_of, state_message
 from .scene_changes import apply_attached, apply_object, apply_scene
-from .scene_messages import ALL_COMPONENTS, attached_messages, scene_message
+from .scene_messages import (
+    ALL_COMPONENTS,
+    attached_messages,
+    collision_message,
+    scene_message,
+)
 from .scene_snapshot import SceneSnapshot
 from .tf_frames import TfFrames
 
@@ -75,6 +80,7 @@ class SceneMonitor:
         self._arrivals: dict[str, float] = {}
         self._listeners: list[Callable[[], None]] = []
         self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
+        self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
         for kind, topic, apply in (
             (PlanningScene, 'planning_scene', apply_scene),
@@ -89,7 +95,7 @@ class SceneMonitor:
         node.create_service(ApplyPlanningScene, 'apply_planning_scene', self._apply)
         node.create_service(Empty, 'clear_octomap', self._clear_octomap)
         self._shown = self._seen = self.positions()
-        self._publish()
+        self._publish_change()
         node.create_timer(REST_PERIOD, self._publish_rest)
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -217,7 +223,7 @@ class SceneMonitor:
         except PlanningError as error:
             self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
             return False
-        self._publish()
+        self._publish_change()
         for listener in self._listeners:
             listener()
         return True
@@ -232,6 +238,10 @@ class SceneMonitor:
         self._seen = here
         if _near(here, before) and not _near(here, self._shown):
             self._publish()
+
+    def _publish_change(self) -> None:
+        self._collisions.publish(collision_message(self.snapshot, self.robot.name))
+        self._publish()
 
     def _publish(self) -> None:
         self._shown = self.positions()

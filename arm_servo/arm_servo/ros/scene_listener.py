@@ -12,6 +12,7 @@ import time
 
 from moveit_msgs.msg import PlanningScene
 from rclpy.node import Node
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from arm_model import ArmError, Array
@@ -25,8 +26,12 @@ from ..core.moving_arms import MovingArms
 from ..core.scene_updater import SceneUpdater
 from ..core.set_point import Source
 
-TOPIC = 'monitored_planning_scene'
-"""Where move_group publishes its scene, latched."""
+TOPIC = 'collision_scene'
+"""Where move_group of arm_planning publishes what may collide, latched: after each change, meshes
+as the hulls that it has made, for programs that have a control cycle to keep."""
+
+FOREIGN_TOPIC = 'monitored_planning_scene'
+"""Where any move_group publishes its scene; it counts where nothing publishes the other topic."""
 
 LOOK_PERIOD = 0.1
 """Time between two looks where the joints are in [s]."""
@@ -101,15 +106,23 @@ class SceneListener:
         commanded = {name for gateway in self._gateways for name in gateway.model.joints}
         self._awaited = {name for each in self._updaters for name in each.others} - commanded
         node.create_subscription(PlanningScene, TOPIC, self._take, LATCHED)
+        # raw: its meshes take long to read, which is left out where nobody needs them
+        node.create_subscription(
+            PlanningScene, FOREIGN_TOPIC, self._take_foreign, LATCHED, raw=True
+        )
         if self._awaited:
             node.create_subscription(JointState, joint_topic, self._take_joints, 10)
         node.create_timer(LOOK_PERIOD, self._look)
 
+    def _take_foreign(self, data: bytes) -> None:
+        if not self._node.count_publishers(TOPIC):
+            self._take(deserialize_message(data, PlanningScene))
+
     def _take(self, message: PlanningScene) -> None:
         if message.is_diff:
             self._node.get_logger().error(
-                f'{TOPIC}: a diff (is_diff) is refused, the scene before counts: who joins a'
-                ' latched topic gets its last message only; publish whole scenes there, and send'
+                f'{FOREIGN_TOPIC}: a diff (is_diff) is refused, the scene before counts: who joins'
+                ' a latched topic gets its last message only; publish whole scenes there, and send'
                 ' diffs to planning_scene of move_group',
                 once=True,
             )
