@@ -136,9 +136,10 @@ def test_controllers_make_the_scene_that_the_planner_has(
     sent = collision_message(planned, panda().name)
     assert not any(mesh.triangles for each in sent.world.collision_objects for mesh in each.meshes)
     made = apply_planning_scene(panda().scene, sent, READY)
-    distances = (Clearances(each).least(READY, math.inf) for each in (planned.scene, made))
-    # two planes have no distance
-    assert next(distances) == pytest.approx(next(distances), abs=1e-6, nan_ok=True)
+    assert made.pairs == planned.scene.pairs
+    one, other = (Clearances(each).least(READY, math.inf) for each in (planned.scene, made))
+    apart = one > 1e-3  # of shapes deep in each other, two ways out may be found
+    assert one[apart] == pytest.approx(other[apart], abs=1e-4)
 
 
 @given(
