@@ -18,7 +18,13 @@ TRUNK_MASS_RANGE: Final = (0.05, 5.0)  # [kg] what the legs could carry, with ro
 
 
 @lru_cache(maxsize=16)
-def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None = None) -> str:
+def robot_urdf(
+    preset: str = 'lite',
+    arm: bool = False,
+    trunk_mass: float | None = None,
+    *,
+    base_footprint: bool = True,
+) -> str:
     """Make the URDF of a robot.
 
     Args:
@@ -26,6 +32,7 @@ def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None
         arm: With the arm and gripper on its back.
         trunk_mass: Mass of the trunk in [kg] when the robot carries more than the bare one, whose
             figure is the preset's.
+        base_footprint: With that frame on a floating joint, for robot_state_publisher.
 
     Returns:
         The URDF as XML text.
@@ -49,6 +56,7 @@ def robot_urdf(preset: str = 'lite', arm: bool = False, trunk_mass: float | None
             'preset': preset,
             'arm': str(bool(arm)).lower(),
             'trunk_mass': repr(float(trunk_mass or 0.0)),
+            'base_footprint': str(base_footprint).lower(),
         }
     )
 

@@ -22,9 +22,19 @@ def run(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--trunk-mass', type=float, metavar='KG', help="mass of the trunk instead of the preset's"
     )
+    parser.add_argument(
+        '--base-footprint',
+        action='store_true',
+        help='with that frame on a floating joint, as /robot_description has it',
+    )
     options = parser.parse_args(argv)
     try:
-        urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
+        urdf = robot_urdf(
+            options.preset,
+            options.arm,
+            options.trunk_mass,
+            base_footprint=options.base_footprint,
+        )
     except DescriptionError as error:
         sys.stderr.write(f'urdf: {error}\n')
         return 2

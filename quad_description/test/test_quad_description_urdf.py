@@ -256,7 +256,7 @@ def test_the_description_says_nothing_about_this_machine() -> None:
 
 def test_the_command_prints_the_urdf(capsys: pytest.CaptureFixture[str]) -> None:
     """Its arguments are those of the API, and a wrong one ends with exit code 2."""
-    assert run(['--preset', 'mini', '--arm']) == 0
+    assert run(['--preset', 'mini', '--arm', '--base-footprint']) == 0
     assert capsys.readouterr().out == robot_urdf('mini', arm=True) + '\n'
     assert run(['--trunk-mass', '0']) == 2
     assert 'trunk_mass' in capsys.readouterr().err

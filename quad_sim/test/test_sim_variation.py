@@ -6,12 +6,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
 import pytest
 
 from quad_description import robot_urdf
+from quad_description.urdf_command import run as print_urdf
 from quad_sim import ServoModel, ServoParameters, SetupError, Terrain
 from quad_sim.export_mjcf import run
 from quad_sim.options import parse_servo
@@ -132,6 +134,28 @@ def test_mjcf_without_a_floor_is_the_robot_alone(tmp_path: Path) -> None:
     assert {model.geom(foot).name for foot in Robot(robot_urdf()).feet}
     names = [model.actuator(index).name for index in range(model.nu)]
     assert tuple(names) == Robot(robot_urdf()).joint_names
+
+
+def test_trainers_recognize_servos_and_take_the_options(tmp_path: Path) -> None:
+    """Newton reads position servos alone as servos; MuJoCo Warp refuses the flag `autoreset`."""
+    path = tmp_path / 'xgo.xml'
+    assert run([str(path), '--servo', 'kp=6,kv=0.2,damping=0.05,interpolation=0']) == 0
+    root = ET.parse(path)  # noqa: S314  # written by us
+    servos = list(root.iter('position'))
+    assert [(each.get('kp'), each.get('kv')) for each in servos] == [('6', '0.2')] * 12
+    assert all(each.get('forcerange') and each.get('ctrlrange') for each in servos)
+    assert not list(root.iter('general'))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def test_the_urdf_for_other_tools_is_read_by_mujoco(capsys: pytest.CaptureFixture[str]) -> None:
+    """As it is printed: base_footprint would be a body without mass on a joint of its own."""
+    assert print_urdf(['--preset', 'lite']) == 0
+    model = mujoco.MjModel.from_xml_string(capsys.readouterr().out)
+    assert model.nq == 12
+    assert print_urdf(['--base-footprint']) == 0
+    assert 'base_footprint' in capsys.readouterr().out
 
 
 def test_a_file_that_cannot_be_written_is_reported(

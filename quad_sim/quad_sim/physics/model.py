@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Final
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -81,8 +82,22 @@ def mjcf(
     spec, model = _compiled(urdf, servo, Terrain() if floor else None, timestep)
     ctrl = [start[int(model.jnt_qposadr[joint])] for joint in model.actuator_trnid[:, 0]]
     spec.add_key(name='stand', qpos=list(start), ctrl=ctrl)
-    text: str = spec.to_xml()
-    return text
+    # how a blow-up is handled is the trainer's choice, and MuJoCo Warp refuses the flag
+    spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return _with_position_servos(spec.to_xml())
+
+
+def _with_position_servos(text: str) -> str:
+    """Write position servos as such: others do not recognize the general form of MuJoCo."""
+    root = ET.fromstring(text)  # noqa: S314  # written by MuJoCo itself
+    for servo in root.findall('actuator/general'):
+        servo.tag = 'position'
+        _, _, kv = (servo.attrib.pop('biasprm') + ' 0 0').split()[:3]
+        servo.set('kp', servo.attrib.pop('gainprm').split()[0])
+        servo.set('kv', f'{-float(kv):g}')
+        for name in ('biastype', 'ctrllimited', 'forcelimited'):
+            servo.attrib.pop(name, None)
+    return ET.tostring(root, encoding='unicode')
 
 
 def _compiled(
