@@ -225,10 +225,13 @@ def test_a_late_motion_is_halted(master: CanopenMaster) -> None:
     """It does not go on after its failure was reported."""
     drive = master.drive('joint1')
     drive.enable()
-    with pytest.raises(DriveError, match=r'not arrived within 0\.1 s and is halted'):
+    with pytest.raises(DriveError, match=r'not arrived within 0\.1 s, and was halted'):
         drive.move_to(100.0, timeout=0.1)
-    drive.halt()  # until it stands
-    assert drive.position < 50.0
+    stands = drive.position
+    assert stands < 50.0
+    assert drive.velocity == pytest.approx(0.0, abs=0.01)
+    drive.halt()
+    assert drive.position == pytest.approx(stands, abs=0.001)
     assert drive.state is DriveState.OPERATION_ENABLED
 
 
@@ -321,6 +324,7 @@ def test_missing_devices_are_named(bus_yml: Path, bus: str) -> None:
         with program('-m', 'canopen_sim.fake_slaves_command', bus_yml, '--can', bus):
             master.boot(TIMEOUT)
             master.drive('joint1').enable()
+            master.close()
 
 
 def test_a_warning_on_the_way_does_not_end_a_boot(bus_yml: Path, bus: str) -> None:
@@ -491,7 +495,7 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
 def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(
     drives: subprocess.Popen[str], bus_yml: Path, bus: str
 ) -> None:
-    """The motion that waits for one ends, and so does the master, in a time of its own."""
+    """The motion that waits for one ends, and so does the master; rest is not known."""
     with CanopenMaster.from_bus_yml(bus_yml, bus) as master:
         master.boot(TIMEOUT)
         drive = master.drive('joint1')
@@ -510,6 +514,8 @@ def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(
             drive.enable()
         with pytest.raises(BootError, match='joint1'):
             master.boot(0.1)
+        with pytest.raises(DriveError, match='not disabled; cut its power: offline'):
+            master.close()
 
 
 def test_events_are_handed_over_and_one_that_fails_harms_nobody(

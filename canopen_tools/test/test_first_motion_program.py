@@ -246,11 +246,11 @@ def test_whatever_ends_it_the_drive_stands_without_power(end: str, tmp_path: Pat
         assert code != 0
         return
     words = {
-        'ctrl_c': 'ended by you; the drive is stopped and disabled',
-        'terminate': 'interrupted: the drive is stopped and disabled',
-        'fault': 'shoulder: the drive cannot go on: .*0x2310',
+        'ctrl_c': 'shoulder stands without power: 0x0250.*ended by you',
+        'terminate': 'shoulder stands without power: 0x0250.*interrupted',
+        'fault': 'shoulder stands without power: .*0x0218.*the drive cannot go on: .*0x2310',
     }
-    assert re.search(words[end], person.screen), person.screen
+    assert re.search(words[end], person.screen, re.DOTALL), person.screen
     assert code == (128 + signal.SIGTERM if end == 'terminate' else 1)
 
 

@@ -92,6 +92,7 @@ class Drive:
         self._follows = False
         self._following = FollowingWatch()
         self._led = False  # by a motion source, in the last cycle
+        self._unknown = True  # its state, since it was lost; no controlword leaves before it shows
         self._unseen_since: float | None = None
         self._polling: Task[None] | None = None
         node.on_lost.append(self._on_lost)
@@ -145,6 +146,8 @@ class Drive:
         self.following_error = self.control.setpoint - view.position
         if before is DriveState.UNKNOWN and self.node.taken_over and self.control.goal is None:
             self._take_over()
+        elif self._unknown and view.fresh:
+            self._found()
         if view.state is not before:
             self._state_changed(before)
         self._watch_sight()
@@ -165,7 +168,10 @@ class Drive:
             command, bits = self.control.step(self._command(), now, period)
         elif self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
-        if self.control.enables and self.objects.controlword_muted and not self.stop.running:
+        elif self._unknown:
+            self.objects.mute_controlword()  # it may move, and would coast
+        kept_back = self.objects.controlword_muted and not (self._unknown or self.stop.running)
+        if self.control.enables and kept_back:
             raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self.control.send(command, bits)
 
@@ -230,6 +236,16 @@ class Drive:
         self.control.halt.release()
         self.motions += not self._led
         self._streamed = True
+
+    def _found(self) -> None:
+        """Command it from now on; one that is enabled without a command of ours is stopped."""
+        self._unknown = False
+        if self.stop.running:
+            return
+        self.objects.unmute_controlword()
+        if self.view.state in POWERED and self.control.goal is None:
+            self.warn(f'was found in motion or held, and is stopped: {self.describe()}')
+            self.leave_operation()
 
     def _take_over(self) -> None:
         """Go on where another master has left the drive."""
@@ -397,6 +413,7 @@ class Drive:
             self.interrupted = control.mode.number
         self.feed_forward.end()
         self.resetting = self._follows = self._begun = self._announced = False
+        self._unknown = True
         self._unseen_since = None
         self._following.clear()
         control.forget()

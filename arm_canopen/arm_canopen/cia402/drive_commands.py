@@ -216,9 +216,12 @@ class DriveCommands:
             await self._scheduler.until(lambda: lost() or arrived(), timeout)
         except TimeoutError:
             if not lost():  # else the motion is that of somebody else
-                control.hold()
-                late = f'has not arrived within {timeout:g} s and is halted'
-                raise steps.refused(late) from None
+                late = f'{drive.name} has not arrived within {timeout:g} s'
+                try:
+                    late = f'{late}, and was halted: {await self.request("halt")}'
+                except DriveError as error:
+                    late = f'{late}, and was commanded to halt: {error}'
+                raise DriveError(late) from None
         if lost():
             raise steps.refused('was stopped, or got another target, before it arrived')
         return drive.describe()

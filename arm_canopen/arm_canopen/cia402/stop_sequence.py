@@ -243,7 +243,11 @@ class StopSequence:
     def _report(self, what: str, remedy: str = '') -> None:
         if not self._quiet:
             view = self._view
-            shown = f'{statusword_text(view.objects.statusword)}; {view.speed:.3g} per second'
+            shown = 'nothing'
+            if view.state is not DriveState.UNKNOWN:
+                shown = statusword_text(view.statusword)
+            if view.speed_known:
+                shown += f'; {view.speed:.3g} per second'
             self._log(Severity.ERROR, f'{what}: {shown}{remedy}')
 
     def _write(self) -> None:

@@ -111,7 +111,7 @@ class CanopenDrive:
         return self._run('mode', partial(self._commands.select_mode, _operation_mode(mode)))
 
     def disable(self) -> str:
-        """Take the torque away (Switched On)."""
+        """Take the torque away (Switched On); return when it stands."""
         return self._request('disable')
 
     def halt(self) -> str:
@@ -119,7 +119,7 @@ class CanopenDrive:
         return self._request('halt')
 
     def quick_stop(self) -> str:
-        """Begin a quick stop; what follows is the drive's option code 0x605A."""
+        """Quick stop; return when it stands, in the state of its option code 0x605A."""
         return self._request('quick_stop')
 
     def shutdown(self) -> str:

@@ -31,7 +31,11 @@ class MovingDrive:
     """
 
     def __init__(
-        self, option: int = 2, *writes: tuple[int, int, int], kept_alive: bool = False
+        self,
+        option: int = 2,
+        *writes: tuple[int, int, int],
+        kept_alive: bool = False,
+        mode: OperationMode = OperationMode.CYCLIC_POSITION,
     ) -> None:
         """Set it in motion.
 
@@ -39,6 +43,7 @@ class MovingDrive:
             option: Quick stop option code (0x605A).
             writes: Index, sub-index and value of objects that differ.
             kept_alive: It passes from one master to the next.
+            mode: Mode of operation.
         """
         slow = [(0x6085, 0, round(SCALE / RAMP)), (0x605A, 0, option), *writes]
         changed = [sdo_write(*write) for write in slow]
@@ -49,8 +54,9 @@ class MovingDrive:
         self.net.allows_defects = True
         self.net.boot()
         self.net.do(JOINT, 'init')
-        self.net.select(JOINT, OperationMode.CYCLIC_POSITION)
-        self.net.commands[JOINT].set_target(50.0)
+        self.net.select(JOINT, mode)
+        velocity = mode is OperationMode.PROFILE_VELOCITY
+        self.net.commands[JOINT].set_target(1.0 if velocity else 50.0)
         self.net.run(0.6)
         assert self.device.velocity / SCALE == pytest.approx(1.0, rel=0.05)
         self.states = [DriveState.OPERATION_ENABLED]

@@ -286,10 +286,12 @@ def test_shutdown_leaves_the_drive_without_power(net: VirtualNetwork, mode: Oper
     enabled(net, mode)
     net.commands[JOINT].set_target(0.5)
     net.run(0.3)
-    net.do(JOINT, 'shutdown', preempt=True)
-    net.run(0.1)
-    assert net.drives[JOINT].view.state is DriveState.SWITCH_ON_DISABLED
-    assert net.drives[JOINT].view.velocity == 0.0
+    answer = net.do(JOINT, 'shutdown', preempt=True)
+    drive = net.devices[JOINT].drive
+    assert drive is not None
+    assert drive.state is DriveState.SWITCH_ON_DISABLED
+    assert 'Switch on disabled' in answer, 'it is what was seen last'
+    assert abs(drive.velocity) < 0.01 * SCALE
 
 
 def test_a_dead_master_is_noticed() -> None:

@@ -4,11 +4,15 @@
 
 from __future__ import annotations
 
+from drive_samples import SCALE
 from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
+from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
+from arm_canopen.exceptions import DriveError
+from arm_canopen.library.bus_master import leave_device
 from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState
+from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 
 pytestmark = pytest.mark.slow
@@ -19,6 +23,11 @@ OPTIONS = pytest.mark.parametrize('option', [2, 6], ids=['605A=2', '605A=6'])
 def lose(moving: MovingDrive, *cob_ids: int) -> None:
     """Lose all frames of some identifiers of the device from now on."""
     moving.net.wire.loses = lambda sender, frame: frame.can_id in cob_ids
+
+
+def turning(option: int, *writes: tuple[int, int, int]) -> MovingDrive:
+    """Return a drive that turns on without set-points, whatever becomes of its master."""
+    return MovingDrive(option, (0x6007, 0, 0), *writes, mode=OperationMode.PROFILE_VELOCITY)
 
 
 def nmt_commands(moving: MovingDrive) -> list[int]:
@@ -62,3 +71,49 @@ def test_a_heartbeat_that_is_gone_brakes_the_axis_before_its_device_is_configure
     lose(moving)
     moving.net.run_until(moving.net.all_ready)
     assert moving.net.drives[JOINT].failure == ''
+
+
+@OPTIONS
+@pytest.mark.parametrize('begins', ['NMT', 'silence'])
+def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option: int) -> None:
+    """The first controlword that it gets is no 0, which would let it coast."""
+    moving = turning(option)
+    if begins == 'NMT':
+        moving.net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+        moving.run(0.5)
+        moving.net.network.send_nmt(NmtCommand.START, NODE_ID)
+    else:
+        moving.net.wire.loses = lambda sender, frame: True
+        moving.run(0.5)
+        lose(moving)
+    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
+    moving.run(RAMP + 3.0)
+    assert moving.fastest < STANDING
+    assert moving.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]
+    moving.net.run_until(moving.net.all_ready)
+    moving.net.do(JOINT, 'enable')
+
+
+@pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
+def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(nmt: NmtCommand) -> None:
+    """Pre-operational it is stopped by SDO first; in the NMT state Stopped nothing is seen."""
+    moving = turning(6)
+    net, node = moving.net, moving.net.network.nodes[JOINT]
+    node.watch_slot = 1
+    net.network.send_nmt(nmt, NODE_ID)
+    moving.run(0.3)
+    assert abs(moving.device.velocity) / SCALE == pytest.approx(1.0)
+
+    def unwatched() -> bool:
+        requests = net.frames(0x600 + NODE_ID, since=moving.began)
+        return any(data[1:4] == b'\x16\x10\x01' for data in requests)
+
+    scheduler = net.network.scheduler
+    leaving = scheduler.spawn(leave_device(node, [net.commands[JOINT]], scheduler))
+    net.run_until(lambda: leaving.done or unwatched(), SHUTDOWN_MAX)
+    stands = abs(moving.device.velocity) / SCALE < STANDING
+    assert stands is unwatched() is (nmt is NmtCommand.ENTER_PRE_OPERATIONAL)
+    assert leaving.done is not stands
+    if not stands:
+        with pytest.raises(DriveError, match='cut its power'):
+            leaving.result()

@@ -73,9 +73,7 @@ def _asked(question: str) -> str:
     try:
         return input(question).strip()
     except EOFError as error:
-        raise FirstMotionError(
-            'the input has ended; a drive that was enabled is stopped and disabled'
-        ) from error
+        raise FirstMotionError('the input has ended') from error
 
 
 def say(text: str) -> None:

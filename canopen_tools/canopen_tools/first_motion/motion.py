@@ -114,21 +114,24 @@ def move(request: Request, axis: DriveConfig, interruptions: Interruptions) -> R
             with Keyboard() as keyboard:
                 after = guarded.run(keyboard, kind)
         except TerminalError as error:
-            raise FirstMotionError(f'{error}; the drive is stopped and disabled') from error
+            raise FirstMotionError(str(error)) from error
         finally:
             _leave(drive, mover)
     if not guard.outcome.is_judged:
         raise FirstMotionError(
-            f'{axis.name}: {guard.detail}; the drive is stopped and disabled. It reported '
-            f'{kind.shown(plan.start)} before, {kind.shown(after)} after'
+            f'{axis.name}: {guard.detail}. It reported {kind.shown(plan.start)} before, '
+            f'{kind.shown(after)} after'
         )
     return Record(guard.outcome, guard.detail, plan.start, after, facts)
 
 
 def _leave(drive: CanopenDrive, mover: Mover) -> None:
-    """Stop and disable the drive, and give it its speed back; the master does so once more."""
+    """Stop and disable the drive, and give it its speed back; the master does so once more.
+
+    What was seen of the stop is shown.
+    """
     try:
-        drive.shutdown()
+        say(f'{drive.name} stands without power: {drive.shutdown()}')
         mover.close()
     except CanopenError as error:
         say(str(error))
@@ -258,7 +261,7 @@ class _GuardedMotion:
         for event in keyboard.wait(PERIOD):
             self._held.feed(event)
             if event.is_stroke and event.key in QUIT:
-                raise FirstMotionError('ended by you; the drive is stopped and disabled')
+                raise FirstMotionError('ended by you')
             if event.is_stroke and event.key == 'enter':
                 order = self._guard.finish()
         now = time.monotonic()

@@ -47,7 +47,7 @@ def run(request: Request) -> int:
                     return code
     except Interrupted as interruption:
         if interruption.number != signal.SIGHUP:
-            say('interrupted: the drive is stopped and disabled')
+            say('interrupted')
         return 128 + interruption.number
 
 
