@@ -52,7 +52,7 @@ from moveit_msgs.srv import (
     QueryPlannerInterfaces,
 )
 import numpy as np
-from planning_messages import box, panda
+from planning_messages import box, panda, tetrahedron
 import pytest
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import String
@@ -513,6 +513,46 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     apply(rig, world=PlanningSceneWorld(collision_objects=[remove_all()]))
     rig.client.spin_until(lambda: not rocks(collisions), 30.0, 'the scene without the rock')
     assert len(collisions) == before + 1
+
+
+def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
+    """That it counts as its hull; a convex one is not."""
+    corner = CollisionObject(id='corner', pose=PoseMessage(position=Point(x=-0.5, y=0.9)))
+    corner.header.frame_id = BASE
+    solid = corner_mesh()
+    corner.meshes = [solid]
+    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    note = "object 'corner' counts as the convex hull of its mesh, of which it fills 71 %"
+    rig.process.wait_for(note, 30.0)
+    goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
+    assert note in rig.move(goal)[1].error_code.message
+    # the tip is in the corner, which is empty
+    place = tip(rig).position
+    corner.pose.position = Point(x=place.x - 0.35, y=place.y - 0.35, z=place.z - 0.1)
+    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    refused = rig.move(goal)[1].error_code
+    assert refused.val == MoveItErrorCodes.START_STATE_IN_COLLISION
+    assert note in refused.message
+    corner.meshes = [tetrahedron(0.2)]
+    corner.pose.position = Point(x=-0.5, y=0.9)
+    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    answer = rig.move(goal)[1].error_code
+    assert (answer.val, answer.message) == (SUCCESS, '')
+    apply(rig, world=PlanningSceneWorld(collision_objects=[remove_all()]))
+
+
+def corner_mesh() -> Mesh:
+    """Return a prism with the outline of an L."""
+    outline = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.2), (0.2, 0.2), (0.2, 0.6), (0.0, 0.6)]
+    count = len(outline)
+    corners = [Point(x=x, y=y, z=z) for z in (0.0, 0.2) for x, y in outline]
+    caps = [(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 5, 4)]
+    faces = [*caps, *(tuple(count + each for each in reversed(cap)) for cap in caps)]
+    for one in range(count):
+        other = (one + 1) % count
+        faces += [(one, other, count + other), (one, count + other, count + one)]
+    triangles = [MeshTriangle(vertex_indices=list(face)) for face in faces]
+    return Mesh(vertices=corners, triangles=triangles)
 
 
 def remove_all() -> CollisionObject:

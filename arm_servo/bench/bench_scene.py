@@ -35,8 +35,8 @@ from shape_msgs.msg import Mesh as MeshMessage
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Array, Clearances, Mesh, octomap_shapes, Places, PlanningScene
-from arm_model.ros import apply_planning_scene
-from arm_model.ros.planning_scene import hull_of, MAX_CORNERS
+from arm_model.ros import apply_planning_scene, hull_of
+from arm_model.ros.planning_scene import MAX_CORNERS
 from arm_servo.core.prepared_scene import PreparedScene
 
 BOXES = 100

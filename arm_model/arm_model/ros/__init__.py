@@ -9,6 +9,7 @@ from .planning_scene import (
     apply_collision_object,
     apply_planning_scene,
     FrameOf,
+    hull_of,
     primitive_shape,
 )
 from .robot_parameters import (
@@ -35,6 +36,7 @@ __all__ = [
     'declare_groups',
     'declare_robot',
     'duration_fields',
+    'hull_of',
     'learn_static',
     'learn_transforms',
     'primitive_shape',

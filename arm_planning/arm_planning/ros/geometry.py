@@ -35,7 +35,7 @@ from arm_model import (
     rotation_of,
     Sphere,
 )
-from arm_model.ros import xyz, xyzw
+from arm_model.ros import hull_of, xyz, xyzw
 
 from ..exceptions import PlanningCode, PlanningError
 
@@ -140,11 +140,33 @@ def check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
     Raises:
         PlanningError: It has no triangle or no volume, or names a corner that there is not.
     """
-    corners = np.array([(each.x, each.y, each.z) for each in message.vertices], dtype=float)
-    triangles = np.array([each.vertex_indices for each in message.triangles], dtype=int)
-    problem = _problem(corners, triangles)
+    problem = _problem(*_arrays(message))
     if problem:
         raise PlanningError(PlanningCode.FAILURE, f'{what}: {problem}')
+
+
+def volumes(message: Any) -> tuple[float, float]:  # noqa: ANN401
+    """Return the volumes of a shape_msgs/Mesh that is a body and of its hull; 0 for an open one.
+
+    Args:
+        message: The mesh.
+    """
+    corners, triangles = _arrays(message)
+    hull = hull_of(corners.tobytes()).hull
+    corners, same = np.unique(corners, axis=0, return_inverse=True)
+    triangles = same.reshape(-1)[triangles]
+    edges = np.sort(triangles[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2), axis=1)
+    if (np.unique(edges, axis=0, return_counts=True)[1] % 2).any():
+        return 0.0, 0.0
+    a, b, c = (corners[triangles[:, each]] for each in range(3))
+    return abs(float((a * np.cross(b, c)).sum()) / 6.0), float(hull.computeVolume())
+
+
+def _arrays(message: Any) -> tuple[Array, Places]:  # noqa: ANN401
+    """Return corners (m, 3) in [m], and the three numbers of each triangle (n, 3)."""
+    corners = np.array([(each.x, each.y, each.z) for each in message.vertices], dtype=float)
+    triangles = np.array([each.vertex_indices for each in message.triangles], dtype=int)
+    return corners.reshape(-1, 3), triangles.reshape(-1, 3)
 
 
 def _problem(corners: Array, triangles: Places) -> str:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 import time
@@ -159,7 +159,9 @@ class PlanningThreads:
             )
         snapshot, positions = self._monitor.start(message.start_state, message.group_name)
         snapshot = _changed(snapshot, scene_diff, positions)
-        return lambda: self._plan(message, snapshot, positions, is_canceled)
+        return lambda: _noted(
+            snapshot, lambda: self._plan(message, snapshot, positions, is_canceled)
+        )
 
     def prepare_sequence(
         self,
@@ -185,7 +187,9 @@ class PlanningThreads:
             if run.group not in [each.group for each in runs[:number]]:
                 positions = self._begin(run, positions)
         snapshot = _changed(snapshot, scene_diff, positions)
-        return lambda: self._plan_sequence(runs, snapshot, positions, is_canceled)
+        return lambda: _noted(
+            snapshot, lambda: self._plan_sequence(runs, snapshot, positions, is_canceled)
+        )
 
     def _begin(self, run: GroupRun, positions: Array) -> Array:
         """Return all positions with those at which the first item of a group begins."""
@@ -333,6 +337,15 @@ def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> 
         response.planned_trajectories = list(planned.trajectories)
         response.planning_time = planned.planning_time
     return response
+
+
+def _noted(snapshot: SceneSnapshot, plan: Callable[[], PlannedMotion]) -> PlannedMotion:
+    """Plan, and say in the answer what a person should know of the objects of the scene."""
+    try:
+        planned = plan()
+    except PlanningError as error:
+        raise PlanningError(error.code, '; '.join((str(error), *snapshot.notes))) from error
+    return replace(planned, notes=(*planned.notes, *snapshot.notes))
 
 
 def _changed(

@@ -37,7 +37,7 @@ from arm_model.ros import (
 )
 
 from ..exceptions import PlanningCode, PlanningError
-from .geometry import check_mesh, placement, pose_message, pose_of
+from .geometry import check_mesh, placement, pose_message, pose_of, volumes
 from .scene_snapshot import AttachedDetails, ObjectDetails, SceneSnapshot
 
 
@@ -200,7 +200,12 @@ def _details(message: Any) -> ObjectDetails:  # noqa: ANN401
         name: pose_of(each, f'subframe {name!r} of {what}')
         for name, each in zip(message.subframe_names, message.subframe_poses, strict=True)
     }
-    return ObjectDetails(message.type.key, message.type.db, subframes, tuple(message.meshes))
+    solid, whole = (
+        sum(each) for each in zip((0.0, 0.0), *map(volumes, message.meshes), strict=True)
+    )
+    fullness = solid / whole if whole else 1.0
+    meshes = tuple(message.meshes)
+    return ObjectDetails(message.type.key, message.type.db, subframes, meshes, fullness)
 
 
 def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
@@ -208,6 +213,7 @@ def _joined(before: ObjectDetails, added: ObjectDetails) -> ObjectDetails:
         before,
         subframes={**before.subframes, **added.subframes},
         meshes=(*before.meshes, *added.meshes),
+        fullness=min(before.fullness, added.fullness),
     )
 
 

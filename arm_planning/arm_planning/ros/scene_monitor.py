@@ -218,11 +218,15 @@ class SceneMonitor:
 
     def _change(self, source: str, apply: Any, message: Any) -> bool:  # noqa: ANN401
         """Apply a message; a refusal is logged and leaves the scene as it is."""
+        known = self.snapshot.notes
         try:
             self.snapshot = apply(self.snapshot, message, self.positions())
         except PlanningError as error:
             self._node.get_logger().warning(f'{source} refused: {error.code.name}: {error}')
             return False
+        for note in self.snapshot.notes:
+            if note not in known:
+                self._node.get_logger().warning(note)
         self._publish_change()
         for listener in self._listeners:
             listener()

@@ -12,6 +12,9 @@ from arm_model import Array, combined, ORIGIN, PlanningScene, Pose
 
 from ..exceptions import PlanningCode, PlanningError
 
+MIN_FULLNESS = 0.9
+"""Share of its hull that a mesh fills at least without a note."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectDetails:
@@ -22,12 +25,14 @@ class ObjectDetails:
         type_db: Which database.
         subframes: Poses in the object, by name.
         meshes: Its shape_msgs/Mesh, in the order of its meshes: of arm_model they are the hulls.
+        fullness: Volume of its meshes as a share of that of their hulls, which count.
     """
 
     type_key: str = ''
     type_db: str = ''
     subframes: Mapping[str, Pose] = field(default_factory=dict)
     meshes: Sequence[Any] = ()
+    fullness: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,6 +85,17 @@ class SceneSnapshot:
     def root(self) -> str:
         """The link in which objects of the world are."""
         return self.scene.kinematics.root
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What a person should know of objects that count as larger than they are."""
+        return [
+            f'object {name!r} counts as the convex hull of its mesh, of which it fills'
+            f' {100.0 * each.fullness:.0f} %; give it several meshes of convex parts where that'
+            ' refuses too much'
+            for name, each in self.details.items()
+            if each.fullness < MIN_FULLNESS
+        ]
 
     def link_of(self, frame: str) -> tuple[str, Pose]:
         """Return the link that carries a frame, and where the frame is in it.
