@@ -21,6 +21,7 @@ from isolation import reserve
 from moveit_msgs.msg import CollisionObject, PlanningScene
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene
 from processes import executable, RunningProcess
+import psutil
 import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
@@ -59,6 +60,7 @@ class Seen:
     """An arm, its page in a browser, and what it really does.
 
     Attributes:
+        bringup: The programs of the arm.
         browser: The browser.
         url: Of the page.
         page: It, opened once: drawing it without a graphics card costs time.
@@ -68,6 +70,7 @@ class Seen:
         ready: Where all were, which is the state of the SRDF of that name.
     """
 
+    bringup: RunningProcess
     browser: Browser
     url: str
     page: Page
@@ -91,6 +94,14 @@ class Seen:
         if button.is_visible():
             button.click()
             button.wait_for(state='hidden')  # the sliders below it move up
+
+    def type_into(self, slider: int, text: str) -> None:
+        """Type into the number box beside a slider of the open tab, without an end."""
+        box = self.page.locator('input[inputmode=decimal]:visible').nth(slider)
+        box.click()
+        box.press('Control+a')
+        self.page.keyboard.type(text)
+        assert box.input_value() == text
 
     def jog(self, page: Page) -> None:
         """Hold the button that leads back: at its limit the joint would not move."""
@@ -157,7 +168,7 @@ def seen() -> Iterator[Seen]:
             )
             client.spin_until(lambda: bool(states), REACTION, 'joint states')
             with chromium.browser() as browser:
-                yield Seen(browser, url, chromium.open_page(browser, url), client, states)
+                yield Seen(bringup, browser, url, chromium.open_page(browser, url), client, states)
 
 
 def press(page: Page, button: str) -> None:
@@ -269,7 +280,7 @@ def test_stop_of_any_page_ends_a_jog(seen: Seen) -> None:
     seen.jog(page)
     other.locator('#robot-stop').click()
     seen.wait_for_rest()
-    other.get_by_text('received').wait_for()
+    other.get_by_text('stopped', exact=True).wait_for()
     other.close()
     page.mouse.up()
     seen.wait_for_rest()
@@ -298,6 +309,53 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     chromium.drag(page, JOINT1, 0.1)
     seen.wait(seen.moves, 'a motion again')
     page.get_by_text('target: reached').wait_for()
+
+
+def test_a_number_counts_when_it_is_complete(seen: Seen) -> None:
+    """Its first digit is no target; the space bar is STOP also while it is being typed."""
+    page = seen.show(TARGETS)
+    seen.unlock()
+    seen.wait_for_rest()
+    start = seen.position()
+    wanted = 2.5 if start < 0.5 else -2.5
+    seen.type_into(JOINT1, f'{wanted}')
+    seen.wait_for_rest()
+    assert abs(seen.position() - start) < MOVES, 'half a number was sent'
+    page.keyboard.press('Enter')
+    seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
+    page.keyboard.press('Space')
+    page.get_by_text('stopped', exact=True).wait_for()
+    seen.wait_for_rest()
+    assert abs(seen.position() - wanted) > 0.2
+    before = dict(zip(seen.states[-1][1].name, seen.states[-1][1].position, strict=True))
+    seen.unlock()
+    seen.type_into(JOINT1, '0.5')
+    page.keyboard.press('Enter')
+    page.get_by_text('target: reached').wait_for()
+    seen.wait(lambda: abs(seen.position() - 0.5) < 0.01, 'its end')
+    others = set(before) - {'panda_joint1'}
+    assert max(abs(seen.position(joint) - before[joint]) for joint in others) < 0.002
+
+
+def test_a_single_joint_and_the_tool_along_its_own_axes(seen: Seen) -> None:
+    """The other joints stand; the tool goes where it points, which is down."""
+    page = seen.show(JOG)
+    page.get_by_role('tab', name='Single joints').click()
+    before = seen.states[-1][1]
+    chromium.hold(page, '7 −' if seen.position(WRIST) > seen.wrist else '7 +')
+    seen.wait(seen.moves, 'a jog')
+    page.mouse.up()
+    seen.wait_for_rest()
+    for name, position in zip(before.name, before.position, strict=True):
+        assert (abs(seen.position(name) - position) > MOVES) is (name == WRIST), name
+    chromium.picture(page, 'jog-joints')
+    page.get_by_role('tab', name='Tool', exact=True).click()
+    chromium.choose(page, 'Along the axes of', 'panda_link7')
+    chromium.hold(page, '− z')
+    seen.wait(seen.moves, 'a jog')
+    page.mouse.up()
+    seen.wait_for_rest()
+    chromium.picture(page, 'jog-tool')
 
 
 @pytest.mark.parametrize('way', ['asleep', 'elsewhere'])
@@ -339,8 +397,17 @@ def test_stop_is_in_reach_on_a_phone(seen: Seen) -> None:
     assert box is not None
     assert min(box['width'], box['height']) > 48  # [px] what a thumb hits
     page.touchscreen.tap(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
-    page.get_by_text('received').wait_for(timeout=chromium.PAGE_TIMEOUT)
+    page.get_by_text('stopped', exact=True).wait_for(timeout=chromium.PAGE_TIMEOUT)
     page.get_by_role('tab', name='Joints').wait_for(timeout=chromium.PAGE_TIMEOUT)
+    jog = page.get_by_role('tab', name=JOG)
+    jog.tap()
+    page.get_by_role('button', name=TURN, exact=True).wait_for()
+    middle = 'document.elementFromPoint(195, 170).tagName'
+    assert page.evaluate(middle) == 'CANVAS', 'the panel hides the robot'
+    tab = jog.bounding_box()
+    assert tab is not None
+    assert tab['y'] > 200
+    assert box['y'] > 640, 'a thumb holds the phone below'
     chromium.picture(page, 'phone')
     context.close()
 
@@ -356,3 +423,25 @@ def test_a_fault_is_shown_with_its_reason(seen: Seen) -> None:
     page.get_by_role('option', name='/panda_joint3', exact=True).click()
     page.get_by_role('cell', name='Fault', exact=True).wait_for()
     chromium.picture(page, 'fault')
+
+
+def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
+    """Its process hangs: the page says what to do; with a dropdown open, by the space bar."""
+    page = seen.show(DRIVES)
+    page.locator('input:visible').first.click()
+    robot = [
+        child
+        for child in psutil.Process(seen.bringup.pid).children(recursive=True)
+        if any(word.endswith('/motion_node') for word in child.cmdline())
+    ]
+    assert robot
+    for process in robot:
+        process.suspend()
+    try:
+        page.keyboard.press('Space')
+        page.get_by_text('no answer from the robot: use the emergency stop').wait_for()
+        chromium.picture(page, 'no-answer')
+    finally:
+        for process in robot:
+            process.resume()
+    page.get_by_text(re.compile('stopped|NOT confirmed')).first.wait_for()

@@ -20,8 +20,9 @@ from websockets.typing import Origin, Subprotocol
 from robot_viewer.loopback import binding_problem
 from robot_viewer.page import overlay
 from robot_viewer.page.gate import COOKIE, Gate
+from robot_viewer.page.jog_panel import Twist
 from robot_viewer.page.overlay import Overlay, STOP_HEADER, StopAnswer
-from robot_viewer.page.robot_page import RobotPage, Twist, Velocity
+from robot_viewer.page.robot_page import RobotPage, Velocity
 
 TIMEOUT = 10.0  # [s]
 EVERYWHERE = '0.0.0.0'  # noqa: S104  # what is tested is that it is guarded
@@ -46,7 +47,13 @@ class Nothing:
     def call(self, service: str) -> None:
         """Nothing."""
 
-    def jog(self, twist: Twist) -> None:
+    def jog(self, twist: Twist, frame: str) -> None:
+        """Nothing."""
+
+    def jog_joint(self, joint: str, share: float) -> None:
+        """Nothing."""
+
+    def grip(self, gripper: str, *, opens: bool) -> None:
         """Nothing."""
 
     def walk(self, velocity: Velocity) -> None:

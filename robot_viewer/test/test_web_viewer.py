@@ -19,7 +19,7 @@ from geometry_msgs.msg import TwistStamped
 from isolation import Isolation
 import pytest
 import rclpy
-from rclpy.action.server import ActionServer
+from rclpy.action.server import ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -125,6 +125,14 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     state = [True]
     monkeypatch.setattr(RobotPage, 'watched', property(lambda _: state[-1]))
     return state
+
+
+@pytest.fixture
+def said(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Collect what the page says."""
+    texts: list[str] = []
+    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: texts.append(text))
+    return texts
 
 
 @pytest.fixture
@@ -283,18 +291,116 @@ def test_who_does_not_look_takes_no_messages(
 
 
 def test_each_heartbeat_is_one_command(robot: Robot) -> None:
-    """Nothing goes on by itself: a page that is gone moves nothing."""
-    robot.spin_until(lambda: robot.viewer._jogs is not None, 'the servo')
-    publisher = robot.viewer._jogs
-    assert publisher is not None
-    robot.spin_until(lambda: publisher.get_subscription_count() > 0, 'a subscription')
+    """Of the tool, along the axes of the base or of a link, or of one joint.
+
+    Nothing goes on by itself: a page that is gone moves nothing.
+    """
+    kind = import_module('control_msgs.msg').JointJog
+    joint_jogs: list[Any] = []
+    robot.node.create_subscription(kind, 'servo_node/delta_joint_cmds', joint_jogs.append, 10)
+    viewer = robot.viewer
+
+    def connected() -> bool:
+        publishers = viewer._jogs, viewer._joint_jogs
+        return all(each is not None and each.get_subscription_count() for each in publishers)
+
+    robot.spin_until(connected, 'the servo')
     for _ in range(3):
-        robot.viewer.jog(TWIST)
-    robot.spin_until(lambda: len(robot.jogs) == 3, 'jogs')
+        viewer.jog(TWIST, 'link7')
+    viewer.jog_joint('joint1', -0.3)
+    robot.spin_until(lambda: len(robot.jogs) == 3 and bool(joint_jogs), 'jogs')
     assert robot.jogs[0].twist.linear.z == pytest.approx(0.3)
+    assert robot.jogs[0].header.frame_id == 'link7'
     assert robot.jogs[0].header.stamp.sec > 0
+    assert list(joint_jogs[0].joint_names) == ['joint1']
+    assert list(joint_jogs[0].velocities) == [-0.3]
+    assert joint_jogs[0].header.stamp.sec > 0
     robot.spin_times(20)
     assert len(robot.jogs) == 3
+    assert len(joint_jogs) == 1
+
+
+def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -> None:
+    """To the ends of its joint; the single joints that are jogged are those of the arm."""
+    control = import_module('control_msgs.action')
+    goals: list[Any] = []
+    canceled: list[Any] = []
+
+    def begin(handle: Any) -> None:
+        goals.append(handle)
+        if len(goals) < 3:  # the third one goes on
+            handle.execute()
+
+    def execute(handle: Any) -> Any:
+        handle.succeed()
+        return control.GripperCommand.Result(position=2.0, reached_goal=True)
+
+    def cancel(handle: Any) -> CancelResponse:
+        canceled.append(handle)
+        return CancelResponse.ACCEPT
+
+    ActionServer(
+        robot.node,
+        control.GripperCommand,
+        'hand/gripper_cmd',
+        execute,
+        handle_accepted_callback=begin,
+        cancel_callback=cancel,
+    )
+    joint_jog = import_module('control_msgs.msg').JointJog
+    robot.node.create_subscription(joint_jog, 'servo_node/delta_joint_cmds', print, 10)
+    state = state_message()
+    state.joint_names, state.feedback.positions = ['b'], [0.0]
+    state.reference.positions = [0.0]
+    states = robot.node.create_publisher(type(state), 'hand/controller_state', 10)
+    robot.description.publish(String(data=TWO_SLIDERS))
+
+    def found() -> bool:
+        states.publish(state)
+        jogged = robot.viewer.page._jogged
+        return jogged is not None and jogged[1].grippers == ('/hand',)
+
+    robot.spin_until(found, 'the gripper')
+    jogged = robot.viewer.page._jogged
+    assert jogged is not None
+    assert jogged[1].joints == ('a',)
+    client = robot.viewer._grippers._found['/hand'].client
+    robot.spin_until(client.server_is_ready, 'its action')
+    for opens, end, word in ((True, 2.0, 'open'), (False, -2.0, 'close')):
+        robot.viewer.grip('/hand', opens=opens)
+        robot.spin_until(lambda word=word: f'/hand: {word}: done, at 2.0000' in said, 'the end')
+        assert goals[-1].request.command.position == end
+    robot.viewer.grip('/hand', opens=True)
+    robot.spin_until(lambda: len(goals) == 3, 'a goal')
+    robot.viewer.stop()
+    robot.spin_until(lambda: bool(canceled), 'its end')
+
+
+def test_the_page_keeps_what_the_robot_warns_of(robot: Robot) -> None:
+    """As /rosout has it, the last first and once each; notes are left out, and other robots."""
+    logger = robot.node.get_logger()
+    robot.spin_until(lambda: robot.node.count_subscribers('/rosout') > 0, 'the page')
+    page = robot.viewer.page
+
+    def warned() -> bool:
+        logger.warning('joint1: near its <limit>')
+        return 'near its &lt;limit&gt;' in page._log.html
+
+    def failed() -> bool:
+        logger.error('joint1: stalled')
+        return 'joint1: stalled' in page._log.html
+
+    logger.info('a note')
+    robot.spin_until(warned, 'the warning')
+    robot.spin_until(failed, 'the error')
+    assert page._log.html.index('stalled') < page._log.html.index('near its')
+    assert page._log.html.count('near its') == 1
+    assert '<b>/robot</b>' in page._log.html
+    assert 'a note' not in page._log.html
+    page.say('target: reached')
+    robot.spin_until(
+        lambda: page._log_html is not None and 'target: reached' in page._log_html.content, 'it'
+    )
 
 
 def test_sliders_publish_where_nobody_else_does(robot: Robot) -> None:
@@ -404,12 +510,8 @@ def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
         robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
 
 
-def test_nothing_that_the_robot_sends_ends_the_page(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_that_the_robot_sends_ends_the_page(robot: Robot, said: list[str]) -> None:
     """What cannot be shown is said once, in the log and on the page; STOP works all the same."""
-    said: list[str] = []
-    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: said.append(text))
     statuses = robot.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
     odd = DiagnosticStatus(name='odd', level=b'\x09', message='a level of nobody')
 
@@ -435,11 +537,9 @@ def test_nothing_that_the_robot_sends_ends_the_page(
     [('control_msgs', 'targets are not offered'), ('moveit_msgs', 'planning is not offered')],
 )
 def test_messages_that_are_not_installed_here_leave_the_rest(
-    robot: Robot, monkeypatch: pytest.MonkeyPatch, package: str, what: str
+    robot: Robot, said: list[str], monkeypatch: pytest.MonkeyPatch, package: str, what: str
 ) -> None:
     """Another computer offers what has them; it is said once, with the package."""
-    said: list[str] = []
-    monkeypatch.setattr(robot.viewer.page, 'say', lambda text, **_: said.append(text))
     state = state_message()
     moveit = import_module('moveit_msgs.action')
     for module in ('msg', 'action', 'srv'):

@@ -17,10 +17,11 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist as TwistMessage
 from geometry_msgs.msg import TwistStamped
+from rcl_interfaces.msg import Log
 from rclpy.client import Client
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.publisher import Publisher
-from rclpy.qos import qos_profile_sensor_data, QoSProfile
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -38,13 +39,15 @@ from node_runner import (
 )
 
 from ..loopback import binding_problem
+from ..page.jog_panel import Twist
 from ..page.overlay import StopAnswer
-from ..page.robot_page import RobotPage, STALE, Status, Twist, Velocity
+from ..page.robot_page import RobotPage, STALE, Status, Velocity
 from ..page.robot_scene import greatest_velocities
 from ..robots import of_robot, SET_MODE_TYPE, stops_robot
 from .body import Body
 from .controllers import Controllers
 from .first_motion import FirstMotion
+from .grippers import Grippers
 from .listening import Listening
 from .motion_planning import MotionPlanning
 from .serving import Border, serve
@@ -72,6 +75,10 @@ DRIVE_SERVICES = (
 )
 """Services of a drive that the page offers; a node with halt and quick_stop is one."""
 WALKING_MODES = ('stand', 'walk', 'turn', 'lie', 'relax', 'get_up')
+WARN = 30
+"""Level of warnings in rcl_interfaces/Log."""
+ROSOUT = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""It gets what was said in the seconds before the page was opened."""
 TRIGGER = 'std_srvs/srv/Trigger'
 STOP = 'stop'
 """Service of a robot that stops all of it."""
@@ -118,12 +125,15 @@ class WebViewer(Node):
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
+        self._independent: Sequence[str] = ()
         self._listening = Listening(self)
         self._controllers = Controllers(
             self, self._listening, lambda text, failed: self.page.say(text, failed=failed)
         )
+        self._grippers = Grippers(self, lambda text, failed: self.page.say(text, failed=failed))
         self._base = self._shown_base = Transform()
         self._jogs: Publisher | None = None
+        self._joint_jogs: Publisher | None = None
         self._walks: Publisher | None = None
         self._joint_states: Publisher | None = None
         self.page = RobotPage(host, port, self)
@@ -138,6 +148,7 @@ class WebViewer(Node):
         self._listening.add(JointState, 'joint_states', self._take_joints, sensor)
         self._listening.add(TFMessage, '/tf', self._take_transforms, sensor)
         self._listening.add(DiagnosticArray, 'diagnostics', self._take_statuses, 10)
+        self._listening.add(Log, '/rosout', self._take_log, ROSOUT)
         self.create_timer(DRAW_PERIOD, self._serve_page)
         self.create_timer(LIST_PERIOD, self._list)
         self.create_timer(GRAPH_PERIOD, self._look_around)
@@ -152,6 +163,8 @@ class WebViewer(Node):
     def _show(self, tree: KinematicTree) -> None:
         self._root, self._drawn = tree.root, {}
         self._velocities = greatest_velocities(tree)
+        self._independent = [joint.name for joint in tree.joints if joint.independent]
+        self._grippers.describe(tree)
         notes = self.page.show_robot(tree)
         self._planning.describe(tree)
         self._first_motion.describe(tree)
@@ -179,6 +192,16 @@ class WebViewer(Node):
             level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
             values = {each.key: each.value for each in status.values}
             self._statuses[status.name] = Status(status.name, level, status.message, values)
+
+    def _take_log(self, message: Log) -> None:
+        """Keep the warnings and errors of other nodes of the robot."""
+        who = message.name.replace('.', '/')  # a logger has the full name of its node
+        within = self.get_namespace().strip('/')
+        inside = not within or who.startswith(f'{within}/')
+        own = who == self.get_fully_qualified_name().strip('/')
+        if message.level >= WARN and inside and not own:
+            at = message.stamp.sec + message.stamp.nanosec * 1e-9
+            self.page.log(at, f'/{who}', message.msg, failed=message.level > WARN)
 
     def _serve_page(self) -> None:
         while self._orders:
@@ -208,6 +231,7 @@ class WebViewer(Node):
             return
         now, received_at = time.monotonic(), self._received_at
         age = None if received_at is None else now - received_at
+        self.page.list_log()
         self.page.list_joints(self._positions, 0.0 if self._own else age)
         silent = now - self._listens_since if age is None else age
         self.page.show_silence(silent if self._robot_publishes else None)
@@ -228,10 +252,14 @@ class WebViewer(Node):
             self._find_drives({name for name, kinds in services.items() if TRIGGER in kinds})
         with around('the first motion is not offered'):
             self._first_motion.look(services, self._drives)
-        with around('jogging is not offered'):
-            self._find_jogging()
         with around('targets are not offered'):
             self._find_controllers()
+        with around('grippers are not offered'):
+            self._grippers.look(services, self._controllers.found)
+        with around('single joints are not jogged'):
+            self._find_joint_jogging()
+        with around('jogging is not offered'):
+            self._find_jogging()
         with around('walking is not offered'):
             self._find_walking(services)
         with around('planning is not offered'):
@@ -273,7 +301,17 @@ class WebViewer(Node):
         topic = 'servo_node/delta_twist_cmds'
         if self._jogs is None and self.count_subscribers(topic):
             self._jogs = self.create_publisher(TwistStamped, topic, QoSProfile(depth=1))
-            self.page.offer_jog()
+        if self._jogs is not None:
+            others = self._grippers.joints
+            joints = [] if self._joint_jogs is None else self._independent
+            arm = [joint for joint in joints if joint not in others]
+            self.page.offer_jog(arm, self._grippers.names)
+
+    def _find_joint_jogging(self) -> None:
+        topic = 'servo_node/delta_joint_cmds'
+        if self._joint_jogs is None and self.count_subscribers(topic):
+            kind = import_module('control_msgs.msg').JointJog
+            self._joint_jogs = self.create_publisher(kind, topic, QoSProfile(depth=1))
 
     def _find_walking(self, services: Mapping[str, Sequence[str]]) -> None:
         name = self.resolve_service_name('set_mode')
@@ -295,15 +333,29 @@ class WebViewer(Node):
         """Call a Trigger service."""
         self._order(partial(self._call, service))
 
-    def jog(self, twist: Twist) -> None:
+    def jog(self, twist: Twist, frame: str = '') -> None:
         """Publish a jog once, at once; the robot's time-out ends it."""
         if self._jogs is None:
             return
         message = TwistStamped()
         message.header.stamp = self.get_clock().now().to_msg()
+        message.header.frame_id = f'{self._prefix}{frame}' if frame else ''
         linear, angular = message.twist.linear, message.twist.angular
         linear.x, linear.y, linear.z, angular.x, angular.y, angular.z = twist
         self._jogs.publish(message)
+
+    def jog_joint(self, joint: str, share: float) -> None:
+        """Publish a jog of a joint once, at once; the robot's time-out ends it."""
+        if self._joint_jogs is None:
+            return
+        kind: Any = self._joint_jogs.msg_type
+        message = kind(joint_names=[joint], velocities=[share])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._joint_jogs.publish(message)
+
+    def grip(self, gripper: str, *, opens: bool) -> None:
+        """Open or close a gripper."""
+        self._order(partial(self._grippers.grip, gripper, opens=opens))
 
     def walk(self, velocity: Velocity) -> None:
         """Publish a velocity once, at once; the robot's time-out ends it."""
@@ -331,9 +383,9 @@ class WebViewer(Node):
     def _stop(self, answer: concurrent.futures.Future[StopAnswer]) -> None:
         calls = {service: self._call(service) for service in sorted(self._stops)}
         called = {service for service, call in calls.items() if call is not None}
-        for stop in (self._controllers.stop, self._first_motion.stop, self._planning.stop):
+        for part in (self._controllers, self._grippers, self._first_motion, self._planning):
             with self.border.around('STOP'):
-                stop()
+                part.stop()
         try:
             doubtful = self._doubtful_stops(called)
         except Exception as error:  # noqa: BLE001  # whatever it is, the drives are halted

@@ -19,6 +19,7 @@ from viser import (
 )
 
 from .standing import Contacts, Support
+from .style import NEUTRAL, WANTED
 from .target_panel import UNLOCK
 
 RANGES: Mapping[str, float] = {'Roll [rad]': 0.35, 'Pitch [rad]': 0.3, 'Height [m]': 0.03}
@@ -52,7 +53,7 @@ class BodyPanel:
         self._folder = gui.add_folder(None)
         with self._folder:
             self._html: GuiHtmlHandle = gui.add_html('')
-            self._unlock = gui.add_button(UNLOCK, color='orange', visible=False)
+            self._unlock = gui.add_button(UNLOCK, color=WANTED, visible=False)
         self._unlock.on_click(lambda _: self._set_locked(locked=False))
         self._sliders: list[GuiSliderHandle[float]] = []
         self._feet: dict[str, IcosphereHandle] = {}
@@ -86,7 +87,7 @@ class BodyPanel:
                 slider = gui.add_slider(label, -most, most, most / 100.0, 0.0)
                 slider.on_update(moved)
                 self._sliders.append(slider)
-            gui.add_button('Level').on_click(lambda _: level())
+            gui.add_button('Level', color=NEUTRAL).on_click(lambda _: level())
 
     def remove(self) -> None:
         """Take all of it off the page."""

@@ -14,6 +14,7 @@ from viser import GuiButtonHandle, GuiDropdownHandle, GuiHtmlHandle, GuiNumberHa
 from first_motion import Cause, FASTEST, FURTHEST, JointKind, Judgement, MotionGuard
 
 from .first_motion import MotionRequest, Saw
+from .style import CAUTION, NEUTRAL, WANTED
 
 DISTANCE = 1.0
 """In the unit of people, degrees or millimetres."""
@@ -85,19 +86,19 @@ class FirstMotionPanel:
             self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
             self._distance: GuiNumberHandle[float] = gui.add_number('Distance', DISTANCE, step=0.1)
             self._speed: GuiNumberHandle[float] = gui.add_number('Speed', SPEEDS[self._kind])
-            self._prepare = gui.add_button('Enable and prepare')
+            self._prepare = gui.add_button('Enable and prepare', color=WANTED)
             self._state: GuiHtmlHandle = gui.add_html('')
             self._place_of_hold = gui.add_html('')
-            self._enough = gui.add_button('That is enough')
+            self._enough = gui.add_button('That is enough', color=NEUTRAL)
             self._saw: GuiDropdownHandle[str] = gui.add_dropdown(
                 'What you saw', tuple(each.value for each in Saw)
             )
             self._far: GuiNumberHandle[float] = gui.add_number('How far', DISTANCE, step=0.01)
-            self._conclude = gui.add_button('Conclude')
+            self._conclude = gui.add_button('Conclude', color=NEUTRAL)
             self._verdict: GuiHtmlHandle = gui.add_html('')
             self._cause: GuiDropdownHandle[str] = gui.add_dropdown('Cause', (CHOOSE,))
             self._lines = gui.add_markdown('')
-            self._write = gui.add_button('Write it into bus.yml', color='orange')
+            self._write = gui.add_button('Write it into bus.yml', color=CAUTION)
             self._note: GuiHtmlHandle = gui.add_html('')
         self._joint.on_update(lambda _: self._select())
         self._prepare.on_click(lambda _: self._ask())

@@ -45,6 +45,7 @@ from .motion_plan import (
 )
 from .robot_scene import put, RobotScene, Tint
 from .scene_objects import SceneObjects
+from .style import Color, NEUTRAL, WANTED
 
 GHOST_TINT: Tint = (0.91, 0.35, 0.05, 0.45)
 LINE_COLOR = (232, 89, 12)
@@ -92,7 +93,7 @@ class PlanPanel:
             self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), ChooseGoal)
             self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
             self._button('Plan', lambda: Plan(self._speed.value / 100.0))
-            self._execute = self._button('Execute', Execute)
+            self._execute = self._button('Execute', Execute, WANTED)
             self._again = self._button('Show again', ShowAgain)
             self._outcome: GuiHtmlHandle = gui.add_html('')
             self._object = self._dropdown('Object', (NO_OBJECT,), ChooseObject)
@@ -278,8 +279,10 @@ class PlanPanel:
         if event.client_id is not None:  # or it was set here
             self._ask(request(event.target.value))
 
-    def _button(self, label: str, request: Callable[[], PlanRequest]) -> GuiButtonHandle:
-        button = self._server.gui.add_button(label)
+    def _button(
+        self, label: str, request: Callable[[], PlanRequest], color: Color = NEUTRAL
+    ) -> GuiButtonHandle:
+        button = self._server.gui.add_button(label, color=color)
         button.on_click(lambda _: self._ask(request()))
         return button
 

@@ -36,30 +36,16 @@ from .deadman import Deadman, HEARTBEAT
 from .drive_table import drive_html
 from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
+from .jog_panel import JogActions, Jogged, JogPanel
+from .log import Log
 from .motion_plan import PlanRequest
 from .overlay import Overlay, StopAnswer
 from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
+from .style import CAUTION, NEUTRAL, THREE_COLUMNS, WANTED
 from .target_panel import PlotPanel, TargetPanel
 
-Twist: TypeAlias = tuple[float, float, float, float, float, float]
 Velocity: TypeAlias = tuple[float, float, float]
-
-TWISTS: Mapping[str, Twist] = {
-    '+ x': (1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    '− x': (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    '+ y': (0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-    '− y': (0.0, -1.0, 0.0, 0.0, 0.0, 0.0),
-    '+ z': (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
-    '− z': (0.0, 0.0, -1.0, 0.0, 0.0, 0.0),
-    '+ about x': (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-    '− about x': (0.0, 0.0, 0.0, -1.0, 0.0, 0.0),
-    '+ about y': (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
-    '− about y': (0.0, 0.0, 0.0, 0.0, -1.0, 0.0),
-    '+ about z': (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-    '− about z': (0.0, 0.0, 0.0, 0.0, 0.0, -1.0),
-}
-"""Shares of the speed of jogging, along and about the axes of the base."""
 
 SILENCE = 1.0
 """Without joint states after which the robot counts as out of reach in [s]."""
@@ -67,7 +53,6 @@ SILENT = (
     'nothing from the robot for {:.0f} s: is the link cut, or has it ended? What is held here '
     'stops by itself; STOP may not reach the rest: use the emergency stop'
 )
-REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 WALKS: Mapping[str, Velocity] = {
     'forward': (0.3, 0.0, 0.0),
     'back': (-0.3, 0.0, 0.0),
@@ -80,6 +65,24 @@ WALKS: Mapping[str, Velocity] = {
 
 COLORS = ('#2f9e44', '#e8a400', '#e03131', '#868e96')
 """Of the levels of a status: good, warning, error, stale."""
+DRIVE_GROUPS: Mapping[str, tuple[str, ...]] = {
+    '': ('enable', 'recover', 'halt'),
+    'Mode': (
+        'cyclic_position_mode',
+        'interpolated_position_mode',
+        'position_mode',
+        'velocity_mode',
+    ),
+    'Seldom needed': ('init', 'home', 'quick_stop', 'disable'),
+}
+"""Services of a drive by what they are for; what has a title is folded."""
+BUTTON_COLORS = {
+    'enable': WANTED,
+    'home': CAUTION,
+    'quick_stop': CAUTION,
+    'disable': CAUTION,
+    'relax': CAUTION,
+}
 STALE = 3
 WORST = (2, STALE, 1, 0)
 """Levels of a status, the worst first."""
@@ -102,7 +105,7 @@ class Status:
     values: Mapping[str, str] = field(default_factory=dict)
 
 
-class Actions(Protocol):
+class Actions(JogActions, Protocol):
     """What a page may have done; any thread may call it, and none of it waits."""
 
     def stop(self) -> Future[StopAnswer]:
@@ -110,9 +113,6 @@ class Actions(Protocol):
 
     def call(self, service: str) -> None:
         """Call a Trigger service."""
-
-    def jog(self, twist: Twist) -> None:
-        """Command a share of the speed of jogging once, -1 to 1."""
 
     def walk(self, velocity: Velocity) -> None:
         """Command a velocity in [m/s] and [rad/s] once."""
@@ -152,7 +152,7 @@ class RobotPage:
             self.url += f'/?token={gate.token}'
         self._scene: RobotScene | None = None
         gui = self._server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=WANTED)
         gui.main_panel.dock_right()
         self._server.scene.set_up_direction('+z')
         self._ground = Ground(self._server.scene)
@@ -174,6 +174,10 @@ class RobotPage:
         self._plan: PlanPanel | None = None
         self._body: BodyPanel | None = None
         self._first_motion: FirstMotionPanel | None = None
+        self._jog: JogPanel | None = None
+        self._jogged: tuple[KinematicTree, Jogged] | None = None
+        self._log = Log()
+        self._log_html: GuiHtmlHandle | None = None
         self._tree: KinematicTree | None = None
 
     @property
@@ -227,6 +231,8 @@ class RobotPage:
             if name in positions
         ]
         self._joints.content = _table(rows) + (_line(old, COLORS[1]) if old else '')
+        if self._jog is not None:
+            self._jog.show(positions if age is not None and age < SILENCE else {})
 
     def show_silence(self, age: float | None) -> None:
         """Say it in front of everything when nothing is received from the robot any more.
@@ -290,10 +296,21 @@ class RobotPage:
         with self._drive_panel:
             self._drive = drive = gui.add_dropdown('Drive', ('all', *services))
             self._drive_state = gui.add_html('')
-            verbs = dict.fromkeys(verb for each in services.values() for verb in each)
-            for verb in verbs:
-                button = gui.add_button(verb.replace('_', ' '))
-                button.on_click(partial(self._call, found, drive, verb))
+            verbs = {verb for each in services.values() for verb in each}
+            for title, group in DRIVE_GROUPS.items():
+                offered = [verb for verb in group if verb in verbs]
+                if offered:
+                    with gui.add_folder(title or None, expand_by_default=not title):
+                        gui.add_html(THREE_COLUMNS)
+                        for verb in offered:
+                            self._add_verb(verb, found, drive)
+
+    def _add_verb(
+        self, verb: str, found: Mapping[str, Sequence[str]], drive: GuiDropdownHandle[str]
+    ) -> None:
+        label, color = verb.replace('_', ' '), BUTTON_COLORS.get(verb, NEUTRAL)
+        button = self._server.gui.add_button(label, color=color)
+        button.on_click(partial(self._call, found, drive, verb))
 
     def _show_drive(self, statuses: Sequence[Status]) -> None:
         """Show what the chosen drive reports; of all drives those that are not well."""
@@ -378,24 +395,31 @@ class RobotPage:
             self._first_motion = FirstMotionPanel(self._server, joints, actions, self._held)
         return self._first_motion
 
-    def offer_jog(self) -> None:
-        """Offer to jog the tool as long as a button is held."""
-        if not self._offer('Jog'):
+    def offer_jog(self, joints: Sequence[str], grippers: Sequence[str]) -> None:
+        """Offer to jog the tool and joints as long as a button is held, and to move grippers.
+
+        Args:
+            joints: Those that are jogged, from the base on.
+            grippers: Names of their controllers.
+        """
+        jogged = Jogged(tuple(joints), tuple(grippers), self._actions)
+        if self._tree is None or (self._tree, jogged) == self._jogged:
             return
+        if self._jog is not None:
+            self._jog.remove()
         with self._tab('Jog'):
-            speed = self._speed()
-            for title, twist in TWISTS.items():
-                self._held(
-                    title, partial(self._jog, speed, twist), partial(self._actions.jog, REST)
-                )
+            self._jog = JogPanel(self._server, self._tree, jogged, self._held)
+        self._jogged = self._tree, jogged
 
     def offer_walk(self, modes: Collection[str]) -> None:
         """Offer to walk as long as a button is held, and the modes of the robot."""
         if not self._offer('Walk'):
             return
         with self._tab('Walk'):
+            self._server.gui.add_html(THREE_COLUMNS)
             for mode in modes:
-                button = self._server.gui.add_button(mode)
+                color = BUTTON_COLORS.get(mode, NEUTRAL)
+                button = self._server.gui.add_button(mode, color=color)
                 button.on_click(partial(self._request, mode))
             speed = self._speed()
             rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
@@ -412,7 +436,28 @@ class RobotPage:
 
     def say(self, text: str, *, failed: bool = False) -> None:
         """Show what became of the last request."""
-        self._answer.content = _line(text, COLORS[2] if failed else COLORS[0])
+        color = COLORS[2] if failed else COLORS[0]
+        self._answer.content = _line(text, color)
+        self._log.add(time.time(), 'page', text, color)
+
+    def log(self, at: float, who: str, text: str, *, failed: bool) -> None:
+        """Keep what a node of the robot said.
+
+        Args:
+            at: Its time in [s] since the epoch.
+            who: The node.
+            text: What it said.
+            failed: It is an error, else a warning.
+        """
+        self._log.add(at, who, text, COLORS[2 if failed else 1])
+
+    def list_log(self) -> None:
+        """Show what was said."""
+        if self._log_html is None:
+            with self._tab('Log'):
+                self._log_html = self._server.gui.add_html('')
+        if self._log_html.content != self._log.html:
+            self._log_html.content = self._log.html
 
     def _offer(self, what: str) -> bool:
         """Whether something is offered for the first time; it stays as it was then."""
@@ -442,14 +487,10 @@ class RobotPage:
             if self._deadman.release(event.client_id, which, time.monotonic()):
                 rest()
 
-        button = self._server.gui.add_button(label, hint='hold it')
+        button = self._server.gui.add_button(label, color=NEUTRAL)
         button.on_hold(beat, 1.0 / HEARTBEAT)
         button.on_click(release)  # a click ends where the button is let go
         return button
-
-    def _jog(self, speed: GuiSliderHandle[float], twist: Twist) -> None:
-        x, y, z, a, b, c = (speed.value / 100.0 * part for part in twist)
-        self._actions.jog((x, y, z, a, b, c))
 
     def _walk(self, speed: GuiSliderHandle[float], velocity: Velocity) -> None:
         x, y, turn = (speed.value / 100.0 * part for part in velocity)

@@ -21,6 +21,7 @@ from viser import (
 
 from .aim import History, KEPT
 from .robot_scene import travel
+from .style import WANTED
 
 UNTOUCHED = 1.0
 """Time in [s] after which a slider follows its joint again."""
@@ -52,7 +53,7 @@ class TargetPanel:
         self._touched = 0.0
         gui = server.gui
         gui.add_markdown('Moves to where a slider is put; STOP ends it.')
-        self._unlock = gui.add_button(UNLOCK, color='orange', visible=False)
+        self._unlock = gui.add_button(UNLOCK, color=WANTED, visible=False)
         self._unlock.on_click(lambda _: self._set_locked(locked=False))
         self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 20.0)
         self._sliders: dict[str, GuiSliderHandle[float]] = {}

@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Grippers of a robot, opened and closed by their actions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from rclpy.action.client import ActionClient
+from rclpy.node import Node
+from urdf_reader import KinematicTree
+
+from ..page.robot_scene import travel
+from .action_call import ActionCall
+from .controllers import Controller, Report
+
+SEND_GOAL = '/_action/send_goal'
+SINGLE_TYPE = 'control_msgs/action/GripperCommand_SendGoal'
+"""Of grippers of one joint."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Gripper:
+    client: ActionClient
+    joint: str
+
+
+class Grippers:
+    """Those of the robot of a node; everything in the thread of the node."""
+
+    def __init__(self, node: Node, report: Report) -> None:
+        """Find none yet.
+
+        Args:
+            node: The node of the page.
+            report: Reports to people what became of a motion.
+        """
+        self._node, self._report = node, report
+        self._found: dict[str, _Gripper] = {}
+        self._calls: dict[str, ActionCall] = {}
+        self._ends: Mapping[str, tuple[float, float]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of their controllers."""
+        return tuple(self._found)
+
+    @property
+    def joints(self) -> frozenset[str]:
+        """The joints that they move."""
+        return frozenset(each.joint for each in self._found.values())
+
+    def describe(self, tree: KinematicTree) -> None:
+        """Take another robot."""
+        self._ends = {joint.name: travel(joint) for joint in tree.movable()}
+        for name in [n for n, each in self._found.items() if each.joint not in self._ends]:
+            self._found.pop(name).client.destroy()
+
+    def look(
+        self, services: Mapping[str, Sequence[str]], controllers: Mapping[str, Controller]
+    ) -> None:
+        """Find those of one joint.
+
+        Args:
+            services: All services with their types.
+            controllers: Controllers of the robot, by the full name.
+        """
+        for service, kinds in services.items():
+            action = service.removesuffix(SEND_GOAL)
+            name = action.rpartition('/')[0]
+            controller = controllers.get(name)
+            if (
+                SINGLE_TYPE in kinds
+                and name not in self._found
+                and controller is not None
+                and len(controller.joints) == 1
+                and controller.joints[0] in self._ends
+            ):
+                kind = import_module('control_msgs.action').GripperCommand
+                client = ActionClient(self._node, kind, action)
+                self._found[name] = _Gripper(client, controller.joints[0])
+
+    def grip(self, name: str, *, opens: bool) -> None:
+        """Open or close one: to the greatest or the least position of its joint.
+
+        Args:
+            name: Full name of its controller.
+            opens: Open it.
+        """
+        gripper = self._found.get(name)
+        what = f'{name}: {"open" if opens else "close"}'
+        if gripper is None or not gripper.client.server_is_ready():
+            self._report(f'{what}: its action is not there', True)
+            return
+        goal = import_module('control_msgs.action').GripperCommand.Goal()
+        goal.command.position = self._ends[gripper.joint][opens]
+        self._calls[name] = ActionCall(gripper.client, goal, partial(self._done, what))
+
+    def stop(self) -> None:
+        """Cancel what is on its way."""
+        for call in self._calls.values():
+            call.cancel()
+        self._calls.clear()
+
+    def _done(self, what: str, result: Any, why: str) -> None:  # noqa: ANN401
+        if why:
+            self._report(f'{what}: {why}', True)
+            return
+        arrived = bool(result.reached_goal)
+        how = 'done' if arrived else 'stalled: it holds something' if result.stalled else 'ended'
+        self._report(f'{what}: {how}, at {result.position:.4f}', not (arrived or result.stalled))
