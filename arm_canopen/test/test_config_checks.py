@@ -316,13 +316,6 @@ WARNINGS = {
         '0x6081:00 is written again in line 18 with another value',
         'keep one',
     ),
-    'emergencies elsewhere': Case(
-        '    node_id: 2\n',
-        f'    node_id: 2\n    sdo: [{{index: 0x1014, value: 0x90}}] {HERE}\n',
-        'nodes.joint1.sdo[0]',
-        'have COB-ID 0x090 .0x1014., the master listens at 0x082',
-        'write 0x82',
-    ),
 }
 
 ERRORS = {

@@ -9,11 +9,11 @@ from collections.abc import Callable, Mapping
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model.factor_group import FactorGroup
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.device_profile import is_drive
+from arm_canopen.standard.device_profile import drive_axes, is_drive
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.lss import UNCONFIGURED
 from arm_canopen.standard.nmt import NmtCommand, NmtState
-from arm_canopen.standard.objects import AXES_MAX, AXIS_OFFSET, Index
+from arm_canopen.standard.objects import AXIS_OFFSET
 from arm_canopen.standard.sdo import Abort
 
 from .drive.drive import Drive
@@ -110,7 +110,7 @@ class Device:
         self._parts = self._powered_parts
 
     def _build_drives(self, servo: ServoModel, rate_units: RateUnits) -> tuple[Drive, ...]:
-        shared = SharedErrors(self._errors)
+        shared, dictionary = SharedErrors(self._errors), self.store.dictionary
         return tuple(
             Drive(
                 self.store,
@@ -120,9 +120,7 @@ class Device:
                 number=axis,
                 rate_units=rate_units.get(axis) or self._own_rate_units(axis),
             )
-            for axis in range(AXES_MAX)
-            if is_drive(self.store.dictionary)
-            and (Index.CONTROLWORD + axis * AXIS_OFFSET, 0) in self.store
+            for axis in (drive_axes(dictionary) if is_drive(dictionary) else ())
         )
 
     def _own_rate_units(self, axis: int) -> tuple[float, float]:

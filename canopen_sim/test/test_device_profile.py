@@ -192,7 +192,7 @@ def test_pieces_cover_the_time(
         for point, duration in motion.pieces(begin, end):
             assert duration > 0.0
             assert point.position == pytest.approx(
-                motion.at(time).position, abs=1e-6 * (1.0 + abs(point.velocity))
+                motion.at(time).position, abs=1e-6 * (1.0 + abs(start.velocity))
             )
             time += duration
         assert time == pytest.approx(end)

@@ -112,8 +112,8 @@ def test_refusals_are_reported() -> None:
     for node_id in (0, 128, 254):
         with pytest.raises(LssError, match=f'{node_id} is no node id'):
             network.run(master.set_node_id(node_id))
-    with pytest.raises(LssError, match='100 kbit/s is no bit rate of LSS; take 1000, 800, 500'):
-        network.run(master.set_bit_rate(100_000))
+    with pytest.raises(LssError, match='300 kbit/s is no bit rate of LSS; take 1000, 800, 500'):
+        network.run(master.set_bit_rate(300_000))
     for bit_rate in BIT_RATES.values():
         network.run(master.set_bit_rate(bit_rate))
 

@@ -129,16 +129,17 @@ def test_the_only_device_is_not_one_of_two(
     assert set(states(runner)) == {LssState.WAITING}
 
 
+@pytest.mark.parametrize('bitrate', ['500000', '100000'])
 def test_the_bit_rate_is_activated(
-    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str]
+    name: str, runner: DeviceRunner, capsys: pytest.CaptureFixture[str], bitrate: str
 ) -> None:
     """The delay goes out, and nothing after it at the old bit rate."""
     with open_bus(name) as witness:
-        options = ['--bitrate', '500000', '--store', '--activate', '0.2']
+        options = ['--bitrate', bitrate, '--store', '--activate', '0.2']
         assert main(['lss', 'set', *ADDRESS, *options, '--can', name]) == 0
         requests = [f.data for f in witness.receive(0.0) if f.can_id == 0x7E5]
     assert requests[-1] == bytes.fromhex('15C8000000000000')
-    assert 'bitrate 500000' in capsys.readouterr().err
+    assert f'bitrate {bitrate}' in capsys.readouterr().err
     assert LssState.CONFIGURATION in states(runner)
 
 
@@ -146,7 +147,7 @@ def test_the_bit_rate_is_activated(
     ('arguments', 'message'),
     [
         (['set'], 'nothing to set'),
-        (['set', '--bitrate', '100k'], 'LSS has no bit rate 100k; take 1000k, 800k, 500k'),
+        (['set', '--bitrate', '300k'], 'LSS has no bit rate 300k; take 1000k, 800k, 500k'),
         (['set', '--node-id', '3', '--activate', '1'], '--activate needs --bitrate'),
         (['inquire'], 'one of the arguments --address --only is required'),
         (['set', '--node-id', '128'], '128 is no node id'),

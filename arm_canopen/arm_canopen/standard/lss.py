@@ -20,11 +20,17 @@ BIT_RATES: dict[int, int] = {
     2: 500_000,
     3: 250_000,
     4: 125_000,
+    5: 100_000,
     6: 50_000,
     7: 20_000,
     8: 10_000,
 }
-"""Bit rates in [bit/s] by their index in the standard table (CiA 301, table 1)."""
+"""Bit rates in [bit/s] by their index in the standard table (CiA 301, table 1).
+
+Newer issues of CiA 305 reserve index 5; a device that does not have it refuses it.
+"""
+BIT_RATES_KBIT = tuple(sorted(rate // 1000 for rate in BIT_RATES.values()))
+"""The same in [kbit/s], as bus.yml and EDS files (``BaudRate_...``) name them."""
 STANDARD_TABLE = 0  # the table selector of BIT_RATES
 
 WHOLE_NUMBER = 0x80  # BitCheck of fast scan: all unconfigured devices answer, and begin anew

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
-from drive_samples import bus_config, drive_config, pdo, PERIOD
+from drive_samples import bus_config, drive_config, pdo, PERIOD, sdo_write
 import pytest
 from virtual_network import FRAME_TIME, VirtualNetwork
 
@@ -17,6 +17,7 @@ from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.network import NEVER, UPDATE_SHARE
 from arm_canopen.master.status import node_status
 from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
+from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 
@@ -123,6 +124,20 @@ def test_the_status_has_the_age_of_the_heartbeat() -> None:
     assert 0.0 <= age <= 0.1 + PERIOD
     later = node_status(node, net.now + 0.2).heartbeat_age
     assert later == pytest.approx(age + 0.2)
+
+
+def test_an_emergency_comes_with_the_identifier_that_bus_yml_has_written() -> None:
+    """The device sends it as 0x1014 says, and there the master listens, not at the usual one."""
+    config = drive_config('a', 2)
+    changed = (sdo_write(0x1014, 0, value) for value in (0x8000_0082, 0x90))  # off, then elsewhere
+    writes = (*config.sdo_writes, *changed)
+    net = VirtualNetwork(bus_config(replace(config, sdo_writes=writes)))
+    net.boot()
+    net.devices['a'].faults.inject(FaultInjection(Fault.OVER_TEMPERATURE), net.now)
+    net.run(0.1)
+    assert net.frames(0x090)
+    assert not net.frames(EMCY + 2)
+    assert '0x4310' in events(net, EventKind.EMERGENCY, 'a')[0]
 
 
 def test_emergencies_are_reported_in_words_until_they_end() -> None:

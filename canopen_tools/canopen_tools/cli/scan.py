@@ -15,6 +15,7 @@ from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import SdoError
 from arm_canopen.master import SdoClient
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
+from arm_canopen.standard.device_profile import DeviceProfile, PROFILE_MASK
 from arm_canopen.standard.nmt import NmtState
 from arm_canopen.standard.objects import Index
 from arm_canopen.standard.sdo import UploadRequest
@@ -41,10 +42,10 @@ IDENTITY: tuple[tuple[str, str, int, int], ...] = (
 
 PROFILES: dict[int, str] = {
     301: '',
-    401: 'I/O modules',
-    402: 'drive',
+    DeviceProfile.GENERIC_IO: 'I/O modules',
+    DeviceProfile.DRIVE: 'drive',
     404: 'measuring device',
-    406: 'encoder',
+    DeviceProfile.ENCODER: 'encoder',
     408: 'hydraulics',
     410: 'inclinometer',
     418: 'battery',
@@ -278,7 +279,7 @@ def _cells(device: Found) -> Iterable[str]:
         elif number is None:
             yield '-'
         elif attribute == 'device_type':
-            profile = PROFILES.get(number & 0xFFFF, '')
+            profile = PROFILES.get(number & PROFILE_MASK, '')
             yield f'0x{number:08X} {profile}'.rstrip()
         else:
             yield f'0x{number:08X}'

@@ -21,6 +21,7 @@ from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import AccessType, object_address
+from arm_canopen.standard.lss import BIT_RATES_KBIT
 from arm_canopen.standard.nmt import ConsumerHeartbeatTime
 from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
 from arm_canopen.standard.pdo import MappedObject
@@ -31,7 +32,6 @@ from .text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 RO, RW, CONST = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.CONSTANT
 TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012 (CiA 301, 7.5.2.15)
-BIT_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)  # [kbit/s] CiA 306-1, DeviceInfo
 DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
 """Integer types, which a PDO may have as gaps."""
 
@@ -105,7 +105,7 @@ def _head(master: MasterConfig, rpdos: int, tpdos: int) -> dict[str, dict[str, s
             'ProductNumber': f'0x{identity.product_code:08X}',
             'RevisionNumber': f'0x{identity.revision_number:08X}',
             'OrderCode': '',
-            **{f'BaudRate_{rate}': '1' for rate in BIT_RATES},
+            **{f'BaudRate_{rate}': '1' for rate in BIT_RATES_KBIT},
             'SimpleBootUpMaster': '1',
             'SimpleBootUpSlave': '0',
             'Granularity': '1',

@@ -11,6 +11,7 @@ from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.read.eds_ini import IniFile, IniSection
 from arm_canopen.config.read.eds_values import parse_integer
 from arm_canopen.standard.dictionary import object_address, ObjectDictionary
+from arm_canopen.standard.lss import BIT_RATES_KBIT
 from arm_canopen.standard.objects import Index
 
 MANDATORY_INDICES = (Index.DEVICE_TYPE, Index.ERROR_REGISTER, Index.IDENTITY)
@@ -28,7 +29,6 @@ IDENTITY_KEYS = (
     ('vendornumber', 'VendorNumber', 1),
     ('productnumber', 'ProductNumber', 2),
 )
-BIT_RATES = (10, 20, 50, 125, 250, 500, 800, 1000)  # [kbit/s]
 
 
 def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings: Findings) -> None:
@@ -64,7 +64,7 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
                 'the latter is checked at boot',
                 'correct the wrong one of them',
             )
-    rates = [_number(info, f'baudrate_{rate}') for rate in BIT_RATES]
+    rates = [_number(info, f'baudrate_{rate}') for rate in BIT_RATES_KBIT]
     if any(rate is not None for rate in rates) and not any(rates):
         findings.warning(
             Place(path, info.line, key='[DeviceInfo]'),

@@ -8,6 +8,7 @@ differs, ``why`` says the reason.
 
 from __future__ import annotations
 
+from ...standard.lss import BIT_RATES_KBIT
 from ..units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from .schema import Key, Kind, Use
 from .shared_keys import (
@@ -24,8 +25,7 @@ from .shared_keys import (
 
 NO_DICTIONARY = 'the master has no object dictionary of its own'
 
-BITRATES = dict.fromkeys((10, 20, 50, 100, 125, 250, 500, 800, 1000), 'kbit/s')
-"""Bit rates of CiA 301, table 1."""
+BITRATES = dict.fromkeys(BIT_RATES_KBIT, 'kbit/s')
 
 OPTION_KEYS: tuple[Key, ...] = (
     Key('dcf_path', Kind.TEXT, 'dcf_path'),
