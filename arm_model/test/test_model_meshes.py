@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import errno
 import io
 from itertools import product
@@ -18,7 +18,15 @@ from model_robots import chain_texts
 import numpy as np
 import pytest
 
-from arm_model import ModelError, RobotModel
+from arm_model import (
+    Clearances,
+    CollisionObject,
+    combined,
+    ModelError,
+    Pose,
+    RobotModel,
+    Sphere,
+)
 from arm_model.scene import meshes
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))
@@ -73,7 +81,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'cache'))
     monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'prefix'))
     monkeypatch.setenv('ROS_PACKAGE_PATH', '')
-    meshes._hull.cache_clear()
+    meshes._hulls.cache_clear()
     return tmp_path / 'cache' / 'arm_model' / 'hulls'
 
 
@@ -141,24 +149,57 @@ def test_a_hull_is_made_once(tmp_path: Path, cache: Path, monkeypatch: pytest.Mo
     for file in (path, copy):
         file.write_text(obj(), encoding='utf-8')
     made: list[Path] = []
-    make = meshes.hull_of_file
+    make = meshes.hulls_of_file
 
-    def counted(file: Path) -> meshes.Hull:
+    def counted(file: Path) -> Sequence[meshes.Hull]:
         made.append(file)
         return make(file)
 
-    monkeypatch.setattr(meshes, 'hull_of_file', counted)
-    first = meshes.load_hull(path)
-    meshes._hull.cache_clear()
-    assert sorted(meshes.load_hull(copy).points.tolist()) == sorted(first.points.tolist())
+    monkeypatch.setattr(meshes, 'hulls_of_file', counted)
+    first = meshes.load_hulls(path)
+    meshes._hulls.cache_clear()
+    assert sorted(meshes.load_hulls(copy)[0].points.tolist()) == sorted(first[0].points.tolist())
     assert made == [path]
-    meshes._hull.cache_clear()
+    meshes._hulls.cache_clear()
     for file in cache.iterdir():
         file.write_bytes(b'damaged')
-    meshes.load_hull(path)
+    meshes.load_hulls(path)
     path.write_text(obj().replace('0.5', '0.7'), encoding='utf-8')
-    meshes.load_hull(path)
+    meshes.load_hulls(path)
     assert made == [path, path, path]
+
+
+def two_cubes(gap: float) -> str:
+    """Return two cubes beside each other as Wavefront OBJ, with a gap as a share of their edge."""
+    second = [(x + 1.0 + gap, y, z) for x, y, z in CORNERS]
+    lines = [f'v {x} {y} {z}' for x, y, z in (*CORNERS, *second)]
+    faces = [*TRIANGLES, *(tuple(8 + corner for corner in face) for face in TRIANGLES)]
+    return '\n'.join(lines + [f'f {a + 1} {b + 1} {c + 1}' for a, b, c in faces])
+
+
+def test_bodies_that_lie_apart_have_a_hull_each(tmp_path: Path) -> None:
+    """What is between them is free; bodies that touch are one."""
+    path = tmp_path / 'cubes.obj'
+    for gap, count in ((0.5, 2), (0.0, 1)):
+        path.write_text(two_cubes(gap), encoding='utf-8')
+        for _ in range(2):  # from the cache, too
+            hulls = meshes.load_hulls(path)
+            assert len(hulls) == count
+            assert sum(len(each.points) for each in hulls) == 8 * count
+            assert min(each.fullness for each in hulls) == pytest.approx(1.0)
+            meshes._hulls.cache_clear()
+    path.write_text(two_cubes(0.5), encoding='utf-8')
+    model = arm('<mesh filename="cubes.obj" scale="0.02 0.02 0.02"/>', tmp_path)
+    assert [len(each) for each in model.scene.link_shapes.values()] == [2] * 4
+    ball = CollisionObject('ball', Sphere(0.003))
+    at = np.zeros(4)
+    placed = model.scene.link_shapes['link_4'][0].pose
+    link = combined(model.kinematics.link_pose('link_4', at), placed)
+    for x, touches in ((0.015, False), (0.0, True), (0.03, True)):
+        middle = Pose(link.rotation, link.position + link.rotation @ [x, 0.0, 0.0])
+        scene = model.scene.with_object(ball.at(middle))
+        found = {name for each in Clearances(scene).contacts(at) for name in each.bodies}
+        assert ('ball' in found) is touches
 
 
 def test_without_a_cache_hulls_are_made_all_the_same(
@@ -168,7 +209,7 @@ def test_without_a_cache_hulls_are_made_all_the_same(
     (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
     (tmp_path / 'file').write_text('', encoding='utf-8')
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path / 'file'))
-    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
 
 
 def test_without_a_home_hulls_are_made_all_the_same(
@@ -183,13 +224,13 @@ def test_without_a_home_hulls_are_made_all_the_same(
     monkeypatch.delenv('XDG_CACHE_HOME')
     monkeypatch.delenv('HOME', raising=False)
     monkeypatch.setattr('pwd.getpwuid', unknown)
-    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
 
 
 def npz(points: list[list[float]]) -> bytes:
     """Return a file of the cache."""
     file = io.BytesIO()
-    np.savez(file, points=np.array(points), fullness=1.0)
+    np.savez(file, points=np.array(points), counts=[len(points)], fullness=[1.0])
     return file.getvalue()
 
 
@@ -210,12 +251,12 @@ def test_a_damaged_file_of_the_cache_is_written_again(
     """Such as the empty one that a loss of power leaves."""
     path = tmp_path / 'cube.stl'
     path.write_text(stl(), encoding='utf-8')
-    meshes.load_hull(path)
+    meshes.load_hulls(path)
     (file,) = cache.iterdir()
     whole = file.read_bytes()
     file.write_bytes(damage(whole))
-    meshes._hull.cache_clear()
-    assert len(meshes.load_hull(path).points) == len(CORNERS)
+    meshes._hulls.cache_clear()
+    assert len(meshes.load_hulls(path)[0].points) == len(CORNERS)
     assert len(file.read_bytes()) == len(whole)
 
 
@@ -229,7 +270,7 @@ def test_a_full_disk_leaves_nothing_behind(
 
     (tmp_path / 'cube.stl').write_text(stl(), encoding='utf-8')
     monkeypatch.setattr('os.fsync', full)
-    assert len(meshes.load_hull(tmp_path / 'cube.stl').points) == len(CORNERS)
+    assert len(meshes.load_hulls(tmp_path / 'cube.stl')[0].points) == len(CORNERS)
     assert not list(cache.iterdir())
 
 

@@ -15,7 +15,7 @@ from urdf_reader import DescriptionError, find_mesh, KinematicTree, MeshFileErro
 from ..arrays import Array
 from ..exceptions import SceneError
 from ..pose import Pose
-from .meshes import load_hull, MeshError
+from .meshes import load_hulls, MeshError
 from .shapes import Box, Capsule, Cylinder, Mesh, native, PlacedShape, Shape, Sphere
 
 CAPSULE_TOLERANCE = 1e-6
@@ -60,15 +60,16 @@ def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
     loose: dict[str, float] = {}  # fullness by link
     for collision in tree.collisions():
         try:
-            shape, fullness = _shape(collision, folder)
+            solids = _solids(collision, folder)
         except (MeshError, MeshFileError) as error:
             links = unusable.setdefault(str(error), [])
             links += [collision.link] if collision.link not in links else []
             continue
-        if fullness < MIN_FULLNESS:
-            loose[collision.link] = min(fullness, loose.get(collision.link, 1.0))
-        placed = PlacedShape(shape, _pose(collision))
-        found.setdefault(collision.link, []).append(placed)
+        for shape, fullness in solids:
+            if fullness < MIN_FULLNESS:
+                loose[collision.link] = min(fullness, loose.get(collision.link, 1.0))
+            placed = PlacedShape(shape, _pose(collision))
+            found.setdefault(collision.link, []).append(placed)
     shapes = {link: _with_capsules(each) for link, each in found.items()}
     return LinkShapes(shapes, [*_left_out(unusable, bool(found)), *_loose(loose)])
 
@@ -93,15 +94,15 @@ def _loose(fullness: Mapping[str, float]) -> Sequence[str]:
     return (note,)
 
 
-def _shape(collision: UrdfShape, folder: Path | None) -> tuple[Shape, float]:
-    """Return a shape, and how full it is."""
+def _solids(collision: UrdfShape, folder: Path | None) -> Sequence[tuple[Shape, float]]:
+    """Return the shapes of a collision, and how full each is; a mesh has one for each body."""
     if collision.shape == 'mesh':
         name = collision.attributes.get('filename', '')
-        hull = load_hull(find_mesh(name, folder))
+        hulls = load_hulls(find_mesh(name, folder))
         scale = collision.lengths('scale') if 'scale' in collision.attributes else (1.0,) * 3
         if len(scale) != 3 or not all(scale):
             raise DescriptionError(f'link {collision.link}: <mesh scale> is not usable: {scale}')
-        return Mesh(hull.points * np.array(scale)), hull.fullness
+        return [(Mesh(each.points * np.array(scale)), each.fullness) for each in hulls]
     if collision.shape not in PRIMITIVES:
         what = f'<{collision.shape}>' if collision.shape else 'an empty <geometry>'
         raise MeshError(f'{what} is no box, cylinder, sphere or mesh')
@@ -113,7 +114,7 @@ def _shape(collision: UrdfShape, folder: Path | None) -> tuple[Shape, float]:
         raise DescriptionError(
             f'link {collision.link}: <{collision.shape}> is not usable: {error}'
         ) from error
-    return shape, 1.0
+    return [(shape, 1.0)]
 
 
 def _pose(collision: UrdfShape) -> Pose:

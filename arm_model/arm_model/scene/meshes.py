@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Meshes as convex hulls: found by their name in a URDF, made once, cached by their content.
 
-STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hull. The points of a
-hull are kept in ``$XDG_CACHE_HOME/arm_model/hulls`` (``~/.cache/arm_model/hulls``), one small file
-for each content of a mesh file; the folder may be deleted at any time, and nothing that is wrong
-with it ends a program.
+STL, DAE, OBJ and what else assimp reads. A raw mesh is only read to make its hulls: one for each
+body that lies apart from the others. Their points are kept in ``$XDG_CACHE_HOME/arm_model/hulls``
+(``~/.cache/arm_model/hulls``), one small file for each content of a mesh file; the folder may be
+deleted at any time, and nothing that is wrong with it ends a program.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import contextlib
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,7 +23,7 @@ import tempfile
 import coal
 import numpy as np
 
-from ..arrays import Array, frozen, Native
+from ..arrays import Array, frozen, Native, Places
 
 MIN_THICKNESS = 1e-3
 """Thickness that a flat mesh is given in [m]: a hull needs a volume."""
@@ -33,7 +34,16 @@ MAX_CORNERS = 250
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 """Turns by this angle in [rad] spread directions evenly."""
 
-FORMAT = 'v1'
+MAX_BODIES = 16
+"""Bodies of one mesh that get a hull each; one with more of them gets a single hull."""
+
+MAX_PARTS = 500
+"""Parts of a mesh without a common corner of which bodies are made."""
+
+APART = 1e-3
+"""Distance between the bounds of two bodies at least, as a share of the size of the mesh."""
+
+FORMAT = 'v2'
 """Version of the files in the cache: part of their names."""
 
 COLLADA_UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*["\']([^"\']+)["\']')
@@ -46,19 +56,19 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """The convex hull of a mesh.
+    """The convex hull of a body.
 
     Attributes:
         points: Its corners (m, 3), in the unit of the mesh.
-        fullness: Volume of the mesh as a share of the hull's; 1 where the mesh has no inside.
+        fullness: Volume of the body as a share of the hull's; 1 where it has no inside.
     """
 
     points: Array
     fullness: float
 
 
-def load_hull(path: Path) -> Hull:
-    """Return the convex hull of a mesh file, from the cache if it is there.
+def load_hulls(path: Path) -> Sequence[Hull]:
+    """Return the convex hulls of the bodies of a mesh file, from the cache if they are there.
 
     Args:
         path: The file.
@@ -70,21 +80,21 @@ def load_hull(path: Path) -> Hull:
         content = path.read_bytes()
     except OSError as error:
         raise MeshError(f'{path}: {error.strerror}') from error
-    return _hull(hashlib.sha256(path.suffix.lower().encode() + content).hexdigest(), path)
+    return _hulls(hashlib.sha256(path.suffix.lower().encode() + content).hexdigest(), path)
 
 
 @lru_cache(maxsize=256)
-def _hull(digest: str, path: Path) -> Hull:
+def _hulls(digest: str, path: Path) -> Sequence[Hull]:
     folder = cache_folder()
     if folder is None:
-        return hull_of_file(path)
+        return hulls_of_file(path)
     cached = folder / f'{digest}-{FORMAT}.npz'
-    hull = _stored(cached)
-    if hull is None:
-        hull = hull_of_file(path)
+    hulls = _stored(cached)
+    if not hulls:
+        hulls = hulls_of_file(path)
         with contextlib.suppress(OSError):  # such as a full disk: it is made the next time, too
-            _store(cached, hull)
-    return hull
+            _store(cached, hulls)
+    return hulls
 
 
 def cache_folder() -> Path | None:
@@ -97,23 +107,37 @@ def cache_folder() -> Path | None:
     return home / 'arm_model' / 'hulls'
 
 
-def _stored(path: Path) -> Hull | None:
-    """Read a file of the cache; None where it was never written, or is damaged."""
+def _stored(path: Path) -> Sequence[Hull]:
+    """Read a file of the cache; nothing where it was never written, or is damaged."""
     # numpy, zipfile and zlib raise what they like for files that are damaged
     with contextlib.suppress(Exception), np.load(path) as stored:
-        points, fullness = frozen(stored['points']), float(stored['fullness'])
-        if points.ndim == 2 and points.shape[1] == 3 and len(points) and np.isfinite(points).all():
-            return Hull(points, fullness)
-    return None
+        points, counts, fullness = (stored[name] for name in ('points', 'counts', 'fullness'))
+        parts = np.split(points, np.cumsum(counts)[:-1])
+        if (
+            points.ndim == 2
+            and points.shape[1] == 3
+            and np.isfinite(points).all()
+            and all(len(part) for part in parts)
+        ):
+            return tuple(
+                Hull(frozen(part), share)
+                for part, share in zip(parts, fullness.tolist(), strict=True)
+            )
+    return ()
 
 
-def _store(path: Path, hull: Hull) -> None:
+def _store(path: Path, hulls: Sequence[Hull]) -> None:
     """Write a file of the cache whole or not at all: several programs start at once."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, suffix='.tmp', delete=False) as file:
         unfinished = Path(file.name)
         try:
-            np.savez(file, points=hull.points, fullness=hull.fullness)
+            np.savez(
+                file,
+                points=np.concatenate([each.points for each in hulls]),
+                counts=[len(each.points) for each in hulls],
+                fullness=[each.fullness for each in hulls],
+            )
             file.flush()
             os.fsync(file.fileno())
             unfinished.replace(path)
@@ -122,8 +146,8 @@ def _store(path: Path, hull: Hull) -> None:
             raise
 
 
-def hull_of_file(path: Path) -> Hull:
-    """Read a mesh file and make its convex hull.
+def hulls_of_file(path: Path) -> Sequence[Hull]:
+    """Read a mesh file and make the convex hulls of its bodies.
 
     Raises:
         MeshError: The file is no mesh.
@@ -133,9 +157,52 @@ def hull_of_file(path: Path) -> Hull:
     except ValueError as error:  # the last line is assimp's
         reason = str(error).strip().splitlines()[-1]
         raise MeshError(f'{path}: {reason}; export it as STL, DAE or OBJ') from error
-    hull = convex(mesh.vertices())
-    whole, solid = hull.computeVolume(), abs(mesh.computeVolume())
+    corners = np.array(mesh.vertices())
+    if not len(corners) or not np.isfinite(corners).all():
+        raise MeshError('a mesh needs corners, and finite ones')
+    faces = map(mesh.tri_indices, range(mesh.num_tris))
+    triangles = np.array([[face[0], face[1], face[2]] for face in faces], dtype=int)
+    if not len(triangles):
+        return (Hull(frozen(convex(corners).points()), 1.0),)
+    return tuple(_hull(corners[triangles[body]]) for body in _bodies(corners, triangles))
+
+
+def _hull(triangles: Array) -> Hull:
+    """Return the hull of the triangles (m, 3, 3) of a body."""
+    hull = convex(triangles.reshape(-1, 3))
+    a, b, c = triangles.transpose(1, 0, 2)
+    whole, solid = hull.computeVolume(), abs(float((a * np.cross(b, c)).sum()) / 6.0)
     return Hull(frozen(hull.points()), min(solid / whole, 1.0) if solid else 1.0)
+
+
+def _bodies(corners: Array, triangles: Places) -> Sequence[Places]:
+    """Return the triangles of each body that lies apart; all of them where bodies are many."""
+    points, same = np.unique(corners, axis=0, return_inverse=True)
+    triangles = same.reshape(-1)[triangles]
+    labels, before = np.arange(len(points)), np.arange(0)
+    while not np.array_equal(labels, before):
+        before = labels.copy()
+        np.minimum.at(labels, triangles, labels[triangles].min(axis=1, keepdims=True))
+        labels = labels[labels]
+    of_body = labels[triangles[:, 0]]
+    bodies = [np.flatnonzero(of_body == each) for each in np.unique(of_body)[: MAX_PARTS + 1]]
+    slack = APART * np.ptp(points, axis=0).max()
+    found: list[tuple[Places, Array, Array]] = []
+    for part in bodies if len(bodies) <= MAX_PARTS else ():
+        body = part
+        inside = points[triangles[body]].reshape(-1, 3)
+        lower, upper = inside.min(axis=0) - slack, inside.max(axis=0) + slack
+        while near := [
+            each for each in found if (each[1] <= upper).all() and (lower <= each[2]).all()
+        ]:
+            found = [each for each in found if not any(each is other for other in near)]
+            body = np.concatenate([body, *(each[0] for each in near)])
+            lower = np.min([lower, *(each[1] for each in near)], axis=0)
+            upper = np.max([upper, *(each[2] for each in near)], axis=0)
+        found.append((body, lower, upper))
+    if not 1 <= len(found) <= MAX_BODIES:
+        return (np.arange(len(triangles)),)
+    return tuple(body for body, _, _ in found)
 
 
 def _unit(path: Path) -> float:
