@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import closing, contextmanager
+from functools import partial
 from importlib import import_module
 import socket
 import sys
@@ -368,7 +369,8 @@ def test_a_gripper_is_opened_closed_and_stopped(robot: Robot, said: list[str]) -
     robot.spin_until(client.server_is_ready, 'its action')
     for opens, end, word in ((True, 2.0, 'open'), (False, -2.0, 'close')):
         robot.viewer.grip('/hand', opens=opens)
-        robot.spin_until(lambda word=word: f'/hand: {word}: done, at 2.0000' in said, 'the end')
+        done = partial(said.__contains__, f'/hand: {word}: done, at 2.0000')
+        robot.spin_until(done, 'the end')
         assert goals[-1].request.command.position == end
     robot.viewer.grip('/hand', opens=True)
     robot.spin_until(lambda: len(goals) == 3, 'a goal')

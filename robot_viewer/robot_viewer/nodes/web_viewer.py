@@ -264,7 +264,7 @@ class WebViewer(Node):
             self._find_walking(services)
         with around('planning is not offered'):
             self._planning.look(services)
-        with around('the body is not shown'):
+        with around('the body is not shown as a whole'):
             self._body.look()
         others = self.count_publishers('joint_states') - (self._joint_states is not None)
         self._robot_publishes |= bool(others)  # also while a link is cut, or when it has ended
