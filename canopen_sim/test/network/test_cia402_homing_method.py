@@ -113,7 +113,7 @@ def test_a_homing_that_was_cut_off_has_not_succeeded(end: str, *, bits: bool) ->
         net.result(task, 0.5)
     device.faults.end(net.now, Fault.STO)
     net.network.send_nmt(NmtCommand.START, 2)
-    net.run(0.1)
+    net.run(1.0)  # what homed on meanwhile is led to rest
     net.do(JOINT, 'enable')
 
 
