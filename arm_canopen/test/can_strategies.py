@@ -18,4 +18,5 @@ def frames(draw: st.DrawFn) -> Frame:
     is_remote = draw(st.booleans())
     can_id = draw(st.integers(0, EXTENDED_ID_MAX if is_extended else STANDARD_ID_MAX))
     data = b'' if is_remote else draw(payloads)
-    return Frame(can_id, data, is_extended=is_extended, is_remote=is_remote)
+    length = draw(st.integers(0, 8)) if is_remote else 0
+    return Frame(can_id, data, 0.0, is_extended, is_remote, remote_length=length)

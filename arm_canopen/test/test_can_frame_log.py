@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 import io
 from pathlib import Path
@@ -12,6 +13,7 @@ import shutil
 import struct
 import subprocess
 import tempfile
+import time
 
 import can
 from can_strategies import frames
@@ -19,10 +21,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import Frame
+from arm_canopen.can import bus, Frame
 from arm_canopen.can.adapter import from_message
 from arm_canopen.can.candump_format import log_channel, parse_line, read_lines
-from arm_canopen.can.frame_log import LogWriter, read_log
+from arm_canopen.can.frame_log import LogWriter, read_buses, read_log
 from arm_canopen.can.pcap import CAN_SOCKETCAN, MICROSECONDS, NANOSECONDS
 from arm_canopen.exceptions import CodecError
 
@@ -30,6 +32,10 @@ EXAMPLES = [
     ('(1700000000.123456) can0 181#27060000', Frame(0x181, b'\x27\x06\x00\x00')),
     ('(1700000000.123456) can0 080#', Frame(0x080)),
     ('(1700000000.123456) can0 701#R', Frame(0x701, is_remote=True)),
+    (
+        '(1700000000.123456) can0 701#R3',
+        Frame(0x701, is_remote=True, remote_length=3),
+    ),
     ('(1700000000.123456) can0 00000181#01', Frame(0x181, b'\x01', is_extended=True)),
     ('(1700000000.123456) can0 20000004#0004', Frame(0x4, b'\x00\x04', is_error=True)),
     ('(1700000000.123456) can0 1FFFFFFF#R', Frame(0x1FFFFFFF, is_extended=True, is_remote=True)),
@@ -54,7 +60,9 @@ def test_lines_are_those_of_candump(line: str, frame: Frame, tmp_path: Path) -> 
     path = written([frame._replace(timestamp=0.123456)], tmp_path)
     (text,) = path.read_text('ascii').splitlines()
     assert text.removesuffix(' R') == line
-    assert parse_line(line)._replace(timestamp=0.0) == frame
+    interface, found = parse_line(line)
+    assert interface == 'can0'
+    assert found._replace(timestamp=0.0) == frame
 
 
 @pytest.mark.parametrize('suffix', ['.log', '.pcap'])
@@ -87,11 +95,222 @@ def test_every_format_keeps_frames_and_times(suffix: str, tmp_path: Path) -> Non
     )
 
 
+TPDO = Frame(0x181, b'\x27\x06')
+LONG = Frame(0x18FF1234, b'\x01', is_extended=True)
+POSTED = {
+    'candump -L': (
+        '$ candump -L can0 can1\n(1.500000) can0 181#2706\n(2.500000) can1 18FF1234#01\n',
+        [('can0', TPDO, 1.5), ('can1', LONG, 2.5)],
+    ),
+    "candump's screen": (
+        (
+            '  can0  181   [2]  27 06\n\n  can1  18FF1234   [1]  01\n'
+            '  can0  701   [1]  remote request\n'
+        ),
+        [
+            ('can0', TPDO, 0.0),
+            ('can1', LONG, 0.0),
+            ('can0', Frame(0x701, is_remote=True, remote_length=1), 0.0),
+        ],
+    ),
+    'candump -t z -a, in colours': (
+        (
+            " (000.000000)  can0  \x1b[31m181\x1b[0m   [2]  27 06                     ''.'\n"
+            ' (001.250000)  can0  080   [0] \n'
+        ),
+        [('can0', TPDO, 0.0), ('can0', Frame(0x80), 1.25)],
+    ),
+    'candump -t d': (
+        (
+            ' (000.000000)  can0  181   [2]  27 06\n (001.250000)  can0  080   [0]\n'
+            ' (000.500000)  can0  080   [0]\n'
+        ),
+        [('can0', TPDO, 0.0), ('can0', Frame(0x80), 1.25), ('can0', Frame(0x80), 1.75)],
+    ),
+    'candump -x -e -t a': (
+        (
+            ' (1700000000.500000)  can0  RX - -  181   [2]  27 06\n'
+            ' (1700000001.500000)  can0  RX - -  20000004   [2]  00 04   ERRORFRAME\n'
+            '\tcontroller-problem{rx-error-warning}\n'
+        ),
+        [
+            ('can0', TPDO, 1_700_000_000.5),
+            ('can0', Frame(4, b'\0\4', is_error=True), 1_700_000_001.5),
+        ],
+    ),
+    'PCAN 1.1': (
+        (
+            ';$FILEVERSION=1.1\n;$STARTTIME=25569.0\n;   Message Number\n'
+            '     1)      1500.0  Rx         0181  2  27 06 \n'
+            '     2)      2500.0  Tx     18FF1234  1  01 \n'
+            '     3)      3500.0  Rx         0701  1  RTR \n'
+        ),
+        [
+            ('1', TPDO, 1.5),
+            ('1', LONG, 2.5),
+            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
+        ],
+    ),
+    'PCAN 2.1': (
+        (
+            ';$FILEVERSION=2.1\n;$STARTTIME=25569.0\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n'
+            '      1      1500.000 DT  1     0181 Rx  -  2    27 06\n'
+            '      2      2500.000 DT  2 18FF1234 Rx  -  1    01\n'
+        ),
+        [('1', TPDO, 1.5), ('2', LONG, 2.5)],
+    ),
+    'SavvyCAN': (
+        (
+            'Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n'
+            '1500000,00000181,false,Rx,0,2,27,06,\n2500000,18FF1234,true,Tx,1,1,01,\n'
+        ),
+        [('0', TPDO, 1.5), ('1', LONG, 2.5)],
+    ),
+    'python-can csv': (
+        'timestamp,arbitration_id,extended,remote,error,dlc,data\n1.5,0x181,0,0,0,2,JwY=\n',
+        [('', TPDO, 1.5)],
+    ),
+    'Vector, two channels and an error frame': (
+        (
+            'date Thu Jan 01 00:00:00.000 1970\nbase hex  timestamps absolute\n'
+            'internal events logged\nBegin Triggerblock Thu Jan 01 00:00:00.000 1970\n'
+            '   1.500000 1  181             Rx   d 2 27 06\n'
+            '   2.500000 2  18FF1234x       Rx   d 1 01\n'
+            '   3.500000 1  701             Rx   r 1\n'
+            '   4.500000 1  ErrorFrame\nEnd TriggerBlock\n'
+        ),
+        [
+            ('1', TPDO, 1.5),
+            ('2', LONG, 2.5),
+            ('1', Frame(0x701, is_remote=True, remote_length=1), 3.5),
+            ('1', Frame(0, is_error=True), 4.5),
+        ],
+    ),
+    'Vector, relative': (
+        (
+            'date Thu Jan 01 00:00:00.000 1970\nbase hex  timestamps relative\n'
+            'no internal events logged\n'
+            '   1.500000 1  181             Rx   d 2 27 06\n'
+            '   1.000000 1  18FF1234x       Rx   d 1 01\n'
+        ),
+        [('1', TPDO, 1.5), ('1', LONG, 2.5)],
+    ),
+    'a silent bus': ('\n', []),
+}
+
+
+@pytest.fixture
+def utc() -> Iterator[None]:
+    """Let local time be that of Greenwich."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv('TZ', 'UTC')
+        time.tzset()
+        yield
+    time.tzset()
+
+
+@pytest.mark.usefixtures('utc')
+@pytest.mark.parametrize('encoding', ['utf-8', 'utf-8-sig', 'utf-16'])
+@pytest.mark.parametrize(('text', 'expected'), POSTED.values(), ids=POSTED)
+def test_logs_are_read_as_people_post_them(
+    text: str,
+    expected: list[tuple[str, Frame, float]],
+    encoding: str,
+    tmp_path: Path,
+) -> None:
+    """Whatever they are called: the buses, the times, and remote requests with their length."""
+    path = tmp_path / 'posted.txt'
+    path.write_text(text, encoding)
+    found = list(read_buses(path))
+    assert [(bus, frame._replace(timestamp=0.0)) for bus, frame in found] == [
+        (bus, frame) for bus, frame, _ in expected
+    ]
+    times = [frame.timestamp for _, frame in found]
+    assert times == pytest.approx([stamp for _, _, stamp in expected], abs=1e-6)
+
+
+REFUSED = {
+    'anything': ('Dear all,\nmy drive does not move.\n', "no log of a known format.*'Dear all,'"),
+    'BUSMASTER': ('***BUSMASTER Ver 3.2.2***\n', r'BUSMASTER \.log is not read; read are candump'),
+    'MDF': ('MDF     4.10    ', r'ASAM MDF \(\.mf4\) is not read'),
+    'gzip': ('\x1f\x8b', 'gzip file is not read'),
+    'FD in candump -L': ('(1.0) can0 181##12706\n', 'candump log: line 1: .*is a CAN FD frame'),
+    'FD on the screen': ('  can0  181  [12]  27 06\n', "candump's screen: line 1: .*CAN FD"),
+    'FD in .asc': (
+        (
+            'base hex  timestamps absolute\nno internal events logged\n'
+            '  1.5 CANFD 1 Rx 181 1 0 9 12 00 01 02 03 04 05 06 07 08 09 0a 0b 0 0 3000 0\n'
+        ),
+        r'Vector \.asc: it has CAN FD frames',
+    ),
+    'FD in .trc': (
+        (
+            ';$FILEVERSION=2.0\n;$STARTTIME=25569.0\n;$COLUMNS=N,O,T,I,d,l,D\n'
+            '      1      1500.000 FD     0181 Rx 12   00 01 02 03 04 05 06 07 08 09 0A 0B\n'
+        ),
+        r'PCAN \.trc: it has CAN FD frames',
+    ),
+    'cut bytes': ('  can0  181   [2]  27\n', 'line 1: .*has no 2 bytes in hexadecimal'),
+    'bits': ('  can0  181   [1]  00100111\n', 'has no 1 bytes in hexadecimal'),
+    'a damaged csv': ('Time Stamp,ID,Extended,Bus,LEN,D1\n1,181,0,0,1,xy\n', 'SavvyCAN csv: dam'),
+}
+
+
+@pytest.mark.parametrize(('text', 'words'), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_read_is_named(text: str, words: str, tmp_path: Path) -> None:
+    """The file, its format, the place and what is read; never nothing at all."""
+    path = tmp_path / 'posted.log'
+    path.write_bytes(text.encode('latin-1'))
+    with pytest.raises(CodecError, match=rf'posted\.log: .*{words}|posted\.log: {words}'):
+        list(read_log(path))
+
+
+def test_one_bus_of_a_log_is_read_as_one(tmp_path: Path) -> None:
+    """Frames of two buses are not mixed: one is named, or the log is refused."""
+    path = tmp_path / 'bus.log'
+    path.write_text(POSTED['candump -L'][0])
+    assert [frame.can_id for frame in read_log(path, 'can1')] == [LONG.can_id]
+    with pytest.raises(CodecError, match='frames of can0 and can1; choose one'):
+        list(read_log(path))
+
+
+@pytest.mark.parametrize('milliseconds', [7, 70, 700])
+def test_the_start_of_an_asc_has_three_digits(milliseconds: int, tmp_path: Path) -> None:
+    """python-can writes .7 for 7 ms, up to 0.9 s from the truth: written right, and read both."""
+    start = 1.7e9 + milliseconds / 1000
+    path = tmp_path / 'bus.asc'
+    with closing(LogWriter(path, 'can0', 0.0)) as log:
+        log.write([TPDO._replace(timestamp=start)])
+    assert f'.{milliseconds:03d} ' in path.read_text().splitlines()[3]
+    (message,) = can.ASCReader(path, relative_timestamp=False)
+    assert message.timestamp == pytest.approx(start, abs=1e-4)
+    theirs = tmp_path / 'theirs.asc'
+    with can.ASCWriter(theirs) as writer:
+        writer.on_message_received(can.Message(arbitration_id=0x181, timestamp=start))
+    for each in (path, theirs):
+        (frame,) = read_log(each)
+        assert frame.timestamp == pytest.approx(start, abs=1e-4)
+
+
+def test_a_pause_between_two_clocks_does_not_move_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that stood still after reading one of them has not read the other in time."""
+    now = [100.0]
+    pauses = iter([0.0, 3.0, 0.0, 0.5, 0.0, 0.0])
+
+    def steady() -> float:
+        now[0] += next(pauses, 1e-6)
+        return now[0]
+
+    monkeypatch.setattr(bus, 'monotonic', steady)
+    monkeypatch.setattr(bus, 'time', lambda: now[0] + next(pauses, 0.0) + 1.7e9)
+    assert bus.wall_clock_offset() == pytest.approx(1.7e9, abs=1e-3)
+
+
 def test_a_damaged_log_is_named(tmp_path: Path) -> None:
     """What is no log of its suffix is refused in one line."""
     path = tmp_path / 'bus.blf'
-    path.write_bytes(b'LOGX' + bytes(200))
-    with pytest.raises(CodecError, match=r'bus\.blf: damaged after 0 frames'):
+    path.write_bytes(b'LOGG' + bytes(200))
+    with pytest.raises(CodecError, match=r'bus\.blf: Vector \.blf: damaged after 0 frames'):
         list(read_log(path))
 
 
@@ -104,7 +323,7 @@ def capture(order: str, magic: int, link: int, *packets: bytes) -> bytes:
     return content
 
 
-TPDO = bytes.fromhex('00000182 03000000 370601')  # as SocketCAN has it in the network's order
+PACKET = bytes.fromhex('00000182 03000000 370601')  # as SocketCAN has it in the network's order
 
 
 @pytest.mark.parametrize('order', ['<', '>'])
@@ -112,8 +331,8 @@ TPDO = bytes.fromhex('00000182 03000000 370601')  # as SocketCAN has it in the n
 def test_captures_of_others_are_read(order: str, magic: int, tmp_path: Path) -> None:
     """Of machines of either byte order, with either unit of time, padded or not."""
     path = tmp_path / 'bus.pcap'
-    padded = TPDO.ljust(16, b'\0')
-    path.write_bytes(capture(order, magic, CAN_SOCKETCAN, TPDO, padded))
+    padded = PACKET.ljust(16, b'\0')
+    path.write_bytes(capture(order, magic, CAN_SOCKETCAN, PACKET, padded))
     assert list(read_log(path)) == [Frame(0x182, b'\x37\x06\x01', 5.25)] * 2
 
 
@@ -122,20 +341,23 @@ def test_captures_of_others_are_read(order: str, magic: int, tmp_path: Path) -> 
     [
         (b'\x0a\x0d\x0d\x0a' + bytes(60), 'save as pcap, not as pcapng'),
         (b'', 'no capture'),
-        (capture('<', MICROSECONDS, 113, TPDO), 'link type is 113.*on the CAN interface'),
-        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO)[:-1], 'after 0 frames: a packet is cut'),
-        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO) + b'1', 'after 1 frames: .*is cut off'),
-        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:-1]), '2 of 3 bytes'),
+        (capture('<', MICROSECONDS, 113, PACKET), 'link type is 113.*on the CAN interface'),
+        (
+            capture('<', MICROSECONDS, CAN_SOCKETCAN, PACKET)[:-1],
+            'after 0 frames: a packet is cut',
+        ),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, PACKET) + b'1', 'after 1 frames: .*is cut off'),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, PACKET[:-1]), '2 of 3 bytes'),
         (
             capture('<', MICROSECONDS, CAN_SOCKETCAN)
             + struct.pack('<IIII', 5, 0, 8, 16)  # 8 of 16 bytes were kept
-            + TPDO[:4]
+            + PACKET[:4]
             + bytes(4),
             'a packet is cut off',
         ),
-        (capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:4]), 'has 4 bytes'),
+        (capture('<', MICROSECONDS, CAN_SOCKETCAN, PACKET[:4]), 'has 4 bytes'),
         (
-            capture('<', MICROSECONDS, CAN_SOCKETCAN, TPDO[:4] + b'\x0c\x04' + bytes(14)),
+            capture('<', MICROSECONDS, CAN_SOCKETCAN, PACKET[:4] + b'\x0c\x04' + bytes(14)),
             'CAN FD',
         ),
     ],
@@ -191,12 +413,13 @@ def test_we_read_logs_of_python_can(frame: Frame) -> None:
         is_extended_id=frame.is_extended,
         is_remote_frame=frame.is_remote,
         data=frame.data,
+        dlc=frame.remote_length or len(frame.data),
     )
     text = io.StringIO()
     writer = can.CanutilsLogWriter(text, channel='vcan0')
     writer.on_message_received(message)
     (found,) = read_lines(text.getvalue().splitlines())
-    assert found == frame._replace(timestamp=1.5)
+    assert found.frame == frame._replace(timestamp=1.5, remote_length=0)  # which it leaves out
 
 
 @pytest.mark.parametrize(
@@ -238,7 +461,7 @@ def test_wrong_lines_are_named_with_their_number(line: str) -> None:
 @pytest.mark.parametrize('line', ['(1.0) can0 181#01.02.03', '(1.0)  can0\t181#010203 R\n'])
 def test_what_can_utils_tolerates_is_tolerated(line: str) -> None:
     """Dots between bytes, more blanks and a direction mean nothing."""
-    assert parse_line(line) == Frame(0x181, b'\x01\x02\x03', 1.0)
+    assert parse_line(line).frame == Frame(0x181, b'\x01\x02\x03', 1.0)
 
 
 @pytest.mark.skipif(shutil.which('log2asc') is None, reason='can-utils is not installed')

@@ -69,7 +69,7 @@ def test_the_order_of_the_keys_means_nothing(frame: Frame, shuffler: st.DataObje
     fields = list(msgpack.unpackb(encode(frame)).items())
     shuffler.shuffle(fields)  # type: ignore[attr-defined]  # a random.Random
     assert decode(msgpack.packb(dict(fields)), 0.0) == frame
-    needed = {'arbitration_id', 'is_extended_id', 'is_remote_frame', 'data'}
+    needed = {'arbitration_id', 'is_extended_id', 'is_remote_frame', 'dlc', 'data'}
     assert decode(msgpack.packb({k: v for k, v in fields if k in needed}), 0.0) == frame
 
 

@@ -10,21 +10,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, ExitStack, suppress
+from itertools import chain, islice
 import math
 import os
 from pathlib import Path
 import signal
 import sys
-from time import monotonic, time
+from time import monotonic
 from types import FrameType
 
 from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.can.frame_log import LogWriter, read_log
+from arm_canopen.can.bus import wall_clock_offset
+from arm_canopen.can.frame_log import LogWriter, read_buses
 from arm_canopen.config import load_bus
 from arm_canopen.config.model import BusConfig
-from arm_canopen.exceptions import CanopenError
+from arm_canopen.exceptions import CanopenError, CodecError
 
 from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle
@@ -36,8 +39,10 @@ examples:
   candump can0 --filter emcy,node:joint1              EMCY of all devices, all of joint1
   candump can0 --log today.log --quiet --timeout 60   record a minute
   candump --read today.log --bus-config bus.yml       show what was recorded
+  candump --read pcan.trc --log bus.asc --quiet       convert a log
 """
 _NODE_WIDTH = len('all nodes')
+_LOOK_AHEAD = 1000  # frames of a log in which its buses show
 
 
 class Listener:
@@ -74,43 +79,48 @@ class Screen:
 
     def __init__(
         self,
-        describer: FrameDescriber,
+        describer: Callable[[], FrameDescriber],
         chosen: FrameFilter,
         line_format: LineFormat,
         *,
+        buses: Iterable[str] = (),
         count: int | None = None,
         quiet: bool = False,
     ) -> None:
         """Prepare.
 
         Args:
-            describer: Puts frames into words.
+            describer: Makes what puts the frames of one bus into words.
             chosen: Which ones to show.
             line_format: How.
+            buses: Names of several buses, for a column; empty for one bus.
             count: After how many it is full, None for never.
             quiet: Print nothing, but count.
         """
-        self._describer = describer
+        self._describers = defaultdict[str, FrameDescriber](describer)
+        self._bus_width = max(map(len, buses), default=0)
         self._filter = chosen
         self._format = line_format
         self._left = math.inf if count is None else count
         self._quiet = quiet
 
-    def show(self, frames: Iterable[Frame]) -> bool:
-        """Print frames; return whether there is room for more.
+    def show(self, frames: Iterable[Frame], bus: str = '') -> bool:
+        """Print frames of a bus; return whether there is room for more.
 
         Raises:
             BrokenPipeError: Nobody reads any more.
         """
         lines = []
+        describer = self._describers[bus]
+        column = f'{bus:<{self._bus_width}}  ' if self._bus_width else ''
         for frame in frames:
             if self._left <= 0:
                 break
             self._format.begin(frame.timestamp)
-            description = self._describer.describe(frame)
+            description = describer.describe(frame)
             if self._filter.shows(frame, description):
                 self._left -= 1
-                lines.append(self._format.line(frame, description) + '\n')
+                lines.append(f'{column}{self._format.line(frame, description)}\n')
         if lines and not self._quiet:
             sys.stdout.write(''.join(lines))
             sys.stdout.flush()
@@ -155,15 +165,51 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
-    """Show a log as if its frames came now; their times are of the wall clock."""
-    screen = _screen(options, config, wall_offset=0.0)
-    for frame in read_log(Path(options.read)):
-        if not screen.show([frame]):
-            break
+    """Show a log as if its frames came now, or convert it; its times are of the wall clock.
+
+    Raises:
+        CodecError: It cannot be read, or has another bus than the one that is asked for, or
+            several where one is wanted.
+    """
+    path, wanted = Path(options.read), options.interface
+    logged = read_buses(path)
+    first = list(islice(logged, _LOOK_AHEAD))
+    found = dict.fromkeys(each.interface for each in first)
+    several = found if len(found) > 1 and not wanted else ()
+    with ExitStack() as stack:
+        log = None
+        if options.log:
+            _refuse_conversion(path, Path(options.log), several)
+            name = wanted or next(iter(found), '')
+            log = stack.enter_context(closing(LogWriter(Path(options.log), name, 0.0)))
+        screen = _screen(options, config, 0.0, several)
+        for interface, frame in chain(first, logged):
+            if interface not in found:
+                found[interface] = None
+                if log is not None:
+                    _refuse_conversion(path, Path(options.log), () if wanted else found)
+            if wanted not in ('', interface):
+                continue
+            if log is not None:
+                log.write([frame])
+            if not screen.show([frame], interface):
+                return
+    if wanted and wanted not in found:
+        raise CodecError(f'{path} has no frames of {wanted}, but of {", ".join(found)}')
+
+
+def _refuse_conversion(source: Path, target: Path, buses: Collection[str]) -> None:
+    if target.resolve() == source.resolve():
+        raise CodecError(f'{source} would be overwritten; give --log another file')
+    if len(buses) > 1:
+        raise CodecError(
+            f'{source} has frames of {", ".join(buses)}, and {target} is of one bus; choose it '
+            'with --interface'
+        )
 
 
 def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
-    offset = time() - monotonic()
+    offset = wall_clock_offset()
     screen = _screen(options, config, offset)
     with ExitStack() as stack:
         bus = stack.enter_context(open_bus(options.bus))
@@ -182,10 +228,15 @@ def _show_bus(options: argparse.Namespace, config: BusConfig | None) -> None:
                 break
 
 
-def _screen(options: argparse.Namespace, config: BusConfig | None, wall_offset: float) -> Screen:
+def _screen(
+    options: argparse.Namespace,
+    config: BusConfig | None,
+    wall_offset: float,
+    buses: Iterable[str] = (),
+) -> Screen:
     names = [config.master.name, *(node.name for node in config.nodes)] if config else []
     return Screen(
-        FrameDescriber(config),
+        lambda: FrameDescriber(config),
         options.filter,
         LineFormat(
             TimeStyle(options.time),
@@ -194,6 +245,7 @@ def _screen(options: argparse.Namespace, config: BusConfig | None, wall_offset: 
             node_width=max([_NODE_WIDTH, *map(len, names)]),
         ),
         count=options.count,
+        buses=buses,
         quiet=options.quiet,
     )
 
@@ -234,7 +286,18 @@ def _parser() -> argparse.ArgumentParser:
         help="write all frames, shown or not, as can-utils' candump -L; FILE.asc and FILE.blf in "
         "Vector's formats, FILE.pcap for Wireshark",
     )
-    add('--read', metavar='FILE', help='show a log, of these formats, instead of a bus')
+    add(
+        '--read',
+        metavar='FILE',
+        help="show a log instead of a bus: of these formats, what candump prints, PCAN's .trc, "
+        'csv of SavvyCAN or python-can; with --log it is converted',
+    )
+    add(
+        '--interface',
+        default='',
+        metavar='NAME',
+        help='of a log of several buses: the one to show, as the log names it, such as can1 or 2',
+    )
     add('-n', '--count', type=_positive_int, help='end after so many frames shown')
     add(
         '--timeout',

@@ -171,6 +171,67 @@ def test_a_log_is_shown_like_a_bus(
     ]
 
 
+TWO_BUSES = '(1.000000) can0 702#05\n(2.000000) vcan1 702#7F\n(3.000000) can0 182#3716\n'
+
+
+def test_each_bus_of_a_log_has_a_column_or_is_chosen(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """One that is not there is an error that names those that are."""
+    path = tmp_path / 'two.log'
+    path.write_text(TWO_BUSES)
+    read = ['--read', str(path), '-t', 'n']
+    _, out, _ = run_main(capsys, *read)
+    assert [line.split()[:2] for line in out.splitlines()] == [
+        ['can0', '702'],
+        ['vcan1', '702'],
+        ['can0', '182'],
+    ]
+    assert len({line.index('  [') for line in out.splitlines()}) == 1
+    _, out, _ = run_main(capsys, *read, '--interface', 'can0')
+    assert [line.split()[0] for line in out.splitlines()] == ['702', '182']
+    code, out, err = run_main(capsys, *read, '--interface', 'can7')
+    assert (code, out) == (1, '')
+    assert 'has no frames of can7, but of can0, vcan1' in err
+
+
+@pytest.mark.parametrize('suffix', ['.asc', '.blf', '.log'])
+def test_a_log_is_converted(
+    suffix: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """With its times; of several buses one has to be named, and no log becomes itself."""
+    source, target = tmp_path / 'screen.txt', tmp_path / f'bus{suffix}'
+    source.write_text(
+        ' (1700000000.250000)  can0  702   [1]  05\n (1700000001.000000)  can0  080   [0]\n'
+    )
+    code, out, _ = run_main(capsys, '--read', str(source), '--log', str(target), '--quiet')
+    assert (code, out) == (0, '')
+    frames = list(read_log(target))
+    assert unstamped(frames) == [Frame(0x702, b'\x05'), Frame(0x080)]
+    assert [frame.timestamp for frame in frames] == pytest.approx([1.7e9 + 0.25, 1.7e9 + 1.0])
+    source.write_text(TWO_BUSES)
+    before = target.read_bytes()
+    code, _, err = run_main(capsys, '--read', str(source), '--log', str(target))
+    assert (code, target.read_bytes()) == (1, before)
+    assert 'can0, vcan1' in err
+    assert '--interface' in err
+    code, _, err = run_main(capsys, '--read', str(source), '--log', str(source))
+    assert code == 1
+    assert 'would be overwritten' in err
+    assert source.read_text() == TWO_BUSES
+
+
+def test_a_file_that_is_no_log_is_refused_by_name(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Nothing and success is no answer."""
+    path = tmp_path / 'mail.txt'
+    path.write_text('Dear all,\n')
+    code, out, err = run_main(capsys, '--read', str(path))
+    assert (code, out) == (1, '')
+    assert 'no log of a known format' in err
+
+
 def test_filters_of_a_log_count_from_its_begin(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -227,6 +227,7 @@ def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
         is_remote_frame=frame.is_remote,
         is_error_frame=frame.is_error,
         data=frame.data,
+        dlc=frame.remote_length or len(frame.data),
     )
 
 
@@ -241,9 +242,10 @@ def from_message(message: can.Message, timestamp: float) -> Frame:
         message.arbitration_id,
         bytes(message.data),
         timestamp,
-        message.is_extended_id,
+        message.is_extended_id and not message.is_error_frame,
         message.is_remote_frame,
         message.is_error_frame,
+        min(message.dlc, PAYLOAD_MAX) if message.is_remote_frame else 0,
     )
 
 

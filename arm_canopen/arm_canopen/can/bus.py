@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from time import monotonic, time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 from .frame import Frame
+
+_CLOCK_READINGS = 5
 
 
 @dataclass(slots=True)
@@ -100,3 +103,12 @@ class Bus(ABC):
     ) -> None:
         """Close it."""
         self.close()
+
+
+def wall_clock_offset() -> float:
+    """Return wall clock minus steady clock in [s], without a pause between reading both."""
+    readings = []
+    for _ in range(_CLOCK_READINGS):
+        before, wall, after = monotonic(), time(), monotonic()
+        readings.append((after - before, wall - before))
+    return min(readings)[1]

@@ -22,6 +22,7 @@ class Frame(NamedTuple):
         is_extended: The identifier has 29 bits.
         is_remote: Remote transmission request; the payload is empty.
         is_error: Error frame of the controller; can_id and data are the kernel's error classes.
+        remote_length: Length of the data that a remote request asks for in [byte].
     """
 
     can_id: int
@@ -30,6 +31,7 @@ class Frame(NamedTuple):
     is_extended: bool = False
     is_remote: bool = False
     is_error: bool = False
+    remote_length: int = 0
 
 
 def checked(frame: Frame) -> Frame:
@@ -42,4 +44,6 @@ def checked(frame: Frame) -> Frame:
         raise ValueError(f'CAN identifier 0x{frame.can_id:X} is out of range')
     if len(frame.data) > PAYLOAD_MAX:
         raise ValueError(f'a CAN frame carries at most {PAYLOAD_MAX} bytes, got {len(frame.data)}')
+    if not 0 <= frame.remote_length <= (PAYLOAD_MAX if frame.is_remote else 0):
+        raise ValueError(f'{frame.remote_length} bytes cannot be requested by such a frame')
     return frame

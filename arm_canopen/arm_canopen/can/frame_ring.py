@@ -71,11 +71,12 @@ class FrameRing:
             timestamp: Its steady time in [s].
             direction: 0 for a frame that was received, :attr:`SENT` for one that was sent.
         """
-        can_id, data, _, is_extended, is_remote, is_error = frame
+        can_id, data, _, is_extended, is_remote, is_error, remote_length = frame
         if is_extended or is_remote or is_error:
             can_id |= _EXTENDED * is_extended | _REMOTE * is_remote | _ERROR * is_error
         at = self._at
-        _RECORD.pack_into(self._memory, at, timestamp, can_id, len(data) | direction, data)
+        length = (remote_length or len(data)) | direction
+        _RECORD.pack_into(self._memory, at, timestamp, can_id, length, data)
         at += RECORD_SIZE
         self._at = at if at < self._end else 0
         self.count += 1
@@ -98,12 +99,14 @@ class FrameRing:
 
 
 def _unpack(timestamp: float, can_id: int, length: int, data: bytes) -> RecordedFrame:
+    is_remote, size = bool(can_id & _REMOTE), length & _LENGTH
     frame = Frame(
         can_id & _IDENTIFIER,
-        data[: length & _LENGTH],
+        b'' if is_remote else data[:size],
         timestamp,
         bool(can_id & _EXTENDED),
-        bool(can_id & _REMOTE),
+        is_remote,
         bool(can_id & _ERROR),
+        size if is_remote else 0,
     )
     return RecordedFrame(frame, bool(length & FrameRing.SENT))

@@ -67,12 +67,15 @@ def encode(frame: Frame) -> bytes:
     Raises:
         ValueError: The identifier or the payload does not fit a classic CAN frame.
     """
-    can_id, data, _, is_extended, is_remote, is_error = checked(frame)
+    can_id, data, _, is_extended, is_remote, is_error, remote_length = checked(frame)
     if is_extended or is_remote or is_error:
         head = _HEAD + _pack(can_id) + _flags(is_extended, is_remote, is_error)
     else:
         head = _PLAIN_HEADS[can_id]
-    return b''.join((head, _LENGTHS[len(data)], data, _TAIL))
+    length = _LENGTHS[len(data)]
+    if remote_length:
+        length = _pack(remote_length) + length[1:]
+    return b''.join((head, length, data, _TAIL))
 
 
 def decode(datagram: bytes, timestamp: float) -> Frame:
@@ -123,8 +126,11 @@ def _decode_any(datagram: bytes, timestamp: float) -> Frame:
         raise CodecError(f'CAN frame with identifier {can_id!r} and payload {data!r}')
     is_error = _flag(fields, 'is_error_frame', default=False)
     data = b'' if is_remote else data
+    length = (fields.get('dlc') or 0) if is_remote else 0
+    if type(length) is not int:
+        raise CodecError(f'remote request of {length!r} bytes')
     try:
-        return checked(Frame(can_id, data, timestamp, is_extended, is_remote, is_error))
+        return checked(Frame(can_id, data, timestamp, is_extended, is_remote, is_error, length))
     except ValueError as error:
         raise CodecError(str(error)) from error
 

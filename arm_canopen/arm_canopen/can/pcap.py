@@ -59,7 +59,7 @@ class PcapWriter:
             | ERROR * message.is_error_frame
         )
         data = bytes(message.data)
-        packet = _FRAME.pack(message.arbitration_id | flags, len(data), 0) + data
+        packet = _FRAME.pack(message.arbitration_id | flags, message.dlc, 0) + data
         seconds, fraction = divmod(round(message.timestamp * 1e6), 1_000_000)
         header = struct.pack(f'<{_PACKET}', seconds, fraction, len(packet), len(packet))
         self.file.write(header + packet)
@@ -141,4 +141,5 @@ def _message(packet: bytes, timestamp: float) -> can.Message:
         is_error_frame=is_error,
         is_fd=bool(fd_flags & FD_FRAME) or length > MAX_DATA,
         data=b'' if is_remote else data,
+        dlc=length if is_remote else len(data),
     )

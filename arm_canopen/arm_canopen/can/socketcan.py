@@ -128,7 +128,7 @@ def pack(frame: Frame) -> bytes:
         can_id |= _EXTENDED_FLAG
     if frame.is_remote:
         can_id |= _REMOTE_FLAG
-    return _FRAME.pack(can_id, len(data), data)
+    return _FRAME.pack(can_id, frame.remote_length or len(data), data)
 
 
 def unpack(packed: bytes, timestamp: float) -> Frame:
@@ -146,7 +146,9 @@ def unpack(packed: bytes, timestamp: float) -> Frame:
         return Frame(can_id & _ERROR_CLASSES, data, timestamp, is_error=True)
     is_extended, is_remote = bool(can_id & _EXTENDED_FLAG), bool(can_id & _REMOTE_FLAG)
     can_id &= EXTENDED_ID_MAX if is_extended else STANDARD_ID_MAX
-    return Frame(can_id, b'' if is_remote else data, timestamp, is_extended, is_remote)
+    if is_remote:
+        return Frame(can_id, b'', timestamp, is_extended, is_remote, remote_length=len(data))
+    return Frame(can_id, data, timestamp, is_extended)
 
 
 def _open_socket(name: str) -> socket.socket:

@@ -11,6 +11,7 @@ import time
 
 from black_box import Pause
 
+from ..can.bus import wall_clock_offset
 from ..can.candump_format import format_line, log_channel
 from ..can.frame import Frame, PAYLOAD_MAX
 from ..can.frame_ring import FrameRing, RecordedFrame
@@ -81,8 +82,7 @@ class BusRecording:
         Raises:
             OSError: The file cannot be written.
         """
-        now = time.monotonic()
-        offset, begin = time.time() - now, now - self._window
+        offset, begin = wall_clock_offset(), time.monotonic() - self._window
         channel = log_channel(self._bus_name)
         path = folder / LOG
         with path.open('w', encoding='ascii') as file:

@@ -54,7 +54,8 @@ example:
   ros2 run arm_canopen replay --ros-args -p bus_config:=bus.yml -p log:=can.log -p rate:=0.2
 
 parameters:
-  log                 file of a black box, candump, ASC, BLF or pcap (required)
+  log                 file of a black box or of candump, ASC, BLF, TRC, csv or pcap (required)
+  interface           of a log of several buses: the one to play, as the log names it
   bus_config          the bus.yml of that bus (required)
   rate                how many seconds of the log go by in one (default 1.0)
   start               where it begins, in [s] after the first frame (default 0.0)
@@ -71,6 +72,7 @@ class Parameters:
 
     Attributes:
         log: The log.
+        interface: The bus, as the log names it; empty for the only one.
         bus_config: Path of the bus.yml.
         rate: How many seconds of the log go by in one.
         start: Where it begins, in [s] after the first frame.
@@ -81,6 +83,7 @@ class Parameters:
     """
 
     log: Path
+    interface: str
     bus_config: str
     rate: float
     start: float
@@ -121,7 +124,7 @@ class ReplayProcess:
         self._bus = bus = BusReplay(config, self._report)
         self._player = LogPlayer(
             bus,
-            partial(_timed_frames, parameters.log),
+            partial(_timed_frames, parameters.log, parameters.interface),
             name=str(parameters.log),
             rate=parameters.rate,
             start=parameters.start,
@@ -225,8 +228,8 @@ class ReplayProcess:
             topics.update_listeners()
 
 
-def _timed_frames(path: Path) -> Iterator[tuple[float, Frame]]:
-    for frame in read_log(path):
+def _timed_frames(path: Path, interface: str) -> Iterator[tuple[float, Frame]]:
+    for frame in read_log(path, interface):
         yield frame.timestamp, frame
 
 
@@ -278,7 +281,10 @@ def _refusal(found: Sequence[str]) -> CanopenError:
 
 def _declare(node: Node) -> Parameters:
     read = ParameterReader(node)
-    log = read.text('log', '', 'log of a bus: of a black box, candump, ASC, BLF or pcap')
+    log = read.text('log', '', 'log of a bus: black box, candump, ASC, BLF, TRC, csv or pcap')
+    interface = read.text(
+        'interface', '', 'of a log of several buses: the one to play, as the log names it'
+    )
     config = read.text('bus_config', '', 'the bus.yml of that bus')
     rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
     start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first frame [s]')
@@ -303,6 +309,7 @@ def _declare(node: Node) -> Parameters:
         raise CanopenError(f'{log}: there is no such file')
     return Parameters(
         Path(log),
+        interface,
         config,
         rate,
         start,

@@ -73,9 +73,8 @@ class LineFormat:
         if self._color:
             code = _RED if description.is_alert else _COLORS.get(description.kind, '')
             meaning = f'{code}{meaning}{_RESET}' if code else meaning
-        columns = (
-            f'{identifier:>{_IDENTIFIER_WIDTH}}  [{len(frame.data)}]  {content:<{_DATA_WIDTH}}'
-        )
+        length = frame.remote_length or len(frame.data)
+        columns = f'{identifier:>{_IDENTIFIER_WIDTH}}  [{length}]  {content:<{_DATA_WIDTH}}'
         return f'{self._time(frame.timestamp)}{columns}  {meaning}'
 
     def _time(self, stamp: float) -> str:
