@@ -108,6 +108,15 @@ class JointLimits:
         turns = np.where(self.continuous, TURN * np.round(error / TURN), 0.0)
         return error - turns
 
+    def in_nearest_turn(self, positions: Array, seed: Array) -> Array:
+        """Return positions, those of continuous joints in the turn that is nearest to a seed.
+
+        Args:
+            positions: Positions in [rad].
+            seed: Positions in [rad].
+        """
+        return np.where(self.continuous, seed + self.error(positions, seed), positions)
+
     @property
     def continuous(self) -> Mask:
         """Mask of the joints that turn without end."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+import math
 
 import numpy as np
 import pinocchio as pin
@@ -127,15 +128,15 @@ class ConstraintCheck:
     """Looks at states and paths of one arm; belongs to one thread.
 
     Attributes:
-        constraints: What must hold.
+        constraints: What must hold, all of it.
     """
 
-    def __init__(self, model: RobotModel, constraints: PathConstraints) -> None:
+    def __init__(self, model: RobotModel, *constraints: PathConstraints) -> None:
         """Prepare.
 
         Args:
             model: The arm.
-            constraints: What must hold.
+            *constraints: What must hold, all of it.
 
         Raises:
             PlanningError: A link is unknown, or no joint moves it.
@@ -144,8 +145,8 @@ class ConstraintCheck:
         self._limits = model.limits
         self._reach = max(model.reach, 1.0)
         self.constraints = constraints
-        names = {each.link for each in constraints.orientations}
-        names |= {each.link for each in constraints.positions}
+        names = {each.link for every in constraints for each in every.orientations}
+        names |= {each.link for every in constraints for each in every.positions}
         self._links = {name: LinkKinematics(model, name) for name in names}
 
     def violated(self, positions: Array) -> str:
@@ -259,13 +260,14 @@ class ConstraintCheck:
 
     def _all(self, positions: Array) -> Iterator[tuple[_Rows, Callable[[], str]]]:
         """Yield the rows of each constraint, and what is to be said where they are broken."""
-        for name, bounds in self.constraints.joints.items():
-            yield self._joint(name, bounds, positions)
         links = {name: link.pose_and_jacobian(positions) for name, link in self._links.items()}
-        for turn in self.constraints.orientations:
-            yield _turned(turn, *links[turn.link])
-        for point in self.constraints.positions:
-            yield self._placed(point, *links[point.link])
+        for every in self.constraints:
+            for name, bounds in every.joints.items():
+                yield self._joint(name, bounds, positions)
+            for turn in every.orientations:
+                yield _turned(turn, *links[turn.link])
+            for point in every.positions:
+                yield self._placed(point, *links[point.link])
 
     def _joint(
         self, name: str, bounds: tuple[float, float], positions: Array
@@ -274,6 +276,9 @@ class ConstraintCheck:
         gradient = np.zeros(len(self._joints))
         gradient[joint] = 1.0
         (lower, upper), place = bounds, float(positions[joint])
+        if self._limits.continuous[joint]:  # whole turns do not count
+            middle = 0.5 * (lower + upper)
+            place = middle + math.remainder(place - middle, math.tau)
         rows = _rows([(place, lower, upper, gradient)], 0.5 * STEP)
         return (
             rows,
@@ -296,7 +301,7 @@ class ConstraintCheck:
 def _turned(
     constraint: OrientationConstraint, pose: Pose, jacobian: Array
 ) -> tuple[_Rows, Callable[[], str]]:
-    about_wanted = constraint.rotation.T @ pose.rotation
+    about_wanted = constraint.rotation.T @ pose.rotation @ constraint.in_link
     if constraint.parameterization is Parameterization.XYZ_EULER_ANGLES:
         turned, by_turn, room = _euler_angles(about_wanted)
     else:

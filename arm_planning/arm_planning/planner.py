@@ -7,23 +7,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
+from itertools import count, islice
 import time
 
 import numpy as np
 
 from arm_model import (
     Array,
-    Box,
     checked,
     CommandError,
     frozen,
-    ORIGIN,
-    PlacedShape,
     PlanningScene,
     Pose,
     RobotModel,
-    Sphere,
 )
 
 from .constraints import ConstraintCheck
@@ -40,10 +36,8 @@ from .requests import (
     JointGoal,
     MotionPlan,
     MotionRequest,
-    OrientationConstraint,
     PathConstraints,
     PoseGoal,
-    PositionConstraint,
 )
 from .validity import ValidityCheck, Violation
 
@@ -215,15 +209,16 @@ class Planner:
         if request.constraints is not None:
             constraints = ConstraintCheck(self._model, request.constraints)
             _require_start(constraints, start)
-        goals = self._goals(request, start, check, constraints)
+        goals = self._goals(request, start, check, constraints, deadline)
         limits = scaled_limits(
             self._model.limits, request.velocity_scaling, request.acceleration_scaling
         )
         free = FreeMotion(limits, check, self._draw, constraints)
-        paths = [free.plan(start, goals, expired)]
+        further = self._further(request.goals, start, check, constraints)
+        paths = [free.plan(start, goals, expired, further)]
         with suppress(PlanningError):  # no time is left for further attempts
             while constraints is None and len(paths) < request.attempts:
-                paths.append(free.plan(start, goals, expired))
+                paths.append(free.plan(start, goals, expired, further))
         notes: tuple[str, ...] = ()
         if request.max_cartesian_speed:
             link, most = (
@@ -238,7 +233,7 @@ class Planner:
 
     def _solver(self, link: str) -> IkSolver:
         if link not in self._solvers:
-            self._solvers[link] = IkSolver(self._model, link, self._clock)
+            self._solvers[link] = IkSolver(self._model, link, self._clock, self._draw)
         return self._solvers[link]
 
     def _checked_in(self, scene: PlanningScene) -> ValidityCheck:
@@ -258,66 +253,140 @@ class Planner:
         start: Array,
         check: ValidityCheck,
         constraints: ConstraintCheck | None,
+        deadline: float,
     ) -> list[Array]:
         """Return the states of all goals that are valid, or raise what is wrong with the first."""
-        found = []
+        found: list[Array] = []
         for goal in request.goals:
             with suppress(PlanningError):
-                found += self._states(goal, start, check, constraints)
-        return found or self._states(request.goals[0], start, check, constraints)
+                found += self._states(goal, start, check, constraints, DEFAULT_TIMEOUT)
+        if found:
+            return found
+        refused: PlanningError | None = None
+        for goal in request.goals:  # as long as it takes
+            left = max(deadline - self._clock(), DEFAULT_TIMEOUT)
+            try:
+                return self._states(goal, start, check, constraints, left)
+            except PlanningError as error:
+                refused = refused or error
+        raise refused or PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'no goal')
 
     def _states(
-        self, goal: Goal, start: Array, check: ValidityCheck, constraints: ConstraintCheck | None
+        self,
+        goal: Goal,
+        start: Array,
+        check: ValidityCheck,
+        constraints: ConstraintCheck | None,
+        timeout: float,
     ) -> list[Array]:
         """Return the states of a goal, which are valid and heed path constraints."""
         try:
-            states = _heeding(constraints, self._exact_states(goal, start, check))
+            states = _heeding(constraints, self._exact_states(goal, start, check, timeout))
         except PlanningError as error:
             if error.code not in _NOT_EXACTLY:
                 raise
-            states = list(islice(self._tolerated(goal, check, constraints), IK_SOLUTIONS))
+            tried = islice(self._tolerated(goal, start, check, constraints), GOAL_SAMPLES)
+            found = (state for state in tried if state is not None)
+            states = list(islice(found, IK_SOLUTIONS))
             if not states:
                 raise
         return states
 
-    def _exact_states(self, goal: Goal, start: Array, check: ValidityCheck) -> list[Array]:
+    def _exact_states(
+        self, goal: Goal, start: Array, check: ValidityCheck, timeout: float
+    ) -> list[Array]:
         """Return the states at a goal itself, which are valid."""
         if isinstance(goal, JointGoal):
             state = self._state(goal.positions, 'goal', PlanningCode.INVALID_GOAL_CONSTRAINTS)
+            state = self._model.limits.in_nearest_turn(state, start)
             _require_goal(check.state(state))
-            return [state]
-        states = self.ik(goal.pose, start, link=goal.link, scene=check.scene, count=IK_SOLUTIONS)
+            return [frozen(state)]
+        wanted = IK_SOLUTIONS if timeout == DEFAULT_TIMEOUT else 1
+        states = self.ik(
+            goal.pose, start, link=goal.link, scene=check.scene, timeout=timeout, count=wanted
+        )
         valid = [state for state in states if check.state(state) is None]
         if not valid:
             _require_goal(check.state(states[0]))
-        return valid[:IK_SOLUTIONS]
+        return valid
+
+    def _further(
+        self,
+        goals: Sequence[Goal],
+        start: Array,
+        check: ValidityCheck,
+        constraints: ConstraintCheck | None,
+    ) -> Iterator[Array | None]:
+        """Yield further states of poses without end, None where a try found none."""
+        sources = [
+            source(goal, start, check, constraints)
+            for goal in goals
+            if isinstance(goal, PoseGoal)
+            for source in (self._solutions, self._tolerated)
+        ]
+        while sources:
+            yield from (next(each, None) for each in sources)
+
+    def _solutions(
+        self,
+        goal: PoseGoal,
+        start: Array,
+        check: ValidityCheck,
+        constraints: ConstraintCheck | None,
+    ) -> Iterator[Array | None]:
+        """Yield further solutions of a pose without end, None where a start led to none."""
+        if self._solver(goal.link).closed_form is not None:
+            return  # all are known
+        while True:
+            state = self._solver(goal.link).another(goal.pose, start)
+            yield self._valid(state, check, constraints)
+
+    def _valid(
+        self, state: Array | None, check: ValidityCheck, constraints: ConstraintCheck | None
+    ) -> Array | None:
+        """Return a state that is valid and heeds constraints, else None."""
+        if state is None or check.state(state) is not None:
+            return None
+        return state if constraints is None or constraints.heeds(state) else None
 
     def _tolerated(
-        self, goal: Goal, check: ValidityCheck, constraints: ConstraintCheck | None
-    ) -> Iterator[Array]:
-        """Yield states within the tolerances of a goal, which are valid and heed constraints."""
+        self,
+        goal: Goal,
+        start: Array,
+        check: ValidityCheck,
+        constraints: ConstraintCheck | None,
+    ) -> Iterator[Array | None]:
+        """Yield states within the tolerances of a goal without end, None where a try found none.
+
+        The first are near to the start, the others anywhere.
+        """
         limits = self._model.limits
-        lower = np.where(limits.continuous, -np.pi, limits.lower)
-        upper = np.where(limits.continuous, np.pi, limits.upper)
+        lower = np.where(limits.continuous, start - np.pi, limits.lower)
+        upper = np.where(limits.continuous, start + np.pi, limits.upper)
         if isinstance(goal, JointGoal):
-            tolerance = goal.tolerance if len(goal.tolerance) else np.zeros(len(lower))
-            lower = np.maximum(limits.lower, goal.positions - tolerance)
-            upper = np.minimum(limits.upper, goal.positions + tolerance)
+            if not goal.tolerance.any():
+                return
+            there = limits.in_nearest_turn(goal.positions, start)
+            lower = np.maximum(limits.lower, there - goal.tolerance)
+            upper = np.minimum(limits.upper, there + goal.tolerance)
             ranges = zip(lower.tolist(), upper.tolist(), strict=True)
             tolerances = PathConstraints(dict(zip(self._model.joints, ranges, strict=True)))
+        elif goal.tolerances is None:
+            return
         else:
-            tolerances = _pose_tolerances(goal, goal.link or self._model.tip)
+            tolerances = goal.tolerances
         if (lower > upper).any():
             return  # beyond a limit by more than the tolerance
-        if constraints is not None:
-            tolerances = tolerances.together_with(constraints.constraints)
-        check_goal = ConstraintCheck(self._model, tolerances)
-        for _ in range(GOAL_SAMPLES):
-            state = check_goal.projected(self._draw.uniform(lower, upper), rooms=0.0)
-            if state is None or check.state(state) is not None:
-                continue
-            if constraints is None or constraints.heeds(state):
-                yield frozen(state)
+        others = () if constraints is None else constraints.constraints
+        within, near = (
+            ConstraintCheck(self._model, tolerances, *others),
+            np.clip(start, lower, upper),
+        )
+        for number in count():
+            share = min(number / GOAL_SAMPLES, 1.0)
+            drawn = near + share * (self._draw.uniform(lower, upper) - near)
+            state = within.projected(drawn, rooms=0.0)
+            yield self._valid(None if state is None else frozen(state), check, constraints)
 
     def _refuse(self, request: MotionRequest) -> None:
         """Raise what is wrong with a request before anything is computed."""
@@ -331,18 +400,6 @@ class Planner:
                 raise PlanningError(
                     PlanningCode.FAILURE, f'{name} is {value}; it must be above 0 and up to 1'
                 )
-
-
-def _pose_tolerances(goal: PoseGoal, link: str) -> PathConstraints:
-    """Return what holds where a link reaches a goal."""
-    off = np.asarray(goal.position_tolerance, dtype=float)
-    shape = Box(*(2.0 * off).tolist()) if off.ndim else Sphere(float(off))
-    middle = goal.pose.position + goal.pose.rotation @ goal.offset
-    place = PositionConstraint(
-        link, goal.offset, [PlacedShape(shape, Pose(ORIGIN.rotation, middle))]
-    )
-    turn = OrientationConstraint(link, goal.pose.rotation, goal.orientation_tolerance)
-    return PathConstraints(orientations=[turn], positions=[place])
 
 
 def _require_start(constraints: ConstraintCheck, start: Array) -> None:

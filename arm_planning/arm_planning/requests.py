@@ -34,31 +34,6 @@ class JointGoal:
     tolerance: Array = field(default_factory=lambda: frozen(np.zeros(0)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseGoal:
-    """A goal for a link.
-
-    Attributes:
-        pose: Where the link is to be, in the root link.
-        link: The link; empty for the tip.
-        position_tolerance: Radius of a sphere in [m], or half the edges of a box (3) along the
-            axes of the root link.
-        orientation_tolerance: Angles about the axes of the goal's pose in [rad] (3); MoveIt's
-            absolute_x_axis_tolerance and so on.
-        offset: The point of the link in [m] (3) to which the position tolerance applies.
-    """
-
-    pose: Pose
-    link: str = ''
-    position_tolerance: float | Array = 0.0
-    orientation_tolerance: Array = field(default_factory=lambda: frozen(np.zeros(3)))
-    offset: Array = field(default_factory=lambda: frozen(np.zeros(3)))
-
-
-Goal = JointGoal | PoseGoal
-"""What a motion is to reach."""
-
-
 class Parameterization(IntEnum):
     """Angles of a turn; numbers of moveit_msgs/OrientationConstraint."""
 
@@ -75,12 +50,14 @@ class OrientationConstraint:
         rotation: Rotation matrix (3, 3) from the link that is wanted to the root link.
         tolerance: Greatest angles about the wanted axes in [rad] (3); pi and more is any angle.
         parameterization: Which angles these are.
+        in_link: Rotation matrix (3, 3) to the link of the body or subframe that is turned so.
     """
 
     link: str
     rotation: Array
     tolerance: Array
     parameterization: Parameterization = Parameterization.ROTATION_VECTOR
+    in_link: Array = field(default_factory=lambda: frozen(np.eye(3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,21 +89,24 @@ class PathConstraints:
     orientations: Sequence[OrientationConstraint] = ()
     positions: Sequence[PositionConstraint] = ()
 
-    def together_with(self, others: PathConstraints) -> PathConstraints:
-        """Return what holds where these and others do.
 
-        Args:
-            others: The others.
-        """
-        joints = dict(self.joints)
-        for name, (lower, upper) in others.joints.items():
-            least, most = joints.get(name, (lower, upper))
-            joints[name] = max(least, lower), min(most, upper)
-        return PathConstraints(
-            joints,
-            (*self.orientations, *others.orientations),
-            (*self.positions, *others.positions),
-        )
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseGoal:
+    """A goal for a link.
+
+    Attributes:
+        pose: Where the link is to be, in the root link.
+        link: The link; empty for the tip.
+        tolerances: What is enough where that cannot be reached; None for the pose alone.
+    """
+
+    pose: Pose
+    link: str = ''
+    tolerances: PathConstraints | None = None
+
+
+Goal = JointGoal | PoseGoal
+"""What a motion is to reach."""
 
 
 class CircPointKind(str, Enum):

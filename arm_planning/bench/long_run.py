@@ -57,6 +57,7 @@ def best_length(model: RobotModel, asked: Problem) -> float | None:
             lambda: draw.uniform(model.limits.lower, model.limits.upper),
             motions,
             expired,
+            further=iter(()),
         )
         if places is None:
             break

@@ -5,22 +5,24 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 
 from arm_model import (
     Array,
     Box,
-    Clearances,
     CollisionObject,
     Cone,
     Cylinder,
     frozen,
     JointLimits,
     ORIGIN,
+    PlacedShape,
     PlanningScene,
     Pose,
     RobotModel,
     Sphere,
 )
+from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
 from arm_trajectory import Path
 
 DENSE = 1e-3
@@ -51,6 +53,15 @@ def with_random_boxes(model: RobotModel, count: int, seed: int) -> PlanningScene
     return scene
 
 
+def near(pose: Pose, shape: Box | Sphere, turn: Array) -> PathConstraints:
+    """Return what holds where the tip is in a shape about a pose, and turned by angles at most."""
+    region = PlacedShape(shape, Pose(ORIGIN.rotation, pose.position))
+    return PathConstraints(
+        orientations=[OrientationConstraint('', pose.rotation, turn)],
+        positions=[PositionConstraint('', ORIGIN.position, [region])],
+    )
+
+
 def holds(shape: Box | Sphere | Cylinder | Cone, point: Array, margin: float) -> bool:
     """Return whether a shape holds a point, or nearly; a cone has its tip above its middle."""
     x, y, z = point
@@ -79,11 +90,19 @@ def dense_times(path: Path) -> Array:
     return times
 
 
+def distances(scene: PlanningScene, positions: Array) -> Array:
+    """Return the distance of each pair in [m], all measured anew by pinocchio and coal."""
+    kinematics, geometry = scene.kinematics, scene.geometry
+    data, results = kinematics.native.createData(), geometry.createData()
+    full = kinematics.expanded(positions)
+    pin.computeDistances(kinematics.native, data, geometry, results, full)
+    return np.array([each.min_distance for each in results.distanceResults])
+
+
 def deepest_overlap(path: Path, scene: PlanningScene) -> float:
     """Return the least distance of any pair at the places of the independent sampler in [m]."""
-    clearances = Clearances(scene)
     places = path.positions(dense_times(path))
-    return min(float(clearances.least(place, 0.0).min(initial=np.inf)) for place in places)
+    return min(float(distances(scene, place).min(initial=np.inf)) for place in places)
 
 
 def broken_limits(path: Path, limits: JointLimits) -> list[str]:

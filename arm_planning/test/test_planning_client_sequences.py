@@ -54,6 +54,7 @@ from moveit_msgs.srv import (
 import numpy as np
 from planning_messages import box, panda, tetrahedron
 import pytest
+from sensor_msgs.msg import JointState
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import String
 from std_srvs.srv import Empty
@@ -192,6 +193,31 @@ def test_a_cartesian_path_ends_in_front_of_what_stands_between_its_places(
     assert 'post' in answer.error_code.message
     post.operation = CollisionObject.REMOVE
     assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+
+
+def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
+    """What is not named is free where it cannot stay."""
+    back = Quaternion(y=-math.sin(1.2), w=math.cos(1.2))
+    goal = pose_goal(PoseMessage(orientation=back), HAND, BASE)
+    goal.position_constraints = []
+    stretched = [0.0, 0.9, 0.0, -0.5, 0.0, 1.4, 0.785]
+    request = motion_request(goal)
+    request.start_state.joint_state = JointState(name=JOINTS, position=stretched)
+    response = rig.plan(request)
+    assert response.error_code.val == SUCCESS, response.error_code
+    end = response.trajectory.joint_trajectory.points[-1].positions
+    planner = Planner(panda().model('panda_arm'))
+    wanted = pose_of(PoseMessage(orientation=back), 'wanted').rotation
+    assert planner.fk(frozen(end), HAND).rotation == pytest.approx(wanted, abs=2e-3)
+    # a box that is turned
+    goal = pose_goal(turned_pose(0.4, 0.2, 0.5, (0.0, 0.0, 1.0)), HAND, BASE)
+    goal.orientation_constraints = []
+    goal.position_constraints[0].target_point_offset.z = 0.1
+    region = goal.position_constraints[0].constraint_region
+    region.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.1, 0.01, 0.01])]
+    region.primitive_poses[0].orientation = Quaternion(z=math.sin(0.4), w=math.cos(0.4))
+    response = rig.plan(motion_request(goal))
+    assert response.error_code.val == SUCCESS, response.error_code
 
 
 def test_planning_scene_interface(rig: MoveGroupRig) -> None:

@@ -9,13 +9,14 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import count, pairwise
 import os
+import time
 
 from model_robots import ready, robot, ROBOTS
 import numpy as np
-from planning_scenes import broken_limits, deepest_overlap, with_box, with_random_boxes
+from planning_scenes import broken_limits, deepest_overlap, near, with_box, with_random_boxes
 import pytest
 
-from arm_model import Array, frozen, ORIGIN, PlanningScene, Pose, RobotModel
+from arm_model import Array, Box, frozen, ORIGIN, PlanningScene, Pose, RobotModel, Sphere
 from arm_planning import (
     JointGoal,
     MotionRequest,
@@ -119,6 +120,21 @@ def around_a_pillar(
     scene = with_box(model.scene, 'pillar', (0.1, 0.1, 1.5), (0.4, 0.0, 0.75))
     check = ValidityCheck(model.limits, scene)
     return FreeMotion(model.limits, check, np.random.default_rng(seed)).plan(start, goals, expired)
+
+
+def test_goals_that_are_found_meanwhile_count() -> None:
+    """The first one is behind a wall; the next come while the search runs."""
+    model = robot('panda')
+    scene = with_box(model.scene, 'left', (1.1, 0.02, 1.0), (0.69, 0.0, 0.5))
+    scene = with_box(scene, 'right', (1.1, 0.02, 1.0), (-0.7, 0.0, 0.5))
+    scene = with_box(scene, 'roof', (2.5, 2.5, 0.02), (0.0, 0.0, 0.8))
+    start, behind, here = (ready('panda') + turn * np.eye(7)[0] for turn in (1.2, -1.2, 1.9))
+    free = FreeMotion(model.limits, ValidityCheck(model.limits, scene), np.random.default_rng(0))
+    deadline = time.monotonic() + TIMEOUT
+    path = free.plan(
+        start, [behind], lambda: time.monotonic() > deadline, iter([None, frozen(here)])
+    )
+    assert path.end.position == pytest.approx(here)
 
 
 def length(path: Path) -> float:
@@ -365,12 +381,9 @@ def test_a_pose_out_of_reach_is_reached_within_its_tolerance(name: str, *, box: 
     away = pose.position / np.linalg.norm(pose.position)
     far = Pose(pose.rotation, frozen(away * (1.3 * model.reach + 0.05)))
     size = 0.6 * model.reach
-    near = PoseGoal(
-        far,
-        position_tolerance=frozen([size] * 3) if box else size,
-        orientation_tolerance=frozen([1.0, 1.0, 3.2]),
-    )
-    path = Planner(model).plan(MotionRequest(ready(name), [near], timeout=TIMEOUT)).path
+    shape = Box(*[2.0 * size] * 3) if box else Sphere(size)
+    goal = PoseGoal(far, tolerances=near(far, shape, frozen([1.0, 1.0, 3.2])))
+    path = Planner(model).plan(MotionRequest(ready(name), [goal], timeout=TIMEOUT)).path
     off = model.pose(path.end.position).position - far.position
     assert (np.abs(off).max() if box else np.linalg.norm(off)) <= size + 1e-6
     exact = MotionRequest(ready(name), [PoseGoal(far)], timeout=TIMEOUT)

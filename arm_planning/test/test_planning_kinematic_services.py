@@ -96,9 +96,9 @@ def test_collisions_are_avoided_where_that_is_asked() -> None:
     assert caught.value.code is PlanningCode.NO_IK_SOLUTION
 
 
-def joint_constraint(position: float, tolerance: float = 0.2) -> Constraints:
-    """Return a constraint of joint 1."""
-    limits = JointConstraint(joint_name='panda_joint1', position=position)
+def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -> Constraints:
+    """Return a constraint of a joint."""
+    limits = JointConstraint(joint_name=f'panda_joint{number}', position=position)
     limits.tolerance_above = limits.tolerance_below = tolerance
     return Constraints(joint_constraints=[limits])
 
@@ -128,7 +128,8 @@ def turned(tolerance: float, x: float) -> Constraints:
 @pytest.mark.parametrize(
     ('heeded', 'violated', 'words'),
     [
-        (joint_constraint(0.0), joint_constraint(2.5), 'panda_joint1 is at'),
+        # the place of the wrist alone says where the elbow is
+        (joint_constraint(0.0), joint_constraint(-1.0, number=4), 'panda_joint4 is at'),
         (region(0.0), region(0.3), 'outside of its region'),
         (turned(0.11, 0.1), turned(0.09, 0.1), 'is turned by'),
     ],

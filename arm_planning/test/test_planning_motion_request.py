@@ -20,7 +20,9 @@ from planning_messages import panda, pose_at
 import pytest
 from shape_msgs.msg import SolidPrimitive
 
+from arm_model import Sphere
 from arm_planning import CircPointKind, JointGoal, PlanningCode, PlanningError, PoseGoal
+from arm_planning.requests import Parameterization
 from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 
@@ -86,8 +88,12 @@ def test_a_pose_is_that_of_the_link() -> None:
     assert isinstance(goal, PoseGoal)
     assert goal.link == TIP
     assert goal.pose.position == pytest.approx([0.4, 0.1, 0.4])
-    assert goal.position_tolerance == 0.001
-    assert list(goal.orientation_tolerance) == [0.01, 0.01, 0.02]
+    assert goal.tolerances is not None
+    (point,), (turned,) = goal.tolerances.positions, goal.tolerances.orientations
+    assert point.regions[0].shape == Sphere(0.001)
+    assert point.offset == pytest.approx([0.0, 0.0, 0.1])
+    assert list(turned.tolerance) == [0.01, 0.01, 0.02]
+    assert turned.parameterization is Parameterization.XYZ_EULER_ANGLES
 
 
 def test_unset_fields_have_the_defaults_of_moveit() -> None:

@@ -11,10 +11,27 @@ import os
 from model_robots import ready, robot, ROBOTS
 import numpy as np
 import pinocchio as pin
-from planning_scenes import broken_limits, deepest_overlap, dense_times, holds, with_random_boxes
+from planning_scenes import (
+    broken_limits,
+    deepest_overlap,
+    dense_times,
+    holds,
+    near,
+    with_random_boxes,
+)
 import pytest
 
-from arm_model import Array, Box, Cylinder, frozen, ORIGIN, PlacedShape, Pose, RobotModel
+from arm_model import (
+    Array,
+    Box,
+    Cylinder,
+    frozen,
+    ORIGIN,
+    PlacedShape,
+    Pose,
+    RobotModel,
+    Sphere,
+)
 from arm_planning import (
     JointGoal,
     MotionRequest,
@@ -194,7 +211,7 @@ def test_a_goal_that_breaks_a_constraint_is_reached_where_its_tolerance_heeds_it
     exact: JointGoal | PoseGoal = JointGoal(frozen(places))
     if by_pose:
         exact = PoseGoal(model.pose(frozen(places)))
-        goal = replace(exact, position_tolerance=1, orientation_tolerance=frozen([0.5] * 3))
+        goal = replace(exact, tolerances=near(exact.pose, Sphere(1.0), frozen([0.5] * 3)))
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
     end = path.end.position
@@ -222,7 +239,7 @@ def test_a_tilted_goal_is_reached_upright_where_its_tolerance_is_wide() -> None:
     pose = model.pose(start)
     tilted = pose.rotation @ pin.exp3(np.array([0.2, 0.0, 0.0]))
     aside = Pose(frozen(tilted), frozen(np.add(pose.position, [0.0, 0.2, 0.0])))
-    goal = PoseGoal(aside, position_tolerance=0.01, orientation_tolerance=frozen([0.4] * 3))
+    goal = PoseGoal(aside, tolerances=near(aside, Sphere(0.01), frozen([0.4] * 3)))
     asked = MotionRequest(start, [goal], timeout=TIMEOUT, constraints=constraints)
     path = Planner(model).plan(asked).path
     looks = path.positions(dense_times(path))

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -54,13 +54,20 @@ class FreeMotion:
         self._limits, self._check, self._draw = limits, check, draw
         self._constraints = constraints
 
-    def plan(self, start: Array, goals: Sequence[Array], expired: Callable[[], bool]) -> Path:
+    def plan(
+        self,
+        start: Array,
+        goals: Sequence[Array],
+        expired: Callable[[], bool],
+        further: Iterable[Array | None] = (),
+    ) -> Path:
         """Return a path to one of some goals, timed and valid.
 
         Args:
             start: Joint positions in [rad] (n), valid; constraints hold there.
             goals: Alternatives in [rad] (k, n), valid; constraints hold there.
             expired: Whether the time is over.
+            further: Goals that are looked for while the search runs; None where a try found none.
 
         Raises:
             PlanningError: No path was found in time.
@@ -71,10 +78,11 @@ class FreeMotion:
         direct = float(np.linalg.norm(goals[0] - start))
         searches = MAX_SEARCHES if self._constraints is None else 1
         found: Path | None = None
-        shortest, tried, near = np.inf, 0, None
+        shortest, tried, near, more = np.inf, 0, None, iter(further)
         while not expired() and not (found is not None and tried >= searches):
             tried += 1
-            places = rrt_connect(start, goals, self._sampler(start), motions, expired)
+            sample = self._sampler(start)
+            places = rrt_connect(start, goals, sample, motions, expired, further=more)
             if places is None:
                 break
             places = shortened(places, self._draw, motions, expired)

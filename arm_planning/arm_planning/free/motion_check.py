@@ -67,6 +67,14 @@ class MotionCheck:
             self._model, scene.geometry, results
         )
 
+    def admits(self, goal: Array) -> bool:
+        """Whether a state that was no end when the search began may be one.
+
+        Args:
+            goal: Joint positions in [rad] (n), valid.
+        """
+        return bool((self._check.required(goal) >= self._required).all())
+
     def free(self, positions: Array) -> bool:
         """Whether no pair touches, as far as the broad phase sees.
 

@@ -12,7 +12,8 @@ state; the bench has the comparison.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 
 import numpy as np
 
@@ -25,6 +26,9 @@ MAX_EXTENSION = 1.2
 
 FIRST_NODES = 256
 """Nodes that a tree has room for at first."""
+
+FURTHER_PERIOD = 25
+"""Edges between two looks for a further goal, each of which takes as long as several of them."""
 
 SAME = 1e-9
 """Distance of states that are one in [rad]."""
@@ -74,6 +78,8 @@ def rrt_connect(
     sample: Callable[[], Array],
     check: MotionCheck,
     expired: Callable[[], bool],
+    *,
+    further: Iterator[Array | None],
 ) -> Array | None:
     """Return the places of a path that looks free (m, n); None where the time is over.
 
@@ -83,13 +89,18 @@ def rrt_connect(
         sample: Draws joint positions.
         check: Checks states and motions.
         expired: Whether the time is over.
+        further: Goals that are looked for meanwhile: each is one, or a try that found none.
     """
     for goal in goals:
         if check.clear(start, goal):
             return np.array((start, goal))
     from_start, from_goal = _Tree([start]), _Tree(goals)
     growing, other = from_start, from_goal
-    while not expired():
+    for number in count():
+        if expired():
+            break
+        if number % FURTHER_PERIOD == 0:
+            _add_goal(from_goal, next(further, None), check)
         if growing.count > other.count:
             growing, other = other, growing
         reached = _extend(growing, sample(), check)
@@ -104,6 +115,11 @@ def rrt_connect(
             return np.array([*here, *there[-2::-1]])
         growing, other = other, growing
     return None
+
+
+def _add_goal(tree: _Tree, goal: Array | None, check: MotionCheck) -> None:
+    if goal is not None and check.admits(goal):
+        tree.add(goal, -1)
 
 
 def _extend(tree: _Tree, target: Array, check: MotionCheck) -> int | None:

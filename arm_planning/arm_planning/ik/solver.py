@@ -16,6 +16,7 @@ from arm_model import (
     Clearances,
     frozen,
     JointLimits,
+    Mask,
     PlanningScene,
     Pose,
     RobotModel,
@@ -44,9 +45,6 @@ POLISH_TOLERANCE = 1e-10
 Descriptions whose axes are not quite parallel need them, and solutions that are almost singular.
 """
 
-RANDOM_SEED = 0
-"""Of the starts: the same question has the same answer each time."""
-
 ORTHOGONAL_TOLERANCE = 1e-6
 """How far a rotation matrix may be from one."""
 
@@ -66,7 +64,11 @@ class IkSolver:
     """
 
     def __init__(
-        self, model: RobotModel, link: str = '', clock: Callable[[], float] = time.monotonic
+        self,
+        model: RobotModel,
+        link: str = '',
+        clock: Callable[[], float] = time.monotonic,
+        draw: np.random.Generator | None = None,
     ) -> None:
         """Prepare.
 
@@ -74,6 +76,7 @@ class IkSolver:
             model: The arm.
             link: The link to place; empty for the tip.
             clock: Steady time in [s], for time-outs.
+            draw: Source of the random starts; None for one that begins alike in each solver.
 
         Raises:
             PlanningError: There is no such link, or no joint moves it.
@@ -82,7 +85,9 @@ class IkSolver:
         self.closed_form = ClosedForm.of(self.link)
         self._limits: JointLimits = model.limits
         self._clock = clock
+        self._draw = np.random.default_rng(0) if draw is None else draw
         self._clearances: Clearances | None = None
+        self._turns = _turning(self.link)
 
     def solve(
         self,
@@ -122,10 +127,7 @@ class IkSolver:
         if isinstance(answers, WristMiss):
             raise self._refused(_out_of_reach(self.link.link, answers))
         limits = self._limits
-        rows = np.array(answers)
-        turned = rows + TURN * np.round((seed - rows) / TURN)
-        turned -= TURN * (turned > limits.upper + RANGE_TOLERANCE)
-        turned += TURN * (turned < limits.lower - RANGE_TOLERANCE)
+        turned = self._in_nearest_turn(np.array(answers), seed)
         beyond = np.maximum(limits.lower - turned, turned - limits.upper)
         within = (beyond <= RANGE_TOLERANCE).all(axis=1)
         if not within.any():
@@ -151,7 +153,7 @@ class IkSolver:
         count: int,
     ) -> list[Array]:
         """Return the solutions that the seed and random starts lead to."""
-        limits, draw = self._limits, np.random.default_rng(RANDOM_SEED)
+        limits = self._limits
         deadline = self._clock() + timeout
         best = end = descend(self.link, pose, seed, limits.lower, limits.upper)
         starts = 1
@@ -159,15 +161,14 @@ class IkSolver:
         touching: list[Array] = []
         while True:
             if end.converged:
-                solution = end.positions + self._whole_turns(end.positions, seed)
+                solution = self._in_nearest_turn(end.positions, seed)
                 touches = clearances is not None and _touches(clearances, solution)
                 among = touching if touches else free
                 if not _known(solution, among):
                     among.append(solution)
             if len(free) >= count or starts >= MAX_STARTS or self._clock() >= deadline:
                 break
-            start = random_start(limits, seed, draw)
-            end = descend(self.link, pose, start, limits.lower, limits.upper)
+            end = self._descent(pose, seed)
             best = min(best, end, key=_size)
             starts += 1
         if free:
@@ -177,10 +178,27 @@ class IkSolver:
             raise self._refused(_in_contact(clearances, nearest))
         raise self._refused(self._why_none(pose, best, starts))
 
-    def _whole_turns(self, positions: Array, seed: Array) -> Array:
-        """Return the turns that bring joints without end next to the seed in [rad]."""
-        turns = TURN * np.round((seed - positions) / TURN)
-        return np.where(self._limits.continuous, turns, 0.0)
+    def another(self, pose: Pose, seed: Array) -> Array | None:
+        """Return a solution to which one more random start leads; None for none.
+
+        Args:
+            pose: Where the link is wanted, in the root link.
+            seed: Joint positions in [rad] (n), of which the solution is in the nearest turn.
+        """
+        end = self._descent(pose, seed)
+        return frozen(self._in_nearest_turn(end.positions, seed)) if end.converged else None
+
+    def _descent(self, pose: Pose, seed: Array) -> Descent:
+        start = random_start(self._limits, seed, self._draw)
+        return descend(self.link, pose, start, self._limits.lower, self._limits.upper)
+
+    def _in_nearest_turn(self, positions: Array, seed: Array) -> Array:
+        """Return positions whose joints are in the turns within limits nearest to a seed."""
+        limits, turn = self._limits, TURN * self._turns
+        turned = positions + turn * np.round((seed - positions) / TURN)
+        turned -= turn * (turned > limits.upper + RANGE_TOLERANCE)
+        turned += turn * (turned < limits.lower - RANGE_TOLERANCE)
+        return turned
 
     def _free(self, found: list[Array], clearances: Clearances) -> list[Array]:
         free = [each for each in found if not _touches(clearances, each)]
@@ -266,6 +284,19 @@ def check_pose(pose: Pose) -> None:
             f'rotation of the pose: its axes are off by {off:.2g}; give an orthogonal matrix that'
             ' does not mirror',
         )
+
+
+def _turning(link: LinkKinematics) -> Mask:
+    """Return a mask of the joints whose whole turns leave the link where it is.
+
+    Others slide, or are followed by joints that may not make whole turns.
+    """
+    kinematics = link.kinematics
+    columns = kinematics.projected(link.axes(np.zeros(len(kinematics.joints))))
+    followed = {each.source for each in kinematics.mimics.values()}
+    turning: Mask = np.abs(columns[3:]).max(axis=0) > 0.0
+    turning &= np.array([name not in followed for name in kinematics.joints])
+    return turning
 
 
 def _touches(clearances: Clearances, positions: Array) -> bool:

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 
-from arm_model import Array, checked, JointLimits, Pose, RobotModel
+from arm_model import Array, checked, frozen, JointLimits, Pose, RobotModel
 from arm_trajectory import farthest_beyond, Path
 
 from ..constraints import ConstraintCheck
@@ -186,7 +186,11 @@ class IndustrialPlanner:
         """
         factors = request.velocity_scaling, request.acceleration_scaling
         check_scaling(*factors)
-        joints = scaled(self._model.limits, *factors)
+        limits = self._model.limits
+        joints = scaled(limits, *factors)
+        if isinstance(goal, JointGoal):
+            there = limits.in_nearest_turn(self._checked(goal.positions, 'goal'), start)
+            goal = JointGoal(frozen(there), goal.tolerance)
         solver = self._solver(goal.link if isinstance(goal, PoseGoal) else '')
         if request.planner_id == PTP:
             end = self._joints(goal, start, solver, check)
@@ -220,7 +224,7 @@ class IndustrialPlanner:
     ) -> Curve:
         begin = link.pose(start)
         if isinstance(goal, JointGoal):
-            end = link.pose(self._checked(goal.positions, 'goal'))
+            end = link.pose(goal.positions)
         else:
             check_pose(goal.pose)
             end = goal.pose
@@ -232,13 +236,13 @@ class IndustrialPlanner:
         self, goal: Goal, start: Array, solver: IkSolver, check: ValidityCheck | None
     ) -> Array:
         if isinstance(goal, JointGoal):
-            return self._checked(goal.positions, 'goal')
+            return goal.positions
         return solver.solve(goal.pose, start, None if check is None else check.scene)[0]
 
     def _ends_at(self, full: FullSpeedPath, goal: JointGoal, name: str) -> FullSpeedPath:
         """Compare the end of a line with the joints of its goal: only the pose leads there."""
         names = self._model.limits.names
-        off = np.abs(full.path.end.position - goal.positions)
+        off = np.abs(self._model.limits.error(full.path.end.position, goal.positions))
         worst = int(off.argmax())
         if off[worst] < GOAL_TOLERANCE:
             return full

@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 import math
 from typing import Any
 
 import numpy as np
-from shape_msgs.msg import SolidPrimitive
 
 from arm_model import (
     Array,
@@ -44,9 +42,6 @@ from ..requests import (
 )
 from .geometry import placement, pose_of
 from .scene_snapshot import SceneSnapshot
-
-ANY_ORIENTATION = (math.pi, math.pi, math.pi)
-"""Tolerance of a goal that names a position only in [rad]."""
 
 OMPL, PILZ = PIPELINES
 
@@ -163,9 +158,7 @@ class RequestReader:
         if message.visibility_constraints:
             raise _bad_goal('visibility constraints are not supported')
         joints = self._joint_ranges(message.joint_constraints)
-        turns = [
-            self._of_link(self._orientation(each)) for each in message.orientation_constraints
-        ]
+        turns = [self._orientation(each) for each in message.orientation_constraints]
         places = [self._positions_in(each) for each in message.position_constraints]
         if not (joints or turns or places):
             return None
@@ -220,6 +213,7 @@ class RequestReader:
 
     def _joint_ranges(self, messages: Sequence[Any]) -> dict[str, tuple[float, float]]:
         ranges: dict[str, tuple[float, float]] = {}
+        continuous = dict(zip(self._model.joints, self._model.limits.continuous, strict=True))
         for each in messages:
             name, position, below, above = self._leading(each)
             if name not in self._model.joints:
@@ -232,6 +226,9 @@ class RequestReader:
                     f' {numbers}; they must be finite, the tolerances not negative'
                 )
             before = ranges.get(name, (-math.inf, math.inf))
+            if name in ranges and continuous[name]:
+                middle = 0.5 * sum(before)
+                position = middle + math.remainder(position - middle, math.tau)
             lower = max(before[0], position - below)
             upper = min(before[1], position + above)
             if lower > upper + ROUNDING:
@@ -261,42 +258,24 @@ class RequestReader:
             )
         link, _ = self._link_of(next(iter(names)))
         here = self._snapshot.frame(link, self._positions)
-        rotation, tolerance = here.rotation, frozen(ANY_ORIENTATION)
-        if turns:
-            wanted = self._of_link(self._orientation(turns[0]))
-            rotation, tolerance = wanted.rotation, wanted.tolerance
-        if not positions:
-            return PoseGoal(Pose(rotation, here.position), link, 0.0, tolerance)
-        point, radius, offset = self._region_goal(positions[0])
-        place = frozen(point - rotation @ offset)
-        return PoseGoal(Pose(rotation, place), link, radius, tolerance, offset)
+        rotation, place = here.rotation, here.position
+        within = PathConstraints(
+            orientations=[self._orientation(each) for each in turns],
+            positions=[self._positions_in(each) for each in positions],
+        )
+        for turn in within.orientations:
+            rotation = frozen(turn.rotation @ turn.in_link.T)
+        for point in within.positions:
+            place = frozen(point.regions[0].pose.position - rotation @ point.offset)
+        return PoseGoal(Pose(rotation, place), link, within)
 
-    def _region_goal(self, message: Any) -> tuple[Array, float | Array, Array]:  # noqa: ANN401
-        """Return middle, tolerance and the point of the link of a position constraint."""
-        placed = self._positions_in(message, most=1)
-        (region,) = placed.regions
-        primitive = message.constraint_region.primitives[0]
-        lengths = [float(each) for each in primitive.dimensions]
-        if primitive.type == SolidPrimitive.SPHERE:
-            return region.pose.position, lengths[0], placed.offset
-        if primitive.type == SolidPrimitive.BOX:
-            # half the edges of the box around it, if it is turned
-            half = np.abs(region.pose.rotation) @ (0.5 * np.array(lengths))
-            if not np.allclose(np.sort(half), np.sort(0.5 * np.array(lengths))):
-                raise _bad_goal(
-                    'the region of a position goal is a box that is turned; use a'
-                    ' sphere, or a box along the axes of the root link'
-                )
-            return region.pose.position, frozen(half), placed.offset
-        raise _bad_goal('the region of a position goal must be a sphere or a box')
-
-    def _positions_in(self, message: Any, most: int = 100) -> PositionConstraint:  # noqa: ANN401
+    def _positions_in(self, message: Any) -> PositionConstraint:  # noqa: ANN401
         region, what = message.constraint_region, f'position constraint of {message.link_name!r}'
         count = len(region.primitives)
-        if region.meshes or not 1 <= count <= most or len(region.primitive_poses) != count:
+        if region.meshes or not count or len(region.primitive_poses) != count:
             raise _bad_goal(
                 f'{what}: its region has {count} primitives, {len(region.primitive_poses)} poses'
-                f' and {len(region.meshes)} meshes; give it one primitive with a pose'
+                f' and {len(region.meshes)} meshes; give it primitives, and a pose for each'
             )
         offset = placement(xyz(message.target_point_offset), (), what, BAD_GOAL).position
         link, place = self._link_of(message.link_name)
@@ -337,18 +316,14 @@ class RequestReader:
                 f'{what}: no parameterization {message.parameterization}; choose'
                 ' XYZ_EULER_ANGLES (0) or ROTATION_VECTOR (1)'
             )
+        link, place = self._link_of(message.link_name)
         return OrientationConstraint(
-            message.link_name,
+            link,
             frozen(rotation),
             frozen(tolerance),
             Parameterization(message.parameterization),
+            place.rotation,
         )
-
-    def _of_link(self, constraint: OrientationConstraint) -> OrientationConstraint:
-        """Return the constraint of a body or subframe as one of the link that carries it."""
-        pose = Pose(constraint.rotation, ORIGIN.position)
-        link, in_link = self.on_link(pose, constraint.link)
-        return replace(constraint, link=link, rotation=in_link.rotation)
 
     def _via(self, message: Any) -> CircPoint | None:  # noqa: ANN401
         """Return the point of a circle, which Pilz' planner has as a path constraint."""
