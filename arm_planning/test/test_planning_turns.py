@@ -28,7 +28,8 @@ def texts() -> tuple[str, str, dict[str, Any]]:
     """Return URDF, SRDF and limits of an arm whose first joint has no end, the last two turns."""
     urdf, srdf, limits = chain_texts('cyyzyyz')
     head, last, tail = urdf.partition('<joint name="j7"')
-    return head + last + tail.replace('lower="-2" upper="2"', 'lower="-6.28" upper="6.28"'), srdf, limits
+    turns = tail.replace('lower="-2" upper="2"', 'lower="-6.28" upper="6.28"')
+    return head + last + turns, srdf, limits
 
 
 @pytest.fixture(name='rig', scope='module')
@@ -59,7 +60,7 @@ def end(rig: MoveGroupRig, goal: Constraints, **fields: Any) -> list[float]:
 
 @pytest.mark.parametrize('planner', ['', 'PTP'])
 def test_a_joint_without_end_turns_the_shorter_way(rig: MoveGroupRig, planner: str) -> None:
-    """By 0.08 from -3.1 to 3.1, and constraints hold in any turn; others go where they are sent."""
+    """By 0.08 from -3.1 to 3.1; constraints hold in any turn; others go where they are sent."""
     goal = joint_goal([3.1, -3.0], ['j1', 'j7'])
     near = JointConstraint(joint_name='j1', position=3.14, weight=1.0)
     near.tolerance_above = near.tolerance_below = 0.1
