@@ -12,6 +12,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 from isolation import Isolation
+import numpy as np
 import pytest
 import rclpy
 from rclpy.context import Context
@@ -20,6 +21,7 @@ from servo_drives import Drives, PERIOD
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from arm_canopen import Refusal, RefusalCause
+from arm_model import JointLimits
 from arm_servo import NotReadyError
 from arm_servo.core.hold_to_run import GONE_AFTER
 from arm_servo.core.trajectory_stream import TOGETHER, TrajectoryStream
@@ -88,18 +90,33 @@ class Arm:
 
 
 @pytest.fixture
-def arm(isolation: Isolation) -> Iterator[Arm]:
-    """The controller on a node."""
+def node(isolation: Isolation) -> Iterator[Any]:
+    """The node of the controller."""
     context = Context()
     rclpy.init(context=context, domain_id=isolation.domain_id)
     node: Any = Node('panda_arm_controller', context=context, enable_rosout=False)
     try:
-        yield Arm(node)
+        yield node
     finally:
         for waitable in list(node.waitables):
             waitable.destroy()
         node.destroy_node()
         rclpy.shutdown(context=context)
+
+
+@pytest.fixture
+def arm(node: Any) -> Arm:
+    """The controller on it."""
+    return Arm(node)
+
+
+def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> None:
+    """5 cm is not there for a slide of half a metre; an end effector may end at what it holds."""
+    names = ('slide', 'turn', 'round')
+    low, high = np.array([0.0, -3.0, -np.inf]), np.array([0.5, 3.0, np.inf])
+    limits = JointLimits(names, low, high, *(np.ones(3) for _ in range(3)))
+    goal = declare_trajectory(node, names, limits).goal
+    assert [goal[name].position for name in names] == pytest.approx([0.005, 0.05, 0.05])
 
 
 def halts(arm: Arm) -> None:

@@ -91,7 +91,11 @@ class ArmMotion(Generic[AnyDrives]):
             ModelError: The parameters do not fit the arm.
         """
         self.nodes: Sequence[Node] = [node for node in (controller, servo) if node is not None]
-        trajectory = None if controller is None else declare_trajectory(controller, model.joints)
+        trajectory = (
+            None
+            if controller is None
+            else declare_trajectory(controller, model.joints, model.limits)
+        )
         jogging = None if servo is None else declare_servo(servo, model)
         check = trajectory.check if trajectory is not None else _check_of_servo(servo)
         self.drives = drives = make_drives(

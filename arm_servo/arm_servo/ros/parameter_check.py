@@ -71,7 +71,7 @@ def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declar
         declare_manager(node, main)
 
     def controller(model: RobotModel, node: Node, *, checks: bool = True) -> None:
-        declare_trajectory(node, model.joints, checks=checks)
+        declare_trajectory(node, model.joints, model.limits if checks else None, checks=checks)
         declare_loop(node, '')
         declare_output(node, '', '', ARRAY)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rclpy.node import Node
 
-from arm_model import ModelError
+from arm_model import JointLimits, ModelError
 from arm_trajectory import GoalRules, JointTolerance
 from node_runner import ParameterReader
 
@@ -20,6 +20,9 @@ RATE_RANGE = (0.1, 1000.0)
 
 GOAL_TOLERANCE = 0.05
 """Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
+
+GOAL_RANGE_SHARE = 0.01
+"""Share of the range of an arm's joint that the default is at most: 0.05 m is far on a slide."""
 
 GOAL_TIME = 5.0
 """Default of the time to come within it in [s]: a client of a stuck arm gets a result."""
@@ -49,13 +52,14 @@ class TrajectoryParameters:
 
 
 def declare_trajectory(
-    node: Node, joints: Sequence[str], *, checks: bool = True
+    node: Node, joints: Sequence[str], limits: JointLimits | None = None, *, checks: bool = True
 ) -> TrajectoryParameters:
     """Declare the parameters of the trajectory controller.
 
     Args:
         node: The node.
         joints: Names of the group's joints.
+        limits: Their limits; None for an end effector, whose joints may end at what they hold.
         checks: Default of whether motions on whose way links meet are refused.
 
     Raises:
@@ -75,8 +79,8 @@ def declare_trajectory(
     )
     path = {name: JointTolerance(_constraint(read, name, 'trajectory', 0.0)) for name in joints}
     goal = {
-        name: JointTolerance(_constraint(read, name, 'goal', GOAL_TOLERANCE), stopped)
-        for name in joints
+        name: JointTolerance(_constraint(read, name, 'goal', default), stopped)
+        for name, default in zip(joints, _goal_tolerances(joints, limits), strict=True)
     }
     rules = GoalRules(
         partial=read.flag(
@@ -105,6 +109,13 @@ def declare_trajectory(
         ),
         declare_check(read, default=checks),
     )
+
+
+def _goal_tolerances(joints: Sequence[str], limits: JointLimits | None) -> Sequence[float]:
+    if limits is None:
+        return [GOAL_TOLERANCE] * len(joints)
+    ranges = limits.upper - limits.lower
+    return [min(GOAL_TOLERANCE, float(GOAL_RANGE_SHARE * each)) for each in ranges]
 
 
 def declare_check(read: ParameterReader, *, default: bool = True) -> bool:
