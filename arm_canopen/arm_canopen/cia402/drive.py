@@ -203,10 +203,17 @@ class Drive:
             self.stop.begin()
 
     async def lead_to_rest(self, reason: str) -> None:
-        """Bring it to rest and take its power away, because its device is given up."""
-        if self.view.state in POWERED:
+        """Bring it to rest and take its power away, before its device is configured.
+
+        What TPDOs do not show is read by SDO; one that does not answer is left as it is.
+        """
+        await self.stop.ended()  # that the loss of its device has begun
+        state = self.view.state if self.view.fresh else await self.view.look()
+        if state in (*POWERED, DriveState.FAULT_REACTION_ACTIVE):
             self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason)
             await self.stop.ended()
+        if not self.node.operational:
+            self.view.lose_sight()
 
     def _take_out(self, refusal: Refusal, text: str) -> None:
         """Stop and disable it; only the first cause is reported until it is enabled again."""
@@ -408,6 +415,8 @@ class Drive:
         view.cache.forget(reason)
         if self._polling is not None:
             self._polling.cancel(SdoError(reason))
+        by_itself = self.node.left_by_itself
+        moves = by_itself and view.state in POWERED
         enabled = control.goal is view.state is DriveState.OPERATION_ENABLED
         if enabled and not self.node.left_operational:
             self.interrupted = control.mode.number
@@ -424,3 +433,5 @@ class Drive:
         if self.node.left_operational:
             cause = RefusalCause.NOT_OPERATIONAL
         self.released(Refusal(cause, reason))
+        if moves:  # it may hear what it does not answer
+            self.stop.begin(quiet=True)

@@ -242,18 +242,23 @@ class DriveView:
         self._looked = None
         self._estimate.clear()
 
-    async def look(self) -> None:
-        """Read statusword and position by SDO; what is not answered stays unknown."""
+    async def look(self) -> DriveState:
+        """Read statusword and position by SDO, and return the state.
+
+        What is not answered stays unknown.
+        """
         objects, begin = self.node.objects, self._scheduler.now
         try:
             word = await objects.read_object(self.objects.at(Index.STATUSWORD))
             position_inc = await objects.read_object(self.objects.at(Index.POSITION_ACTUAL))
         except (SdoError, CodecError):
-            return
-        if isinstance(word, int) and isinstance(position_inc, int):
-            self._looked, self._looked_at = (word, position_inc), begin
-            if not self.fresh:
-                self._estimate.note(self._scheduler.now, position_inc)
+            return DriveState.UNKNOWN
+        if not (isinstance(word, int) and isinstance(position_inc, int)):
+            return DriveState.UNKNOWN
+        self._looked, self._looked_at = (word, position_inc), begin
+        if not self.fresh:
+            self._estimate.note(self._scheduler.now, position_inc)
+        return drive_state(word)
 
     @contextmanager
     def looking(self) -> Iterator[None]:

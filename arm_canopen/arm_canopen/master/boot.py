@@ -134,6 +134,9 @@ class BootProcess:
         node = self._node
         self._enter(BootPhase.IDENTITY)
         await self._check_identity(node.config.identity)
+        self._enter(BootPhase.RESTING)
+        for lead in node.lead_to_rest:
+            await lead(f'it moved when its device was found ({node.loss or "not led before"})')
         # PDO parameters may only be written while the device does not process PDOs
         await self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         if node.life.silent and node.config.uses_node_guarding:

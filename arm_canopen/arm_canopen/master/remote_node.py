@@ -33,6 +33,7 @@ class BootPhase(Enum):
 
     WAITING = 'waiting for the device'
     STATE = 'asking for its NMT state'
+    RESTING = 'bringing its axes to rest'
     IDENTITY = 'checking its identity'
     CONFIGURING = 'configuring'
     ERROR_CONTROL = 'waiting for its life sign'
@@ -136,6 +137,11 @@ class RemoteNode:
     def was_booted(self) -> bool:
         """Whether this master has booted it, so that its axes may move by a command of ours."""
         return self.online or bool(self.loss)
+
+    @property
+    def left_by_itself(self) -> bool:
+        """Whether no NMT command has brought it where it is."""
+        return not self._being_reset and self.wanted in {None, NmtState.OPERATIONAL}
 
     @property
     def phase_text(self) -> str:

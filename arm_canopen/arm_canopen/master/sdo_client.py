@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from ..can.frame import Frame
 from ..exceptions import SdoAbortError, SdoError, SdoTimeoutError
@@ -37,6 +37,14 @@ DownloadHook: TypeAlias = Callable[[int, int, bytes, Promise[None]], None]
 BLOCK_MIN = 256  # [byte] from which on a value is written in blocks
 SIZE_MAX = 16 << 20  # [byte] that a device may announce
 UNANNOUNCED_MAX = 1 << 20  # [byte] that it may send without having announced a length
+
+
+class _Queued(NamedTuple):
+    """A transfer that waits, the promise of its end, and whether it may begin twice."""
+
+    transfer: Transfer[Any]
+    promise: Promise[Any]
+    again: bool
 
 
 class SdoClient:
@@ -74,9 +82,10 @@ class SdoClient:
         self._scheduler = scheduler
         self._dictionary = dictionary
         self._channel = SdoChannel(node_id, name, scheduler, send, on_odd)
-        self._queue: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
-        self._urgent: deque[tuple[Transfer[Any], Promise[Any]]] = deque()
+        self._queue: deque[_Queued] = deque()
+        self._urgent: deque[_Queued] = deque()
         self._yields = False  # the transfer that runs ends for an urgent one
+        self._made_way = False  # it has done so
         self._busy = False
         self._running: Task[Any] | None = None
         self._has_blocks = True  # as long as the device has not shown the contrary
@@ -102,7 +111,9 @@ class SdoClient:
             Promise of the bytes; rejected with SdoAbortError or SdoTimeoutError.
         """
         upload = partial(self._upload, index, subindex, timeout, block=block)
-        return self._enqueue(upload, Promise())
+        promise: Promise[bytes] = Promise()
+        self._enqueue(self._queue, _Queued(upload, promise, again=True))
+        return promise
 
     def write(
         self,
@@ -122,8 +133,9 @@ class SdoClient:
             data: The value as it is sent.
             timeout: Longest time for each answer of the device in [s].
             repeat: Writing the value twice does no harm, so a lost frame may be sent again.
-            urgent: It leaves at once, and ends the transfer that runs unless that is urgent, too;
-                an outstanding answer for the object counts as its own.
+            urgent: It leaves at once, and ends the transfer that runs unless that is urgent, too:
+                an upload begins again after it, a download fails. An outstanding answer for the
+                object counts as its own.
 
         Returns:
             Promise of the end; rejected with SdoAbortError or SdoTimeoutError.
@@ -137,8 +149,10 @@ class SdoClient:
         download = partial(
             self._download, index, subindex, data, timeout, leave, repeat=repeat, urgent=urgent
         )
-        self._enqueue(download, promise, urgent=urgent)
+        queue = self._urgent if urgent else self._queue
+        self._enqueue(queue, _Queued(download, promise, again=False))
         if urgent and self._yields:
+            self._made_way = True
             self._end_running('made way for an urgent SDO')
         return promise
 
@@ -148,8 +162,8 @@ class SdoClient:
         self._urgent.clear()
         self._queue.clear()
         self._end_running(reason)
-        for _, promise in queue:
-            promise.reject(SdoError(f'{self._name}: {reason}'))
+        for entry in queue:
+            entry.promise.reject(SdoError(f'{self._name}: {reason}'))
 
     def restarted(self) -> None:
         """The device has restarted; requests from now on are answered anew."""
@@ -169,29 +183,28 @@ class SdoClient:
             self._channel.cancel()
             self._running.cancel(SdoError(f'{self._name}: {reason}'))
 
-    def _enqueue(
-        self, transfer: Transfer[T], promise: Promise[T], *, urgent: bool = False
-    ) -> Promise[T]:
-        queue = self._urgent if urgent else self._queue
-        queue.append((transfer, promise))
+    def _enqueue(self, queue: deque[_Queued], entry: _Queued) -> None:
+        queue.append(entry)
         if not self._busy:
             self._scheduler.background(self._work())
-        return promise
 
     async def _work(self) -> None:
         self._busy = True
         while self._urgent or self._queue:
-            self._yields = not self._urgent
-            transfer, promise = (self._urgent or self._queue).popleft()
+            self._yields, self._made_way = not self._urgent, False
+            entry = (self._urgent or self._queue).popleft()
             try:
                 # a task of its own, so that it can be ended wherever it waits
-                self._running = self._scheduler.spawn(transfer())
+                self._running = self._scheduler.spawn(entry.transfer())
                 result = await self._running
             except Exception as error:  # noqa: BLE001  # belongs to the caller
-                promise.reject(error)
+                if self._made_way and entry.again:
+                    self._queue.appendleft(entry)
+                else:
+                    entry.promise.reject(error)
             else:
                 self.counters.done += 1
-                promise.resolve(result)
+                entry.promise.resolve(result)
         self._busy, self._running, self._yields = False, None, False
 
     async def _upload(self, index: int, subindex: int, timeout: float, *, block: bool) -> bytes:

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from drive_samples import SCALE
+from drive_samples import PERIOD, SCALE
 from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
+from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.exceptions import DriveError
 from arm_canopen.library.bus_master import leave_device
@@ -117,3 +118,38 @@ def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(nmt: NmtC
     if not stands:
         with pytest.raises(DriveError, match='cut its power'):
             leaving.result()
+
+
+@OPTIONS
+@pytest.mark.parametrize('hears', [True, False], ids=['hears', 'cut off'])
+def test_a_device_that_comes_back_in_motion_is_braked_before_it_is_configured(
+    option: int, *, hears: bool
+) -> None:
+    """Nothing of it arrived for a while; where it heard, it was stopped all the same."""
+    moving = turning(option)
+    moving.net.wire.loses = lambda sender, frame: sender == JOINT or not hears
+    moving.run(0.6)
+    assert not moving.net.network.nodes[JOINT].online
+    assert (moving.device.state is DriveState.OPERATION_ENABLED) is not hears
+    lose(moving)
+    while not nmt_commands(moving):
+        moving.run(PERIOD)
+    assert abs(moving.device.velocity) / SCALE < STANDING
+    assert moving.fastest < STANDING
+    moving.net.run_until(moving.net.all_ready)
+
+
+@OPTIONS
+def test_a_device_that_leaves_operational_by_itself_in_motion_is_braked_at_once(
+    option: int,
+) -> None:
+    """By SDO, not after the pause before its boot."""
+    moving = turning(option)
+    unseen = Frame(0x000, bytes((NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)))
+    moving.net.devices[JOINT].receive(unseen, moving.net.now)
+    moving.run(0.2)
+    assert moving.device.state is DriveState.QUICK_STOP_ACTIVE
+    moving.run(RAMP + 2.0)
+    assert moving.net.all_ready()
+    assert moving.fastest < STANDING
+    assert moving.states[1:] == [DriveState.QUICK_STOP_ACTIVE, DriveState.SWITCH_ON_DISABLED]

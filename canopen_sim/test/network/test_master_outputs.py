@@ -176,7 +176,9 @@ def test_the_position_of_a_drive_is_read_once_for_all_its_targets() -> None:
     """The targets of modes 7 and 8 both start where the drive is."""
     net = VirtualNetwork(bus_config(every_mode(drive_config('a', 2))))
     net.boot()
-    begun = [data for data in net.frames(0x602) if data[:4] == b'\x40\x64\x60\0']
+    (configured,) = (sent.time for sent in net.wire.log if sent.frame.data == b'\x80\x02')
+    requests = net.frames(0x602, since=configured)
+    begun = [data for data in requests if data[:4] == b'\x40\x64\x60\0']
     assert len(begun) == 1
 
 

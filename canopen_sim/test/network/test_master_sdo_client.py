@@ -575,7 +575,7 @@ def test_cancelling_ends_all_and_leaves_the_client_ready(progress: int) -> None:
     'progress', [0, 1, 2], ids=['requested', 'first segment', 'second segment']
 )
 def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> None:
-    """Those that wait come after it; the one that ran gets the reason."""
+    """Those that wait come after it; the read that ran begins again before them."""
     line = Line()
     server = SdoByteServer(values={(0x1018, 1): b'0123456789abcdef', (0x1018, 2): b'*'})
     running, waiting = read(line), read(line, subindex=2)
@@ -587,15 +587,23 @@ def test_an_urgent_write_ends_what_runs_and_passes_what_waits(progress: int) -> 
     urgent = [
         line.client.write(0x6040, 0, data, TIMEOUT, urgent=True) for data in (b'\2\0', b'\0\0')
     ]
-    with pytest.raises(SdoError, match='joint1: made way for an urgent SDO'):
-        running.result()
+    assert not running.done
     assert [data[0] for data in line.sent] == [0x80, 0x2B], 'aborted, then written'
     assert not waiting.done
     line.serve(server.answer)
     assert all(promise.result() is None for promise in urgent)
     assert server.values[0x6040, 0] == b'\0\0', 'they changed places'
-    assert waiting.result() == b'*'
+    assert (running.result(), waiting.result()) == (b'0123456789abcdef', b'*')
     assert line.defects == []
+
+
+def test_a_write_that_makes_way_for_an_urgent_one_fails() -> None:
+    """The device may have it already, and must not get it twice."""
+    line = Line()
+    running = write(line, b'0123456789')
+    line.client.write(0x6040, 0, b'\2\0', TIMEOUT, urgent=True)
+    with pytest.raises(SdoError, match='joint1: made way for an urgent SDO'):
+        running.result()
 
 
 def test_an_urgent_write_leaves_while_an_answer_to_the_same_object_is_outstanding() -> None:
