@@ -203,7 +203,7 @@ def test_a_wrong_sign_and_scale_are_found_on_the_page(
         joint.move(page)
         page.keyboard.press('Space')
         joint.wait_for_rest()
-        page.get_by_text('stopped; prepare it anew').wait_for()
+        page.get_by_text('ended by a stop; prepare it anew').wait_for()
         assert joint.state is DriveState.OPERATION_ENABLED, 'it holds'
         page.mouse.up()
         joint.wait_for_rest()

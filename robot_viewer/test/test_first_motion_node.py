@@ -266,7 +266,7 @@ def test_stop_ends_a_motion_and_keeps_what_was_measured(robot: Robot) -> None:
     robot.prepare()
     robot.hold(0.5)
     robot.motion.stop()
-    assert robot.shown[-1] == 'stopped; prepare it anew'
+    assert robot.shown[-1] == 'ended by a stop; prepare it anew'
     count = len(robot.targets)
     robot.hold(0.5)
     assert len(robot.targets) == count

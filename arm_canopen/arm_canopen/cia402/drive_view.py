@@ -221,11 +221,11 @@ class DriveView:
         """Take state and position from the process image, or from the last look by SDO."""
         shown = self.objects.observe() if self.node.operational else None
         self.fresh = shown is not None and self.objects.fresh(self._scheduler.now)
-        if self._looks:
-            shown = self._looked
-        elif self.fresh and shown is not None:
+        if self.fresh and shown is not None:
             stamp = self.objects.position_timestamp
             self._estimate.note(self._scheduler.now, shown[1], stamp)
+        elif self._looks:
+            shown = self._looked
         else:
             self._estimate.clear()
         if shown is None:

@@ -11,6 +11,7 @@ from ..exceptions import CodecError, SdoError
 from ..master.events import Severity
 from ..master.scheduler import Scheduler, Task
 from ..standard.drive import DriveState, statusword_text
+from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
 from .drive_view import DriveView
 from .state_machine import Command
@@ -204,6 +205,8 @@ class StopSequence:
         by_sdo = view.objects.controlword_muted or not view.node.operational
         while True:
             if by_sdo:
+                if view.node.nmt_state is NmtState.STOPPED:  # in which it takes no SDO
+                    view.node.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
                 view.objects.mute_controlword()
                 self._write()
             if await self._within(min(REACTION_TIME, left()), reacts) or not left():

@@ -114,6 +114,8 @@ class Network:
             for node in config.nodes
         }
         nodes = list(self.nodes.values())
+        for node in nodes:
+            node.send_nmt = partial(self._send_nmt_to, node)
         self._startup = Startup(master, nodes, self.scheduler, self.send_nmt, report)
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
@@ -271,6 +273,9 @@ class Network:
 
     async def _all(self, sent: Sequence[Promise[None]]) -> None:
         await self.scheduler.gather(sent)
+
+    def _send_nmt_to(self, node: RemoteNode, command: NmtCommand) -> Promise[None]:
+        return self.send_nmt(command, node.config.node_id)
 
     def publish_object(self, node: RemoteNode, index: int, subindex: int, value: Number) -> None:
         """Send an object by the RPDOs that carry it.

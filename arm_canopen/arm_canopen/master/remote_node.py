@@ -66,6 +66,7 @@ class RemoteNode:
         life: Its heartbeat, or its answers to node guarding.
         emergencies: Its EMCYs.
         pdos: Whether its TPDOs come.
+        send_nmt: Sends it an NMT command.
         on_boot_up: Called when it has restarted.
         on_lost: Its drivers, which stop; each gets the reason.
         on_gone: Called when it was lost by itself; what an NMT command does to it is no loss.
@@ -115,6 +116,7 @@ class RemoteNode:
         self.life = LifeSigns(config, send)
         self.emergencies = EmergencyLog(self.report)
         self.pdos = PdoWatch(self.image.tpdos, self.report)
+        self.send_nmt: Callable[[NmtCommand], object] = lambda command: None
         self.on_boot_up: Callable[[], None] = lambda: None
         self.on_lost: list[Callable[[str], None]] = []
         self.on_gone: Callable[[], None] = lambda: None

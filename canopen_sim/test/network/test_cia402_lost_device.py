@@ -95,14 +95,15 @@ def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option
     moving.net.do(JOINT, 'enable')
 
 
-@pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
-def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(nmt: NmtCommand) -> None:
-    """Pre-operational it is stopped by SDO first; in the NMT state Stopped nothing is seen."""
+@pytest.mark.parametrize('lost', [False, True])
+def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(*, lost: bool) -> None:
+    """Pre-operational it is stopped by SDO first; where none arrives, it goes on to watch."""
     moving = turning(6)
     net, node = moving.net, moving.net.network.nodes[JOINT]
     node.watch_slot = 1
-    net.network.send_nmt(nmt, NODE_ID)
+    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
     moving.run(0.3)
+    lose(moving, *([0x600 + NODE_ID] if lost else []))
     assert abs(moving.device.velocity) / SCALE == pytest.approx(1.0)
 
     def unwatched() -> bool:
@@ -113,9 +114,9 @@ def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(nmt: NmtC
     leaving = scheduler.spawn(leave_device(node, [net.commands[JOINT]], scheduler))
     net.run_until(lambda: leaving.done or unwatched(), SHUTDOWN_MAX)
     stands = abs(moving.device.velocity) / SCALE < STANDING
-    assert stands is unwatched() is (nmt is NmtCommand.ENTER_PRE_OPERATIONAL)
-    assert leaving.done is not stands
-    if not stands:
+    assert stands is unwatched() is not lost
+    assert leaving.done is lost
+    if lost:
         with pytest.raises(DriveError, match='cut its power'):
             leaving.result()
 

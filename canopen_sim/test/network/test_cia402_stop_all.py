@@ -51,8 +51,9 @@ def test_all_drives_stand_and_it_says_what_became_of_each() -> None:
 
 
 @pytest.mark.parametrize('nmt', [NmtCommand.ENTER_PRE_OPERATIONAL, NmtCommand.STOP])
-def test_a_device_without_pdos_is_stopped_by_sdo_where_it_has_one(nmt: NmtCommand) -> None:
-    """Pre-operational it takes SDOs; stopped it takes none, so it is not known to stand."""
+@pytest.mark.parametrize('lost', [(), (0x582,)], ids=['SDO', 'no SDO'])
+def test_a_device_without_pdos_is_stopped_by_sdo(nmt: NmtCommand, lost: tuple[int, ...]) -> None:
+    """Stopped it takes none before it is pre-operational; unanswered, its rest is unknown."""
     writes = (*MOTION_WRITES, sdo_write(0x6007, 0, 0), sdo_write(0x605A, 0, 6))
     net = VirtualNetwork(bus_config(drive_config(MOVES, 2, sdo_writes=writes)))
     net.boot()
@@ -62,14 +63,15 @@ def test_a_device_without_pdos_is_stopped_by_sdo_where_it_has_one(nmt: NmtComman
     net.run(0.5)
     net.network.send_nmt(nmt, 2)
     net.run(0.3)
+    assert speed(net, MOVES) == pytest.approx(0.5)
+    net.wire.loses = lambda sender, frame: frame.can_id in lost
     report = stop(net)
-    if nmt is NmtCommand.STOP:
-        assert speed(net, MOVES) == pytest.approx(0.5)
+    assert speed(net, MOVES) < STANDING
+    if lost:
         assert report == StopReport((), (), (), report.failed)
         assert report.failed[0].startswith(f'{MOVES} is not seen to come to rest; ')
-        assert 'NMT state STOPPED' in report.failed[0]
+        assert 'NMT state PRE_OPERATIONAL' in report.failed[0]
         return
-    assert speed(net, MOVES) < STANDING
     assert report == StopReport((MOVES,), (), (), ())
     assert state(net, MOVES) is DriveState.QUICK_STOP_ACTIVE
 

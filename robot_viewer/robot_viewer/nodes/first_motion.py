@@ -214,7 +214,7 @@ class FirstMotion:
         """Command nothing any more: the robot was stopped."""
         if self.busy:  # else what was measured is kept
             self._end()
-            self._begin('stopped; prepare it anew')
+            self._begin('ended by a stop; prepare it anew')
 
     def _end(self) -> None:
         """Forget what was prepared and measured."""
