@@ -93,6 +93,7 @@ def test_a_bus_yml_is_changed_in_place(device: str, tmp_path: Path) -> None:
     judgement = Judgement(Verdict.WRONG_SIGN_AND_SCALE, -1, 4.0)
     scales = AxisScales.of(before[device])
     correction = propose(scales, judgement, Cause(4.0, 'four edges'))
+    assert any('scale_acc_to_dev' in note for note in correction.notes)
     apply(correction, path, device, device, None)
     after = {node.name: node.drive for node in load_bus(path).nodes}
     for key, value in correction.values.items():

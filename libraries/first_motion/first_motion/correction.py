@@ -12,6 +12,7 @@ from .judgement import Cause, Judgement, Verdict
 from .scales import AxisScales, corrected
 
 LIMITS = 'limits 0x607D are in increments: those that were computed with the old scale are wrong'
+ACCELERATIONS = 'scale_acc_to_dev, where it is written, changes by the factor of scale_vel_to_dev'
 VELOCITIES = 'scale_vel_to_dev is in other units than increments per second: check it, too'
 
 
@@ -49,11 +50,12 @@ def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Co
         what = f'the scale by {factor:.4g}, by eye' if cause is None else cause.text
         why = f'{sign}{what}'
     values = corrected(scales, judgement.sign, factor)
+    accelerations = (ACCELERATIONS,) if factor != 1.0 else ()
     same_units = math.isclose(abs(scales.scale_vel_to_dev), abs(scales.scale_pos_to_dev))
     odd_velocity = not same_units and factor != 1.0
     return Correction(
         values,
         {key: getattr(scales, key) for key in values},
         f'first motion: {why}; scale_pos_to_dev was {scales.scale_pos_to_dev!r}',
-        (VELOCITIES, LIMITS) if odd_velocity else (LIMITS,),
+        (*((VELOCITIES,) if odd_velocity else ()), *accelerations, LIMITS),
     )
