@@ -127,6 +127,19 @@ def test_the_log_is_in_order_and_of_the_window(tmp_path: Path) -> None:
     assert f'candump --read {box.last}' in report
 
 
+def test_an_answer_does_not_stand_before_its_question(tmp_path: Path) -> None:
+    """On a busy machine the answer is there before the send has returned."""
+    recording = BusRecording(load_bus(write_bus(tmp_path)), 'vcan0', window=1.0)
+    receive = recording.receiving(lambda frame: None)
+
+    def send(frame: Frame) -> None:
+        receive(Frame(frame.can_id - 0x80, frame.data, time.monotonic()))
+
+    recording.sending(send)(Frame(0x602, bytes(8)))
+    path = recording.save(tmp_path, lambda: None)
+    assert [frame.can_id for frame in read_log(path)] == [0x602, 0x582]
+
+
 def test_a_frame_that_the_bus_refuses_is_not_in_it(tmp_path: Path) -> None:
     """It never was on the bus."""
 

@@ -153,6 +153,23 @@ def test_bytes_that_the_port_refused_were_not_sent() -> None:
     assert memory.size == 1
 
 
+def test_bytes_are_stamped_before_they_leave() -> None:
+    """Else an answer could stand before its question."""
+    left: list[float] = []
+    stamps: list[float] = []
+
+    class Answering(BrokenPort):
+        def write(self, data: bytes) -> None:
+            left.append(time.monotonic())
+
+    class Stamps(SerialMemory):
+        def transfer(self, now: float, data: bytes, sent: bool) -> None:
+            stamps.append(now)
+
+    TappedPort(Answering(), [Stamps('/dev/ttyAMA0', 60.0)]).write(bytes(10))
+    assert stamps[0] <= left[0]
+
+
 def test_a_log_file_has_all_that_passed_and_replaces_none(tmp_path: Path) -> None:
     """In its order, whole when it is closed; a second one of that name is refused."""
     path = tmp_path / 'walk.log'

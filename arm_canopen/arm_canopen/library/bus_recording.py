@@ -47,8 +47,9 @@ class BusRecording:
         record, now, sent = self.ring.record, time.monotonic, FrameRing.SENT
 
         def send_and_record(frame: Frame) -> None:
+            stamp = now()  # before, as its answer may come before this returns
             send(frame)
-            record(frame, now(), sent)
+            record(frame, stamp, sent)
 
         return send_and_record
 

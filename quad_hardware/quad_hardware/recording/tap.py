@@ -52,8 +52,8 @@ class TappedPort:
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
+        now = time.monotonic()  # before, as the answer may come before this returns
         self._port.write(data)
-        now = time.monotonic()
         for record in self._record:
             record(now, data, True)
 
