@@ -225,7 +225,7 @@ class Drive:
         if not first:
             return
         self.released(refusal)
-        self.report(Severity.ERROR, f'stopped: {text}')
+        self.report(Severity.ERROR, f'stopping: {text}')
 
     def stream(self, setpoint: Setpoint) -> None:
         """Follow a motion source in this cycle.
@@ -251,7 +251,7 @@ class Drive:
             return
         self.objects.unmute_controlword()
         if self.view.state in POWERED and self.control.goal is None:
-            self.warn(f'was found in motion or held, and is stopped: {self.describe()}')
+            self.warn(f'was found enabled, and is led to rest: {self.describe()}')
             self.leave_operation()
 
     def _take_over(self) -> None:
@@ -279,7 +279,7 @@ class Drive:
         self.released(Refusal(RefusalCause.SILENT, f'the last is {view.age:.1f} s old'))
         self.report(
             Severity.ERROR,
-            f'stopped: no TPDOs for {view.age:.1f} s; it stays halted until the first target '
+            f'stopping: no TPDOs for {view.age:.1f} s; it stays halted until the first target '
             'after they have come again',
         )
 
@@ -365,7 +365,9 @@ class Drive:
         self.control.hold()
         mode.preload(view.actual())  # so that it does not jump when set-points reach it again
         self.released(refusal)
-        self.report(Severity.ERROR, f'stopped: {text}. Do its RPDOs arrive, and is the axis free?')
+        self.report(
+            Severity.ERROR, f'stopping: {text}. Do its RPDOs arrive, and is the axis free?'
+        )
 
     def _command(self) -> Command:
         state = self.view.state

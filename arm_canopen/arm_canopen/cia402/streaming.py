@@ -83,7 +83,7 @@ class TargetStream:
             return
         self.end('a target that the drive did not take')
         drive.control.hold()
-        drive.warn(f'stopped: it has not taken a target of the stream ({delivery.error})')
+        drive.warn(f'stopping: it has not taken a target of the stream ({delivery.error})')
 
     async def _watch_for_pause(self) -> None:
         while self._scheduler.now < self._goes_on_until:

@@ -162,7 +162,7 @@ def test_a_failing_step_stops_its_drive_only(
     assert device.velocity == 0.0
     errors = [text for text in net.reported(Severity.ERROR) if 'injected' in text]
     assert len(errors) == 1, errors
-    assert errors[0].startswith(f'{name}: stopped')
+    assert errors[0].startswith(f'{name}: stopping')
     assert arm.source.losses.keys() == {name}
     assert arm.source.losses[name].cause is RefusalCause.CYCLE_FAILED
     assert len(net.frames(0x080, since=begin)) == pytest.approx(3.0 / PERIOD, abs=2)

@@ -118,7 +118,7 @@ def test_an_encoder_without_reference_is_held_where_it_is() -> None:
     sent = net.frames(0x300 + NODE_IDS[ODD], since=net.now - 0.05)
     assert {struct.unpack_from('<i', data)[0] for data in sent} == {LEAST}
     assert_served(net)
-    assert not [text for text in net.reported(Severity.ERROR) if 'stopped' in text]
+    assert not [text for text in net.reported(Severity.ERROR) if 'stopping' in text]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_a_heartbeat_that_is_gone_brakes_the_axis_before_its_device_is_configure
     ]
     assert moving.fastest < STANDING
     assert nmt_commands(moving)[:1] == [NmtCommand.ENTER_PRE_OPERATIONAL]
-    assert [text for text in moving.errors if 'stopped: heartbeat lost' in text]
+    assert [text for text in moving.errors if 'stopping: heartbeat lost' in text]
     lose(moving)
     moving.net.run_until(moving.net.all_ready)
     assert moving.net.drives[JOINT].failure == ''

@@ -505,7 +505,7 @@ def test_lost_pdos_in_motion(
     arm.net.run(1.0)
     for name in names:
         drive = arm.net.drives[name]
-        causes = {text for text in arm.net.reported(Severity.ERROR) if f'{name}: stopped' in text}
+        causes = {text for text in arm.net.reported(Severity.ERROR) if f'{name}: stopping' in text}
         assert drive.control.accepts_targets is not silent
         assert bool(causes) is (silent or mode in STREAMED), arm.net.story()
         assert drive.control.halted is bool(causes) or not drive.control.acts
