@@ -319,6 +319,13 @@ WARNINGS = {
 }
 
 ERRORS = {
+    'EMCY in the place of SYNC': Case(
+        '    node_id: 2\n',
+        f'    node_id: 2\n    sdo: [{{index: 0x1014, value: 0x80}}] {HERE}\n',
+        'nodes.joint1.sdo[0].value',
+        '0x080 is the identifier of SYNC, and not for EMCYs',
+        '0x80 plus the node id',
+    ),
     'start value above the counter': Case(
         SYNC,
         f'{SYNC}  sync_overflow: 10\n',
@@ -405,6 +412,19 @@ def test_errors_and_warnings_of_reading_come_along(tmp_path: Path) -> None:
     assert [problem.key for problem in report.errors] == ['master.sync_windw']
     keys = [problem.key for problem in report.warnings]
     assert keys == ['defaults.package', 'nodes.joint1.heartbeat_producer']
+
+
+@pytest.mark.parametrize(('literal', 'warned'), [('0x91', True), ('0x80', False), ('0', False)])
+def test_an_emcy_of_the_eds_without_node_id(tmp_path: Path, literal: str, *, warned: bool) -> None:
+    """It is taken as the device's own; one of another node is said at its line of the EDS."""
+    eds = EDS.replace('DefaultValue=$NODEID+0x80', f'DefaultValue={literal}')
+    path = write_bus(tmp_path, CLEAN, eds=eds)
+    assert [node.emergency_id for node in load_bus(path).nodes] == [0x82, 0x83]
+    said = [problem for problem in check_file(path).warnings if 'EMCY' in problem.message]
+    assert len(said) == 2 * warned
+    for problem in said:
+        assert problem.file.name == 'drive.eds'
+        assert 'the EMCY COB-ID 0x091 (0x1014) of the EDS is not that of node' in problem.message
 
 
 def test_a_missing_file_is_one_error(tmp_path: Path) -> None:

@@ -325,12 +325,13 @@ def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert len(reads) == 1
 
 
+PDO_FIELDS = {'number', 'cob_id', 'mapping', 'configured', 'fixed_mapping', 'assumed'}
 TABLES: list[tuple[tuple[Key, ...], type, set[str]]] = [
     (OPTION_KEYS, Options, set()),
     (MASTER_KEYS, MasterSettings, set()),
     (DEVICE_KEYS, DeviceSettings, set()),
     (DRIVE_KEYS, DriveConfig, {'name', 'channel'}),
-    (TPDO_KEYS, PdoConfig, {'number', 'cob_id', 'mapping', 'configured', 'fixed_mapping'}),
+    (TPDO_KEYS, PdoConfig, PDO_FIELDS),
     (RPDO_KEYS, PdoConfig, set()),
 ]
 

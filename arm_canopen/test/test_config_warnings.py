@@ -8,7 +8,7 @@ from pathlib import Path
 import re
 
 from config_cases import added
-from config_samples import BUS, eds_text, load_text, TWO_AXES_EDS
+from config_samples import BUS, eds_text, errors_of, load_text, TWO_AXES_EDS, write_bus
 import pytest
 
 
@@ -86,20 +86,46 @@ def test_a_drive_without_control_word(tmp_path: Path) -> None:
 
 
 def test_identifiers_of_an_eds_without_node_id(tmp_path: Path) -> None:
-    """EDS defaults that collide are warnings as long as bus.yml does not configure the PDOs."""
-    eds = eds_text().replace('$NODEID+0x280', '0x280').replace('$NODEID+0x380', '0x380')
+    """Each device has those of its own node id, which is said and compared at boot."""
+    lines = '\n'.join(with_default_mapping('0x60640020'))
     text = f'{BUS}  joint2: {{node_id: 3}}\n'
-    (warning,) = load_text(tmp_path, text, eds=eds).warnings
-    assert 'COB-ID 0x280 of TPDO 2 of joint2 is also that of TPDO 2 of joint1' in warning.message
-    assert 'node id' in warning.remedy
+    for literal, dcf in (('0x285', ''), ('0x280', ''), ('0x285', COMMISSIONED)):
+        eds = lines.replace('$NODEID+0x280', literal) + dcf
+        bus = load_text(tmp_path, text, eds=eds)
+        assert [node.tpdos[1].cob_id for node in bus.nodes] == [0x282, 0x283]
+        assert [node.tpdos[1].assumed for node in bus.nodes] == [True, True]
+        for warning, node in zip(bus.warnings, bus.nodes, strict=True):
+            assert f'COB-ID {literal} of TPDO 2 of {node.name} is not that of' in warning.message
+            assert f'taken to have 0x{0x280 + node.node_id:03X}' in warning.message
+            assert 'cob_id: auto' in warning.remedy
 
 
-def with_default_mapping(*words: str) -> list[str]:
-    """Return the lines of the EDS with another default mapping of TPDO 2."""
+def test_identifiers_that_a_dcf_means_are_kept(tmp_path: Path) -> None:
+    """Those of a device that listens to another one."""
+    eds = eds_text().replace('$NODEID+0x300', '0x305') + COMMISSIONED.replace('5', '2')
+    assert load_text(tmp_path, eds=eds).nodes[0].rpdos[1].cob_id == 0x305
+
+
+def test_two_rpdos_of_an_eds_with_one_identifier_are_an_error(tmp_path: Path) -> None:
+    """One frame would move two axes, whoever wrote it."""
+    lines = '\n'.join(with_default_mapping('0x607A0020', index='1601'))
+    path = write_bus(
+        tmp_path, f'{BUS}  joint2: {{node_id: 3}}\n', eds=lines.replace('$NODEID+0x300', '0x6A0')
+    )
+    (error,) = errors_of(path)
+    assert 'COB-ID 0x6A0 of RPDO 2 of joint2 is also that of RPDO 2 of joint1' in error.message
+    assert 'cob_id: auto' in error.remedy
+
+
+COMMISSIONED = '\n[DeviceComissioning]\nNodeID=5\n'
+
+
+def with_default_mapping(*words: str, index: str = '1A01') -> list[str]:
+    """Return the lines of the EDS with another default mapping of TPDO 2, or another object."""
     lines = eds_text().splitlines()
-    start = lines.index('[1A01sub0]')
+    start = lines.index(f'[{index}sub0]')
     for offset, value in enumerate((str(len(words)), *words)):
-        section = lines.index(f'[1A01sub{offset}]', start)
+        section = lines.index(f'[{index}sub{offset}]', start)
         place = next(i for i in range(section, len(lines)) if lines[i].startswith('DefaultValue'))
         lines[place] = f'DefaultValue={value}'
     return lines

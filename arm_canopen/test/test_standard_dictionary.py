@@ -103,6 +103,34 @@ def test_predefined_identifiers_never_collide() -> None:
     assert max(identifiers) == 0x57F
 
 
+@pytest.mark.parametrize(
+    ('address', 'literal', 'file_node_id', 'cob_id'),
+    [
+        ((0x1014, 0), 0x80, None, 0x83),
+        ((0x1014, 0), 0, None, 0x83),
+        ((0x1014, 0), 0x91, None, 0x83),
+        ((0x1014, 0), 0x91, 0x11, 0x83),
+        ((0x1014, 0), 0x91, 3, 0x91),  # the file is for this device, and means it
+        ((0x1014, 0), 0x8000_0091, None, 0x8000_0083),
+        ((0x1400, 1), 0x205, None, 0x203),
+        ((0x1400, 1), 0x185, 5, 0x185),  # listens to a TPDO of node 5
+        ((0x1800, 1), 0x4000_0185, 5, 0x4000_0183),
+        ((0x1803, 1), 0x483, None, 0x483),
+        ((0x1804, 1), 0x685, None, 0x685),  # no pre-defined one
+        ((0x1800, 1), 0x2000_0185, None, 0x2000_0185),
+        ((0x2000, 0), 0x185, None, 0x185),
+    ],
+)
+def test_a_cob_id_of_another_node_id_is_that_of_the_device(
+    address: tuple[int, int], literal: int, file_node_id: int | None, cob_id: int
+) -> None:
+    """Where the file leaves out ``$NODEID``; what it means is kept, and so is the value itself."""
+    written = ObjectEntry(*address, 'COB-ID', DataType.UNSIGNED32, default=literal)
+    (entry,) = ObjectDictionary([written], node_id=file_node_id).for_node(3)
+    assert entry.default == cob_id
+    assert entry.literal == (None if cob_id == literal else literal)
+
+
 @pytest.mark.parametrize('number', [0, 5])
 def test_other_pdos_have_no_predefined_identifier(number: int) -> None:
     """Asking for one names the number."""

@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.boot_plan import (
+    assumed_cob_ids,
     boot_writes,
     BootWrite,
     consumer_to_read,
@@ -71,6 +72,14 @@ class Configurator:
         """
         for write in await self._writes():
             await self._bring(write)
+        for write in assumed_cob_ids(self._node.config):
+            present = await self._node.sdo.read(*write.address, self._sdo_timeout)
+            if not write.fits(present):
+                raise SdoError(
+                    f'{write.place} of {self._node.name} is {write.text(present)}, the master '
+                    f'takes {write.text()} by its node id: write {write.key}: {{cob_id: auto}} to '
+                    'its section of bus.yml'
+                )
 
     async def write_error_control(self) -> None:
         """Have the device send its heartbeat or be guarded, its TPDOs come, and watch the master.

@@ -23,7 +23,6 @@ from ..standard.pdo import Number
 from .boot_manager import BootManager
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
-from .emergency_id import emergency_can_id
 from .events import Event, EventKind, Report, Severity
 from .nmt_sender import NmtSender
 from .other_master import OtherMasterWatch
@@ -122,9 +121,11 @@ class Network:
         )
         self.on_node_lost: Callable[[RemoteNode], None] = self._boots.start
         self._unconfigured_clients: dict[int, SdoClient] = {}
-        self._handlers = dict(
-            self._connect(OtherMasterWatch(config, report, expected=beside_master))
-        )
+        self._handlers: dict[int, Callable[[Frame], None]] = {}
+        for cob_id, take in self._connect(
+            OtherMasterWatch(config, report, expected=beside_master)
+        ):
+            self._handlers.setdefault(cob_id, take)  # no device displaces NMT and SYNC
 
     def start(self, now: float) -> None:
         """Reset the devices and begin to boot them, all at the same time."""
@@ -347,13 +348,12 @@ class Network:
         for node in self.nodes.values():
             node_id = node.config.node_id
             yield CobId.HEARTBEAT + node_id, node.receive_heartbeat
-            emergency_id = emergency_can_id(node.config)
-            if emergency_id is not None:
-                yield emergency_id, node.emergencies.receive
             yield CobId.SDO_RESPONSE + node_id, node.sdo.receive
             yield CobId.SDO_REQUEST + node_id, node.sdo.receive_request
             for entry in node.image.tpdos:
                 yield entry.config.cob_id, entry.receive
+            if node.config.emergency_id is not None:
+                yield node.config.emergency_id, node.emergencies.receive
 
     def _receive_nmt(self, frame: Frame) -> None:
         """Note what another master or a tool commands, so that it is not worked against."""

@@ -30,6 +30,14 @@ class CobId(IntEnum):
     HEARTBEAT = 0x700
 
 
+PREDEFINED: dict[tuple[int, int], int] = {
+    (0x1014, 0): CobId.EMCY,
+    **{(0x1400 + number, 1): CobId.RPDO1 + 0x100 * number for number in range(4)},
+    **{(0x1800 + number, 1): CobId.TPDO1 + 0x100 * number for number in range(4)},
+}
+"""Function code of the COB-IDs that devices may change, by index and sub-index."""
+
+
 def tpdo_default(number: int, node_id: int) -> int:
     """Return the pre-defined COB-ID of TPDO 1 to 4 of a node.
 
@@ -46,6 +54,32 @@ def rpdo_default(number: int, node_id: int) -> int:
         ValueError: The number is not 1 to 4; others have no pre-defined identifier.
     """
     return _pdo_default(CobId.RPDO1, number, node_id)
+
+
+def own_cob_id(
+    address: tuple[int, int], cob_id: int, node_id: int, file_node_id: int | None
+) -> int:
+    """Return the COB-ID of a device whose file may give that of another node id.
+
+    Many EDS files leave out ``$NODEID``, and a DCF may have been made for another device: of the
+    pre-defined connection set a device has the identifier that its own node id gives.
+
+    Args:
+        address: Index and sub-index of the object.
+        cob_id: Its value in the file.
+        node_id: The device.
+        file_node_id: Node id for which the file was made, None when it does not say that.
+    """
+    base = PREDEFINED.get(address)
+    if base is None or cob_id & COB_ID_EXTENDED:
+        return cob_id
+    offset = (cob_id & CAN_ID_MASK) - base
+    if cob_id & CAN_ID_MASK == 0 and base == CobId.EMCY:
+        offset = 0
+    others = range(NODE_ID_MAX + 1) if file_node_id is None else (0, file_node_id)
+    if offset not in others:
+        return cob_id
+    return cob_id & ~CAN_ID_MASK | base + node_id
 
 
 def _pdo_default(base: int, number: int, node_id: int) -> int:

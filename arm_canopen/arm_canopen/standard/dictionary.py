@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
+from .cob_id import own_cob_id
 from .datatypes import DataType, Value
 
 
@@ -66,6 +67,8 @@ class ObjectEntry:
         subindex: Sub-index, 0 for a VAR.
         name: ParameterName of the EDS.
         configured: A DCF gives it this value, which is not the one after a reset.
+        literal: COB-ID of the file, where that leaves out ``$NODEID`` and the default has it; None
+            otherwise.
         record: ParameterName of the array or record that it belongs to, empty for a VAR.
         data_type: Type of the value.
         access: Who may read or write.
@@ -90,6 +93,7 @@ class ObjectEntry:
     line: int = 0
     record: str = ''
     configured: bool = False
+    literal: int | None = None
 
     @property
     def address(self) -> tuple[int, int]:
@@ -123,13 +127,19 @@ class ObjectDictionary:
 
     Attributes:
         source: Where it was read from, for messages.
+        node_id: Node id for which its COB-IDs are, None where no file says that.
     """
 
     def __init__(
-        self, entries: Iterable[ObjectEntry], *, source: str = 'object dictionary'
+        self,
+        entries: Iterable[ObjectEntry],
+        *,
+        source: str = 'object dictionary',
+        node_id: int | None = None,
     ) -> None:
         """Collect the entries; of two with one address the later counts."""
         self.source = source
+        self.node_id = node_id
         ordered = sorted(entries, key=lambda entry: entry.address)
         self._entries = {entry.address: entry for entry in ordered}
         self._indices = frozenset(index for index, _ in self._entries)
@@ -167,12 +177,22 @@ class ObjectDictionary:
         )
 
     def for_node(self, node_id: int) -> ObjectDictionary:
-        """Return a copy whose node-relative defaults are resolved for a node id."""
-        return ObjectDictionary((_resolved(entry, node_id) for entry in self), source=self.source)
+        """Return a copy whose node-relative defaults are resolved for a node id.
 
+        A COB-ID of the pre-defined connection set that the file writes for another node id, or
+        without any, is that of this node id, too.
+        """
+        return ObjectDictionary(
+            (self._resolved(entry, node_id) for entry in self), source=self.source, node_id=node_id
+        )
 
-def _resolved(entry: ObjectEntry, node_id: int) -> ObjectEntry:
-    if not entry.node_relative:
-        return entry
-    offset = entry.default if isinstance(entry.default, int) else 0
-    return replace(entry, default=offset + node_id, node_relative=False)
+    def _resolved(self, entry: ObjectEntry, node_id: int) -> ObjectEntry:
+        if entry.node_relative:
+            offset = entry.default if isinstance(entry.default, int) else 0
+            return replace(entry, default=offset + node_id, node_relative=False)
+        if not isinstance(entry.default, int):
+            return entry
+        cob_id = own_cob_id(entry.address, entry.default, node_id, self.node_id)
+        if cob_id == entry.default:
+            return entry
+        return replace(entry, default=cob_id, literal=entry.default)

@@ -414,6 +414,22 @@ def test_a_device_without_heartbeat_is_reported_and_not_started_again() -> None:
     scene.net.run_until(scene.net.all_ready, 3.0)
 
 
+def test_a_cob_id_that_is_not_the_one_of_the_node_id_is_found_at_boot() -> None:
+    """The EDS has none to rely on, so what the device has is compared, and the key named."""
+    (tpdo,) = io_config().tpdos
+    tpdo = replace(tpdo, configured=False, assumed=True, cob_id=0x180 + NODE_ID)
+    scene = Scene(io_config(tpdos=(tpdo,)))
+    scene.device.values[0x1800, 1] = (0x4000_0185).to_bytes(4, 'little')
+    scene.net.start()
+    scene.run(1.5)
+    (failure,) = scene.reported(EventKind.BOOT_FAILED)
+    assert '0x1800:01 of io is 0x00000185, the master takes 0x00000189' in failure
+    assert 'tpdo.1: {cob_id: auto}' in failure
+    assert scene.device.commands.count(START) == 0
+    scene.device.values[0x1800, 1] = (0x4000_0189).to_bytes(4, 'little')
+    scene.net.run_until(scene.net.all_ready)
+
+
 def test_slow_answers_do_not_fail_a_boot() -> None:
     """A device that thinks for 30 ms about each object is booted (many do)."""
     scene = Scene()
@@ -428,5 +444,7 @@ def test_nothing_is_an_error_in_a_boot_that_goes_well() -> None:
     scene.boot()
     scene.run(1.0)
     assert scene.net.reported(Severity.WARNING) == []
+    sent = scene.net.frames(0x600 + NODE_ID)
+    assert not [data for data in sent if data[0] == 0x80], 'the read before the boot-up, too'
     assert scene.node.sdo.counters.aborted == 0
     assert scene.node.sdo.counters.timed_out == 0

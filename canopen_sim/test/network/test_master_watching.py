@@ -126,6 +126,25 @@ def test_an_emergency_is_received_where_the_device_sends_it() -> None:
     assert received == {'a': True, 'b': True, 'c': False}
 
 
+@pytest.mark.parametrize('cob_id', [0x80, 0, 0x91])
+def test_an_emergency_of_a_device_whose_eds_has_no_node_id_is_received(cob_id: int) -> None:
+    """Where the device sends it: with its own node id, and never in the place of SYNC or NMT."""
+    drive = drive_config('a', 2)
+    written = with_defaults(drive.dictionary, {(0x1014, 0): cob_id})
+    drive = replace(drive, dictionary=written.for_node(2))
+    net = VirtualNetwork(bus_config(drive), dictionaries={'a': written})
+    net.boot()
+    device = net.devices['a'].drive
+    assert device is not None
+    device.raise_fault(0x2310, net.now)
+    net.run(0.1)
+    assert [emcy.code for _, emcy in net.network.nodes['a'].emergencies.history] == [0x2310]
+    assert len(net.frames(0x082)) == 1
+    net.network.receive(Frame(0x080, b'', net.now))
+    assert any('somebody else sends SYNC' in text for text in net.reported())
+    assert len(net.network.nodes['a'].emergencies.history) == 1
+
+
 def test_an_error_that_is_over_or_old_is_not_of_now() -> None:
     """Of a fault, the EMCY that came with it counts."""
     log = EmergencyLog(lambda *_: None)

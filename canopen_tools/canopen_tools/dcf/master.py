@@ -196,11 +196,8 @@ def _milliseconds(time: float) -> int:
 
 def _emergencies(nodes: Iterable[NodeConfig]) -> Iterator[tuple[int, str]]:
     for node in nodes:
-        cob_id = node.value_after_boot(Index.EMCY_COB_ID, data_type=DataType.UNSIGNED32)
-        if isinstance(cob_id, int) and cob_id and not cob_id & COB_ID_INVALID:
-            # an EDS without $NODEID means it
-            own = CobId.EMCY + node.node_id if cob_id == CobId.EMCY else cob_id
-            yield node.node_id, f'0x{own:08X}'
+        if node.emergency_id is not None:
+            yield node.node_id, f'0x{node.emergency_id:08X}'
 
 
 def _pdos(config: BusConfig, direction: Direction) -> Iterator[tuple[NodeConfig, PdoConfig]]:

@@ -71,9 +71,9 @@ class FrameDescriber:
         self._names[node.node_id] = node.name
         self._objects[node.node_id] = ObjectNames(node.dictionary)
         if (cob_id := _cob_id(node, Index.SYNC_COB_ID)) is not None:
-            self._handlers[cob_id] = self._sync
-        if (cob_id := _cob_id(node, Index.EMCY_COB_ID)) is not None:
-            self._handlers[cob_id] = lambda frame: self._emcy(node.node_id, frame)
+            self._handlers.setdefault(cob_id, self._sync)
+        if (cob_id := node.emergency_id) is not None:
+            self._handlers.setdefault(cob_id, lambda frame: self._emcy(node.node_id, frame))
         names = self._objects[node.node_id]
         for prefix, pdos in (('TPDO', node.tpdos), ('RPDO', node.rpdos)):
             for pdo in pdos:

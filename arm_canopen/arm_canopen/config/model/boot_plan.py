@@ -132,7 +132,7 @@ def held_after_boot(
         node: The device.
         consumers: As with :func:`boot_writes`.
     """
-    writes = [*_fixed_mappings(node), *boot_writes(bus, node, consumers)]
+    writes = [*_fixed_mappings(node), *assumed_cob_ids(node), *boot_writes(bus, node, consumers)]
     return list({write.address: write for write in writes}.values())  # the last one counts
 
 
@@ -362,6 +362,22 @@ def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
                 for subindex, mapped in enumerate(pdo.mapping, start=1):
                     address, word = (index, subindex), mapped.word
                     yield _number(address, word, DataType.UNSIGNED32, key, fixed=True)
+
+
+def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
+    """Yield the COB-IDs that the device should have by its node id, though not by its EDS."""
+    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+        for pdo in pdos:
+            if pdo.assumed and pdo.enabled and not pdo.configured:
+                address, key = direction.communication + pdo.number - 1, direction.name
+                yield _number(
+                    (address, 1),
+                    pdo.cob_id,
+                    DataType.UNSIGNED32,
+                    f'{key}.{pdo.number}',
+                    mask=COB_ID_BITS,
+                    fixed=True,
+                )
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:

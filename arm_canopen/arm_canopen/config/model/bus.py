@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...exceptions import CodecError, Problem
+from ...standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
 from ...standard.datatypes import DataType, decode, Value
 from ...standard.dictionary import object_address, ObjectDictionary
-from ...standard.objects import AXIS_OFFSET, COMMANDS, slow_timeout
+from ...standard.objects import AXIS_OFFSET, COMMANDS, Index, slow_timeout
 from ...standard.pdo import MappedObject
 from .drive import DriveConfig
 from .identity import ANY_DEVICE, Identity
@@ -51,6 +52,7 @@ class PdoConfig:
         mapping: The mapped objects.
         configured: bus.yml names this PDO, so the master writes it at boot.
         fixed_mapping: The device's mapping is read-only (and equal to ``mapping``).
+        assumed: The EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one.
     """
 
     number: int
@@ -63,6 +65,7 @@ class PdoConfig:
     mapping: tuple[MappedObject, ...] = ()
     configured: bool = False
     fixed_mapping: bool = False
+    assumed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +161,14 @@ class NodeConfig:
             if (write.index, write.subindex) == (index, subindex):
                 return write
         return None
+
+    @property
+    def emergency_id(self) -> int | None:
+        """Identifier of its EMCYs (CiA 301, 7.5.2.17); None when it shall send none."""
+        value = self.value_after_boot(Index.EMCY_COB_ID, data_type=DataType.UNSIGNED32)
+        if not isinstance(value, int):
+            return CobId.EMCY + self.node_id
+        return None if value & COB_ID_INVALID else value & CAN_ID_MASK
 
     def write_timeout(self, index: int, subindex: int, usual: float | None = None) -> float:
         """Return how long the device may take for a write in [s].

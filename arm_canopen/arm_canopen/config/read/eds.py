@@ -60,7 +60,8 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     findings = Findings()
     ini = read_ini(read_eds_text(path, findings))
     objects = ObjectReader(ini)
-    dictionary = ObjectDictionary(objects.entries(), source=str(path))
+    node_id = _node_id(ini)
+    dictionary = ObjectDictionary(objects.entries(), source=str(path), node_id=node_id)
     if not len(dictionary):
         findings.error(Place(path), 'no object in this file', 'name an EDS or DCF file of CiA 306')
         findings.raise_errors()
@@ -68,9 +69,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
         findings.warning(Place(path, line), message, TOLERATED)
     for line, key, message in objects.oddities:
         findings.warning(Place(path, line, key=key), message, TOLERATED)
-    return Eds(
-        path, dictionary, _node_id(ini), _dummy_types(ini), findings.warnings, _numbers(ini)
-    )
+    return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings, _numbers(ini))
 
 
 def read_eds_text(path: Path, findings: Findings) -> str:

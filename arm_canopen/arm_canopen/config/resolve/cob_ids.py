@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ...standard.cob_id import CAN_ID_MASK
 from ..findings import Findings
+from ..model.pdo_direction import RPDO
 from .pdos import PdoDraft
 
 FREE_RANGE = range(0x680, 0x6E0)
@@ -36,7 +37,8 @@ def assign_cob_ids(drafts: Sequence[PdoDraft], findings: Findings) -> list[PdoDr
     Args:
         drafts: All PDOs of the bus in the order of the file.
         findings: Gets reserved and doubled identifiers. When only EDS defaults are concerned,
-            these are warnings: many EDS files leave out ``$NODEID``.
+            these are warnings; two RPDOs with one identifier, of which one frame would move two
+            axes, are an error.
 
     Returns:
         The PDOs in the same order.
@@ -62,6 +64,7 @@ def _assigned(draft: PdoDraft, cob_id: int, findings: Findings) -> PdoDraft:
 
 def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
     owners: dict[int, PdoDraft] = {}
+    commanded: dict[int, PdoDraft] = {}  # those of RPDOs
     for draft in drafts:
         cob_id = draft.config.cob_id
         if not draft.config.enabled or not cob_id:
@@ -73,12 +76,18 @@ def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
                 f'COB-ID 0x{cob_id:03X} of {draft.title} is not for PDOs ({purpose})',
             )
         owner = owners.setdefault(cob_id, draft)
+        both_command = False
+        if draft.direction is RPDO and draft.config.mapping:
+            other = commanded.setdefault(cob_id, draft)
+            both_command = other is not draft
+            owner = other if both_command else owner
         if owner is not draft:
             _report(
                 findings,
                 [draft, owner],
                 f'COB-ID 0x{cob_id:03X} of {draft.title} is also that of {owner.title} '
                 f'(line {owner.place.line})',
+                certain=both_command,
             )
 
 
@@ -87,9 +96,12 @@ def reserved_for(cob_id: int) -> str:
     return next((purpose for ids, purpose in RESERVED if cob_id in ids), '')
 
 
-def _report(findings: Findings, drafts: list[PdoDraft], message: str) -> None:
-    if any(draft.config.configured for draft in drafts):
-        findings.error(drafts[0].place, message, "write 'cob_id: auto', or 'enabled: false'")
+def _report(
+    findings: Findings, drafts: list[PdoDraft], message: str, *, certain: bool = False
+) -> None:
+    if certain or any(draft.config.configured for draft in drafts):
+        remedy = "name each PDO in bus.yml with 'cob_id: auto', or 'enabled: false'"
+        findings.error(drafts[0].place, message, remedy)
     else:
         remedy = 'name the PDO in bus.yml if the device does not add its node id to the default'
         findings.warning(drafts[0].place, message, remedy)

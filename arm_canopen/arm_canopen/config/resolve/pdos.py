@@ -89,8 +89,22 @@ class PdoReader:
             elif draft.config.enabled:
                 # the warnings of this mapping matter, as the PDO is in use
                 eds_mapping(direction, number, self._eds, self._findings)
+                self._warn_of_assumption(draft)
             drafts.append(draft)
         return drafts
+
+    def _warn_of_assumption(self, draft: PdoDraft) -> None:
+        """Report a COB-ID that the file has for another node id, which boot looks up."""
+        config = draft.config
+        entry = self._eds.dictionary.get(draft.direction.communication + config.number - 1, 1)
+        if entry is not None and entry.literal is not None and config.mapping:
+            self._findings.warning(
+                Place(self._eds.path, entry.line, key=f'[{entry.index:04X}sub1]'),
+                f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {draft.title} is not that of node '
+                f'{self._node_id}; it is taken to have 0x{config.cob_id:03X}, which is compared '
+                'at boot',
+                'name the PDO in bus.yml with cob_id: auto, so that it is written',
+            )
 
     def _wanted(self, direction: Direction, numbers: list[int]) -> Iterator[tuple[int, YamlMap]]:
         section = block(self._device, direction.name, self._findings)
@@ -124,9 +138,14 @@ class PdoReader:
             mapping=eds_mapping(direction, number, self._eds, Findings()),
             configured=self._eds.dictionary.is_configured(communication, mapping),
             fixed_mapping=is_fixed(direction, number, self._eds.dictionary),
+            assumed=self._is_assumed(communication),
             **self._times(direction, communication),
         )
         return PdoDraft(config, direction, self._name, self._device.place)
+
+    def _is_assumed(self, communication: int) -> bool:
+        entry = self._eds.dictionary.get(communication, 1)
+        return entry is not None and entry.literal is not None
 
     def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
         """Return the times that a DCF gives a PDO; others are left to the device."""

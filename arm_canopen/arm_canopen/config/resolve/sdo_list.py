@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...exceptions import CodecError
+from ...standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
 from ...standard.datatypes import (
     DataType,
     encode,
@@ -104,6 +105,7 @@ class SdoReader:
             return None
         try:
             data = encode_value(entry, value)
+            _check_emergency(entry, data)
         except RefusedError as reason:
             self._findings.refuse(value.place, reason)
             return None
@@ -151,6 +153,17 @@ def _check_purpose(index: int, subindex: int) -> None:
             f'{object_address(index)} is written by the master, which has to know it',
             f'set {key} instead',
         )
+
+
+def _check_emergency(entry: ObjectEntry, data: bytes) -> None:
+    """Refuse EMCYs under an identifier that has another meaning for every device."""
+    if entry.index == Index.EMCY_COB_ID and not int.from_bytes(data, 'little') & COB_ID_INVALID:
+        cob_id = int.from_bytes(data, 'little') & CAN_ID_MASK
+        if cob_id in (CobId.NMT, CobId.SYNC, CobId.TIME):
+            raise RefusedError(
+                f'0x{cob_id:03X} is the identifier of {CobId(cob_id).name}, and not for EMCYs',
+                'write 0x80 plus the node id, or remove the entry',
+            )
 
 
 def find_entry(dictionary: ObjectDictionary, index: int, subindex: int) -> ObjectEntry:

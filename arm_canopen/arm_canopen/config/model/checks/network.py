@@ -255,18 +255,18 @@ def _services(subject: Subject) -> Iterator[tuple[int, str, Place]]:
 
 
 def _check_emergency(subject: Subject) -> None:
-    value = subject.value(Index.EMCY_COB_ID)
-    expected = CobId.EMCY + subject.node.node_id
-    # EDS files often leave out $NODEID, the device adds it
-    given = subject.node.write_of(Index.EMCY_COB_ID, 0) is not None
-    if value is None or value & CAN_ID_MASK == expected:
+    """Report an EMCY COB-ID of another node id; one without any is usual, the device adds its."""
+    entry, node = subject.node.dictionary.get(Index.EMCY_COB_ID), subject.node
+    if entry is None or entry.literal is None or node.write_of(Index.EMCY_COB_ID, 0) is not None:
         return
-    if given or value & CAN_ID_MASK not in (0, CobId.EMCY):
+    cob_id = entry.literal & CAN_ID_MASK
+    if cob_id not in (0, CobId.EMCY):
+        own = CobId.EMCY + node.node_id
         subject.findings.warning(
             subject.object_place(Index.EMCY_COB_ID, 0),
-            f'the emergency messages of the device have COB-ID 0x{value & CAN_ID_MASK:03X} '
-            f'(0x1014), the master listens at 0x{expected:03X}',
-            f'write 0x{expected:X} to 0x1014',
+            f'the EMCY COB-ID 0x{cob_id:03X} (0x1014) of the EDS is not that of node '
+            f'{node.node_id}; the master listens at 0x{own:03X}',
+            f'correct it to $NODEID+0x80, or write 0x{own:X} to 0x1014',
         )
 
 
