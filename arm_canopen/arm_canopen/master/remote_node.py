@@ -262,11 +262,11 @@ class RemoteNode:
 
     def restarted(self) -> None:
         """It sent a boot-up message: it is another one than before."""
+        self.sdo.restarted()
         if self.online:
             self.lost('restarted: a boot-up message came while it was operational')
         else:
             self.offline('the device restarted')
-        self.sdo.restarted()
 
     def lost(self, reason: str) -> None:
         """The device is gone: forget its values, and stop its drivers."""

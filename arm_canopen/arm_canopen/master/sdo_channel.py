@@ -96,6 +96,7 @@ class SdoChannel:
         self._pending_replies: list[Address] = []
         self._answered_at: dict[bytes, float] = {}  # when requests that left once were answered
         self._other_client_until = 0.0
+        self._restarted = False  # since the present transfer began
 
     async def begin(
         self, index: int, subindex: int, timeout: float, *, settle: bool = True
@@ -114,6 +115,7 @@ class SdoChannel:
         if settle and (index, subindex) in self._pending_replies:
             await self._settle(index, subindex, timeout)
         self.address = (index, subindex)
+        self._restarted = False
 
     def receive(self, data: bytes) -> None:
         """Take a frame of the server.
@@ -160,13 +162,16 @@ class SdoChannel:
 
     def cancel(self) -> None:
         """Abort the transfer, whether or not a request is open."""
-        if self._answered is not None:
-            self._answered = None
+        answered, self._answered = self._answered, None
+        if self._restarted:
+            return
+        if answered is not None:
             self._await_late_replies(1)
         self._send_abort(AbortCode.GENERAL)
 
     def restarted(self) -> None:
-        """The device has restarted, so it owes no answer any more."""
+        """The device has restarted: it owes no answer any more, and has no transfer to abort."""
+        self._restarted = True
         self._pending_replies = []
         self._answered_at.clear()
 
