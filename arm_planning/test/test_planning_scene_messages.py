@@ -8,6 +8,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from geometry_msgs.msg import Point32
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from moveit_msgs.msg import (
@@ -86,6 +87,24 @@ def test_an_object_comes_back_as_it_was(message: ObjectMessage) -> None:
     )
     assert numbers_of(back) == pytest.approx(numbers_of(message), abs=1e-9)
     assert texts_of(back) == texts_of(message)
+
+
+def test_a_mesh_beside_a_prism_comes_back_as_it_was() -> None:
+    """A prism, which counts as its hull, does not take its place."""
+    message = box('thing', 0.5, 0.0, 0.2)
+    corners = [Point32(x=x, y=y) for x, y in ((0.0, 0.0), (0.1, 0.0), (0.0, 0.1))]
+    prism = SolidPrimitive(type=SolidPrimitive.PRISM, dimensions=[0.2])
+    prism.polygon.points = corners
+    message.primitives.append(prism)
+    message.primitive_poses.append(pose_at(0.3))
+    message.meshes, message.mesh_poses = [tetrahedron(0.1)], [pose_at(0.6)]
+    snapshot = with_objects(message)
+    back = object_message(
+        snapshot.scene.objects['thing'], snapshot.details['thing'], snapshot.root
+    )
+    assert [len(each.vertices) for each in back.meshes] == [6, 4]
+    assert back.meshes[1] == message.meshes[0]
+    assert back.mesh_poses[1] == message.mesh_poses[0]
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from typing import Any
 
 from moveit_msgs.msg import CollisionObject as ObjectMessage
 from octomap_msgs.msg import OctomapWithPose
+from shape_msgs.msg import SolidPrimitive
 from std_msgs.msg import Header
 
 from arm_model import (
@@ -204,7 +205,8 @@ def _details(message: Any) -> ObjectDetails:  # noqa: ANN401
         sum(each) for each in zip((0.0, 0.0), *map(volumes, message.meshes), strict=True)
     )
     fullness = solid / whole if whole else 1.0
-    meshes = tuple(message.meshes)
+    prisms = [None for each in message.primitives if each.type == SolidPrimitive.PRISM]
+    meshes = (*prisms, *message.meshes)
     return ObjectDetails(message.type.key, message.type.db, subframes, meshes, fullness)
 
 

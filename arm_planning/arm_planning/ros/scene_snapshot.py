@@ -24,7 +24,7 @@ class ObjectDetails:
         type_key: Key of its type in a database.
         type_db: Which database.
         subframes: Poses in the object, by name.
-        meshes: Its shape_msgs/Mesh, in the order of its meshes: of arm_model they are the hulls.
+        meshes: Its shape_msgs/Mesh, in the order of its hulls; None for that of a prism.
         fullness: Volume of its meshes as a share of that of their hulls, which count.
     """
 
