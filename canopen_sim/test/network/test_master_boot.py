@@ -28,6 +28,7 @@ from arm_canopen.standard.nmt import NmtState
 NODE = 'io'
 NODE_ID = 9
 INVALID = 0x8000_0000
+ABORT = 0x80  # command specifier of an SDO abort
 
 IDENTITY = Identity(
     device_type=0x0002_0192,
@@ -149,6 +150,23 @@ def test_the_whole_configuration_in_its_order() -> None:
     assert scene.device.state is NmtState.OPERATIONAL
     assert scene.node.phase is BootPhase.OPERATIONAL
     assert scene.reported(EventKind.BOOT) == ['operational']
+
+
+@pytest.mark.parametrize('running', [True, False], ids=['in operation', 'at the start'])
+def test_a_device_that_restarts_gets_no_abort(*, running: bool) -> None:
+    """It knows nothing of a transfer from before, and other tools list an abort as a failure."""
+    scene = Scene()
+    if running:
+        scene.boot()
+        scene.device.answers = False
+        scene.node.sdo.read(0x1008, 0, 1.0)
+        scene.run(0.01)
+        scene.device.answers = True
+        scene.device.restart(scene.net.now)
+    else:
+        scene.net.start()
+    scene.net.run_until(lambda: scene.node.online)
+    assert not [data for data in scene.net.frames(0x600 + NODE_ID) if data[0] == ABORT]
 
 
 def test_nothing_is_written_before_pre_operational_and_after_start() -> None:
