@@ -39,6 +39,7 @@ from moveit_msgs.srv import (
 )
 from moving_arm import goal_to, MovingArm, READY, robot_parameters
 from planning_messages import panda
+from planning_scenes import distances
 from processes import executable
 import pytest
 from readme_folder import CHECKOUT
@@ -48,7 +49,7 @@ from simulated_arm import JOINTS
 from std_msgs.msg import String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from arm_model import Clearances, frozen
+from arm_model import frozen
 from arm_model.ros import seconds
 from arm_msgs.srv import InjectFault
 from arm_planning.ros.scene_changes import apply_object
@@ -536,11 +537,11 @@ class Observer:
         robot = panda()
         home = robot.positions({})
         scene = apply_object(SceneSnapshot(robot.scene), visitor, home).scene
-        clearances = Clearances(scene)
         for state in self._states:
             places = dict(zip(state.name, state.position, strict=True))
-            contacts = clearances.contacts(robot.positions(places))
-            assert not contacts, f'{contacts} at {places}'
+            (measured,) = distances(scene, robot.positions(places)).tolist()
+            pairs = zip(scene.pairs, measured, strict=True)
+            assert not [pair for pair, distance in pairs if distance < 0.0], places
 
 
 def _stops_in_front_of_what_appears(arm: MovingArm) -> None:

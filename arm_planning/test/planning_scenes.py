@@ -90,19 +90,25 @@ def dense_times(path: Path) -> Array:
     return times
 
 
-def distances(scene: PlanningScene, positions: Array) -> Array:
-    """Return the distance of each pair in [m], all measured anew by pinocchio and coal."""
+def distances(scene: PlanningScene, places: Array) -> Array:
+    """Return the distance of each pair at each place in [m] (m, k).
+
+    All are measured anew by pinocchio and coal: neither what was known of a place before, nor how
+    far a joint moves a shape counts.
+    """
     kinematics, geometry = scene.kinematics, scene.geometry
     data, results = kinematics.native.createData(), geometry.createData()
-    full = kinematics.expanded(positions)
-    pin.computeDistances(kinematics.native, data, geometry, results, full)
-    return np.array([each.min_distance for each in results.distanceResults])
+    found = []
+    for place in np.atleast_2d(places):
+        full = kinematics.expanded(place)
+        pin.computeDistances(kinematics.native, data, geometry, results, full)
+        found.append([each.min_distance for each in results.distanceResults])
+    return np.array(found)
 
 
 def deepest_overlap(path: Path, scene: PlanningScene) -> float:
     """Return the least distance of any pair at the places of the independent sampler in [m]."""
-    places = path.positions(dense_times(path))
-    return min(float(distances(scene, place).min(initial=np.inf)) for place in places)
+    return float(distances(scene, path.positions(dense_times(path))).min(initial=np.inf))
 
 
 def broken_limits(path: Path, limits: JointLimits) -> list[str]:

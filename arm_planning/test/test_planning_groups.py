@@ -10,6 +10,7 @@ from itertools import pairwise
 from model_robots import two_arms_texts
 from moveit_msgs.msg import PositionIKRequest
 import numpy as np
+from planning_scenes import distances
 import pytest
 
 from arm_model import (
@@ -18,7 +19,6 @@ from arm_model import (
     Box,
     Clearances,
     CollisionObject,
-    Contact,
     PlacedShape,
     Pose,
 )
@@ -60,15 +60,12 @@ def snapshot() -> SceneSnapshot:
     return SceneSnapshot(robot().scene.with_attached(AttachedBody(bar, 'right_2_link', links)))
 
 
-@cache
-def clearances() -> Clearances:
-    """Return what measures the whole robot."""
-    return Clearances(snapshot().scene)
-
-
-def contacts(positions: Array) -> list[Contact]:
-    """Return contacts of the whole robot."""
-    return clearances().contacts(positions)
+def contacts(positions: Array) -> dict[tuple[str, str], float]:
+    """Return which bodies of the whole robot touch, and how deep in [m]."""
+    scene = snapshot().scene
+    (measured,) = distances(scene, positions).tolist()
+    pairs = zip(scene.pairs, measured, strict=True)
+    return {pair: -distance for pair, distance in pairs if distance < 0.0}
 
 
 def anywhere(draw: np.random.Generator) -> Array:
@@ -103,7 +100,7 @@ def test_a_group_touches_what_the_whole_robot_touches() -> None:
         scene = scene_for(snapshot(), model.scene)
         left = np.array([positions[robot().joints.index(name)] for name in model.joints])
         found = {each.bodies for each in Clearances(scene).contacts(left)}
-        assert found == {each.bodies for each in contacts(positions) if each.bodies in scene.pairs}
+        assert found == contacts(positions).keys() & set(scene.pairs)
         with_bar += any('bar' in bodies for bodies in found)
     assert with_bar > STATES / 20
 
@@ -125,7 +122,7 @@ def test_plans_lead_around_the_other_arm() -> None:
         plan = planner.plan(MotionRequest(ends[0], (JointGoal(ends[1]),)), scene)
         for time in np.arange(0.0, plan.path.duration, STEP).tolist():
             there = moved(start, plan.path.at(time).position)
-            assert all(each.depth < SLACK for each in contacts(there))
+            assert all(depth < SLACK for depth in contacts(there).values())
     assert in_the_way
 
 

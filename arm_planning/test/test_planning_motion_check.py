@@ -8,10 +8,10 @@ import math
 
 from model_robots import ready, robot
 import numpy as np
-from planning_scenes import DENSE, with_box, with_random_boxes
+from planning_scenes import DENSE, distances, with_box, with_random_boxes
 import pytest
 
-from arm_model import Array, Clearances, CollisionObject, Mesh, Plane, PlanningScene, RobotState
+from arm_model import Array, CollisionObject, Mesh, Plane, PlanningScene, RobotState
 from arm_planning.free.motion_check import MotionCheck
 from arm_planning.validity import MARGIN, ValidityCheck
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
@@ -46,13 +46,13 @@ def carried() -> PlanningScene:
 @pytest.mark.parametrize('scene', [plane(), hull(), carried()], ids=['plane', 'hull', 'carried'])
 def test_what_overlaps_is_not_free(scene: PlanningScene) -> None:
     """And what is farther apart than the margin is free."""
-    model, clearances = robot('panda'), Clearances(scene)
+    model = robot('panda')
     check = MotionCheck(ValidityCheck(model.limits, scene), [ready('panda')])
     touching = 0
     for state in np.random.default_rng(4).uniform(
         model.limits.lower, model.limits.upper, (300, 7)
     ):
-        distance = float(clearances.least(state, 2.0 * MARGIN).min())
+        distance = float(distances(scene, state).min())
         if distance < 0.0:
             assert not check.free(state)
             touching += 1
@@ -84,10 +84,8 @@ def test_a_straight_motion_is_clear_where_a_dense_sampler_finds_room(scene: Plan
 
 def deepest_on(begin: Array, end: Array, scene: PlanningScene) -> float:
     """Return the least distance on a straight motion in [m], as a dense sampler finds it."""
-    clearances = Clearances(scene)
     count = math.ceil(float(np.abs(end - begin).max()) / DENSE)
-    places = np.linspace(begin, end, count)
-    return min(float(clearances.least(place, MARGIN).min()) for place in places)
+    return float(distances(scene, np.linspace(begin, end, count)).min())
 
 
 @pytest.mark.parametrize('angle', np.linspace(-0.75, 0.75, 12))

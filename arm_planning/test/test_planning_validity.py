@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from model_robots import ready, robot
 import numpy as np
-from planning_scenes import with_box, with_random_boxes
+from planning_scenes import distances, with_box, with_random_boxes
 import pytest
 
 from arm_model import (
-    Clearances,
     CollisionObject,
     frozen,
     ORIGIN,
@@ -64,10 +63,10 @@ def test_a_state_is_valid_where_no_pair_overlaps(seed: int) -> None:
     """The answer is that of the distances, on random states."""
     model = robot('panda')
     scene = with_random_boxes(model, 6, seed)
-    check, clearances = ValidityCheck(model.limits, scene), Clearances(scene)
+    check = ValidityCheck(model.limits, scene)
     draw = np.random.default_rng(seed)
     for state in draw.uniform(model.limits.lower, model.limits.upper, (40, 7)):
-        touching = bool((clearances.least(state, 0.0) < 0.0).any())
+        touching = bool((distances(scene, state) < 0.0).any())
         assert (check.state(state) is not None) == touching
 
 
@@ -129,7 +128,7 @@ def test_a_path_between_states_in_near_contact_is_found_valid() -> None:
     for _ in range(40):
         middle = 0.5 * (near + far)
         scene = with_box(model.scene, 'wall', (0.02, 1.0, 1.0), (middle, 0.0, 0.5))
-        distance = float(Clearances(scene).least(here, 1.0).min())
+        distance = float(distances(scene, here).min())
         near, far = (near, middle) if distance > NEAR else (middle, far)
     assert distance == pytest.approx(NEAR, abs=1e-4)
     assert ValidityCheck(model.limits, scene).waypoints(np.array((here, away))) is None
