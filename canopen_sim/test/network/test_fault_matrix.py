@@ -450,6 +450,7 @@ def assert_accepts_targets(arm: Arm, mode: OperationMode) -> None:
 DEVIATIONS = {
     'no state without a mode': (Deviation.MODE_REQUIRED, Deviation.MODE_ZERO_REFUSED),
     'no mode under halt': (Deviation.MODE_HELD_UNDER_HALT,),
+    'EMCYs without end': (Deviation.EMCY_FLOOD,),
 }
 
 
