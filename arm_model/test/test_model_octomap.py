@@ -115,6 +115,29 @@ def test_cells_count_as_boxes(
         assert by_cell < 0.0
 
 
+def test_gradients_of_distances_to_cells_are_differences() -> None:
+    """What leads away from a cell, whichever side of it."""
+    draw, step, seen = np.random.default_rng(0), 1e-4, 0
+    for _ in range(20):
+        cells = np.unique(draw.integers(-20, 20, (30, 3)), axis=0)
+        middles: Array = 0.05 * (cells + 0.5)
+        scene = MODEL.scene.with_object(Thing(OCTOMAP_NAME, Cells(middles, 0.05)))
+        at = draw.uniform(-1.5, 1.5, 4)
+        ahead, behind = (
+            np.array([Clearances(scene).least(at + way, np.inf) for way in side * np.eye(4)])
+            for side in (step, -step)
+        )
+        for near in Clearances(scene).nearest(at, np.inf, len(scene.pairs)):
+            if OCTOMAP_NAME not in near.links or near.distance < 0.01:
+                continue
+            one, other = ahead[:, near.pair], behind[:, near.pair]
+            smooth = np.abs(one + other - 2 * near.distance) < 2e-7
+            seen += int(smooth.sum())
+            difference = (one - other) / (2 * step)
+            assert near.gradient[smooth] == pytest.approx(difference[smooth], abs=0.02)
+    assert seen > 100
+
+
 def test_a_large_map_is_taken() -> None:
     """Of 20,000 cells that no larger ones join."""
     side = np.arange(40)

@@ -118,8 +118,12 @@ class PlanningScene:
         self.geometry = pin.GeometryModel()
         bodies = self._bodies()
         extents = np.array([_extent(each) for each in self.geometry.geometryObjects])
+        of_cells = [
+            isinstance(each.geometry, coal.OcTree) for each in self.geometry.geometryObjects
+        ]
         pairs = [
-            (first, second)
+            # the octree first: coal turns the normal of the other order about
+            (second, first) if of_cells[second] else (first, second)
             for first, second in _candidates(bodies)
             if self._checks(bodies[first], bodies[second])
         ]
@@ -129,10 +133,7 @@ class PlanningScene:
             (bodies[first].name, bodies[second].name) for first, second in pairs
         )
         self.relative_motion_sign, self.distance_rate_bounds = self._bounds(bodies, extents, pairs)
-        solids = [each.geometry for each in self.geometry.geometryObjects]
-        self.of_cells: Mask = np.array(
-            [any(isinstance(solids[each], coal.OcTree) for each in pair) for pair in pairs], bool
-        )
+        self.of_cells: Mask = np.array([of_cells[first] for first, _ in pairs], bool)
         for array in (self.relative_motion_sign, self.distance_rate_bounds, self.of_cells):
             array.setflags(write=False)
 
