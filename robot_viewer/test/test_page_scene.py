@@ -14,6 +14,7 @@ from urdf_reader import read_urdf, Transform
 from viser import ViserServer
 
 from robot_viewer.page.robot_scene import Ground, RobotScene, start_position, travel
+from robot_viewer.shapes import Meshes, shapes_of
 
 URDF = """
 <robot name="small">
@@ -110,6 +111,16 @@ def test_a_mesh_that_no_reader_takes_is_named(
     scene = RobotScene(server.scene, read_urdf(URDF.format(mesh=mesh)), tmp_path)
     (found,) = scene.notes
     assert found.startswith(note)
+
+
+def test_a_mesh_is_shown_in_its_own_unit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A COLLADA file in millimetres, once; the reader leaves the unit to us."""
+    unit = '<COLLADA><asset><unit name="millimeter" meter="0.001"/></asset></COLLADA>'
+    (tmp_path / 'a.dae').write_text(unit)
+    monkeypatch.setattr(trimesh, 'load', lambda *_, **__: trimesh.creation.box())
+    shapes = shapes_of(read_urdf(URDF.format(mesh='a.dae')))
+    _, scale = Meshes(tmp_path).read(next(each for each in shapes if each.shape == 'mesh'))
+    assert scale == pytest.approx((0.002, 0.002, 0.002))
 
 
 def test_a_color_that_is_none_is_named_and_its_shape_is_there(server: ViserServer) -> None:

@@ -17,11 +17,11 @@ from functools import lru_cache
 import hashlib
 import os
 from pathlib import Path
-import re
 import tempfile
 
 import coal
 import numpy as np
+from urdf_reader import mesh_unit
 
 from ..arrays import Array, frozen, Native, Places
 
@@ -45,9 +45,6 @@ APART = 1e-3
 
 FORMAT = 'v2'
 """Version of the files in the cache: part of their names."""
-
-COLLADA_UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*["\']([^"\']+)["\']')
-"""Where a COLLADA file says how many metres its unit has."""
 
 
 class MeshError(ValueError):
@@ -153,7 +150,7 @@ def hulls_of_file(path: Path) -> Sequence[Hull]:
         MeshError: The file is no mesh.
     """
     try:
-        mesh = coal.MeshLoader().load(str(path), np.full(3, _unit(path)))
+        mesh = coal.MeshLoader().load(str(path), np.full(3, mesh_unit(path)))
     except ValueError as error:  # the last line is assimp's
         reason = str(error).strip().splitlines()[-1]
         raise MeshError(f'{path}: {reason}; export it as STL, DAE or OBJ') from error
@@ -203,17 +200,6 @@ def _bodies(corners: Array, triangles: Places) -> Sequence[Places]:
     if not 1 <= len(found) <= MAX_BODIES:
         return (np.arange(len(triangles)),)
     return tuple(body for body, _, _ in found)
-
-
-def _unit(path: Path) -> float:
-    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention."""
-    if path.suffix.lower() != '.dae':
-        return 1.0
-    found = COLLADA_UNIT.search(path.read_bytes())
-    try:
-        return float(found[1]) if found else 1.0
-    except ValueError:
-        return 1.0
 
 
 def convex(points: Array, most: int | None = None) -> Native:

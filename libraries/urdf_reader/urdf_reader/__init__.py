@@ -8,7 +8,7 @@ description here: the model of an arm, publishers of joint states and of /tf, br
 
 from .exceptions import DescriptionError, MeshFileError, XacroError
 from .groups import find_group, JointGroup
-from .mesh_files import find_mesh, find_package
+from .mesh_files import find_mesh, find_package, mesh_unit
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
 from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
 from .urdf import (
@@ -50,6 +50,7 @@ __all__ = [
     'find_mesh',
     'find_package',
     'from_rpy',
+    'mesh_unit',
     'multiply',
     'parse_srdf',
     'read_urdf',

@@ -6,9 +6,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+import re
 from urllib.parse import unquote
 
 from .exceptions import MeshFileError
+
+COLLADA_UNIT = re.compile(rb'<unit\b[^>]*\bmeter\s*=\s*["\']([^"\']+)["\']')
+"""Where a COLLADA file says how many metres its unit has."""
 
 
 def find_mesh(name: str, folder: Path | None = None) -> Path:
@@ -37,6 +41,21 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
     if not path.is_file():
         raise MeshFileError(f'{name}: no file {path}; correct the name, or add the file')
     return path
+
+
+def mesh_unit(path: Path) -> float:
+    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention.
+
+    Args:
+        path: Its file.
+    """
+    if path.suffix.lower() != '.dae':
+        return 1.0
+    found = COLLADA_UNIT.search(path.read_bytes())
+    try:
+        return float(found[1]) if found else 1.0
+    except ValueError:
+        return 1.0
 
 
 def find_package(name: str, folder: Path | None = None) -> Path:
