@@ -120,7 +120,7 @@ def test_gradients_of_distances_to_cells_are_differences() -> None:
     draw, step, seen = np.random.default_rng(0), 1e-4, 0
     for _ in range(20):
         cells = np.unique(draw.integers(-20, 20, (30, 3)), axis=0)
-        middles: Array = 0.05 * (cells + 0.5)
+        middles = np.asarray(0.05 * (cells + 0.5), dtype=np.float64)
         scene = MODEL.scene.with_object(Thing(OCTOMAP_NAME, Cells(middles, 0.05)))
         at = draw.uniform(-1.5, 1.5, 4)
         ahead, behind = (
