@@ -164,14 +164,16 @@ class Drive:
             self.feed_forward.end()
         self._led, self._streamed = self._streamed, False
         command, bits = Command.DISABLE_VOLTAGE, NO_BITS
-        if self.node.operational and self.view.state is not DriveState.UNKNOWN:
+        view = self.view
+        known = view.state is not DriveState.UNKNOWN
+        if known and (view.fresh or self.node.operational):
             command, bits = self.control.step(self._command(), now, period)
         elif self.node.taken_over:
             return  # its RPDOs go on to carry what another master had commanded
         elif self._unknown:
             self.objects.mute_controlword()  # it may move, and would coast
-        kept_back = self.objects.controlword_muted and not (self._unknown or self.stop.running)
-        if self.control.enables and kept_back:
+        leads = self.control.enables and not (self._unknown or self.stop.running)
+        if leads and self.objects.controlword_muted:
             raise CanopenError('the RPDO with its controlword is kept back, with another axis')
         self.control.send(command, bits)
 
@@ -292,10 +294,10 @@ class Drive:
     def _watch_braking(self) -> None:
         """Stop an axis by stronger means that a halt, or being disabled, does not slow down."""
         view, control = self.view, self.control
-        halted = control.halted and not control.halt.leaving
-        leaves = control.goal not in {None, DriveState.OPERATION_ENABLED}
-        enabled = view.state is DriveState.OPERATION_ENABLED
-        if self.stop.running or not enabled or not (halted or leaves):
+        halted = control.halt.held and not control.halt.leaving
+        goal, enabled = control.goal, DriveState.OPERATION_ENABLED
+        commanded = halted or not (goal is enabled or goal is None)
+        if not commanded or view.state is not enabled or self.stop.running:
             self._braking.clear()
             return
         if not self._braking.fails(
