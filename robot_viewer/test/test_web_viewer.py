@@ -34,7 +34,7 @@ from viser import GuiEvent
 
 from node_runner import LATCHED, ParameterError
 from robot_viewer.nodes import controllers as controllers_module
-from robot_viewer.nodes import listening
+from robot_viewer.nodes import listening, web_viewer
 from robot_viewer.nodes.web_viewer import WebViewer
 from robot_viewer.page.overlay import StopAnswer
 from robot_viewer.page.robot_page import RobotPage
@@ -512,7 +512,9 @@ def test_a_slider_moves_its_joint_alone(robot: Robot, monkeypatch: pytest.Monkey
         robot.spin_until(lambda: not controllers.found['/arm_controller'].busy, 'the end')
 
 
-def test_nothing_that_the_robot_sends_ends_the_page(robot: Robot, said: list[str]) -> None:
+def test_nothing_that_the_robot_sends_ends_the_page(
+    robot: Robot, said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What cannot be shown is said once, in the log and on the page; STOP works all the same."""
     statuses = robot.node.create_publisher(DiagnosticArray, 'diagnostics', 10)
     odd = DiagnosticStatus(name='odd', level=b'\x09', message='a level of nobody')
@@ -523,6 +525,12 @@ def test_nothing_that_the_robot_sends_ends_the_page(robot: Robot, said: list[str
         return html is not None and 'a level of nobody' in html.content
 
     robot.spin_until(shown, 'the status')
+    monkeypatch.setattr(web_viewer, 'STATUS_AGE', 0.1)
+    page = robot.viewer.page
+    gone = 'unknown for 0 s; before: a level of nobody'
+    robot.spin_until(
+        lambda: gone in ((page._statuses and page._statuses.content) or ''), 'its age'
+    )
     for wrong in ('<robot', BAD_ORIGIN):
         robot.description.publish(String(data=wrong))
         robot.spin_until(lambda: bool(said), 'a sentence')

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 import concurrent.futures
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 import threading
@@ -58,6 +59,8 @@ DRAW_PERIOD = 1.0 / 30.0
 """Time between two pictures, and between two looks at what was done on the page, in [s]."""
 LIST_PERIOD = 0.2
 """Time between two looks at numbers in [s]."""
+STATUS_AGE = 5.0
+"""After which a status that does not come again is unknown in [s]."""
 GRAPH_PERIOD = 1.0
 """Time between two looks at what the robot offers in [s]."""
 DRIVE_SERVICES = (
@@ -122,6 +125,7 @@ class WebViewer(Node):
         self._own = False  # the page publishes joint states, as nobody else ever did
         self._robot_publishes = False
         self._statuses: dict[str, Status] = {}
+        self._heard: dict[str, float] = {}  # when each of them came
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
@@ -192,6 +196,16 @@ class WebViewer(Node):
             level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
             values = {each.key: each.value for each in status.values}
             self._statuses[status.name] = Status(status.name, level, status.message, values)
+            self._heard[status.name] = time.monotonic()
+
+    def _aged(self, status: Status, now: float) -> Status:
+        """Return a status as it is known now: whoever has ended says nothing any more."""
+        age = now - self._heard[status.name]
+        if age < STATUS_AGE:
+            return status
+        return replace(
+            status, level=STALE, message=f'unknown for {age:.0f} s; before: {status.message}'
+        )
 
     def _take_log(self, message: Log) -> None:
         """Keep the warnings and errors of other nodes of the robot."""
@@ -212,6 +226,7 @@ class WebViewer(Node):
         looked_at = watched or self._controllers.busy or self._first_motion.busy
         if self._listening.update(time.monotonic(), looked_at=looked_at):
             self._received_at, self._listens_since = None, time.monotonic()  # what is known is old
+            self._statuses.clear()
         if watched:
             self._draw()
 
@@ -236,7 +251,7 @@ class WebViewer(Node):
         silent = now - self._listens_since if age is None else age
         self.page.show_silence(silent if self._robot_publishes else None)
         if self._statuses:
-            self.page.show_statuses(list(self._statuses.values()))
+            self.page.show_statuses([self._aged(each, now) for each in self._statuses.values()])
         for name, controller in self._controllers.found.items():
             self.page.follow(name, busy=controller.busy, positions=controller.positions)
         self._body.list()
