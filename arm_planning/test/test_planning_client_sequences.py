@@ -195,6 +195,14 @@ def test_a_cartesian_path_ends_in_front_of_what_stands_between_its_places(
     assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
 
 
+def test_a_start_just_beyond_a_limit_is_on_it(rig: MoveGroupRig) -> None:
+    """A drive may stand off by some of what it was sent to."""
+    rig.positions['panda_joint1'] = 2.8978  # of 2.8973
+    rig.settle()
+    _status, result = rig.move(action_goal(motion_request(joint_goal([2.5, *READY[1:]]))))
+    assert result.error_code.val == SUCCESS, result.error_code
+
+
 def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     """What is not named is free where it cannot stay."""
     back = Quaternion(y=-math.sin(1.2), w=math.cos(1.2))
@@ -254,6 +262,10 @@ def test_planning_scene_interface(rig: MoveGroupRig) -> None:
         return {each.object.id for each in found.robot_state.attached_collision_objects}
 
     rig.client.spin_until(lambda: attached() == {'cup'} and not names(), 30.0, 'the attached cup')
+    asked = GetPositionFK.Request(fk_link_names=['cup'])
+    asked.header.frame_id = BASE
+    place = rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose.position
+    assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.3, 0.3))
     attach.object.operation = CollisionObject.REMOVE
     publisher.publish(attach)
     rig.client.spin_until(lambda: names() == {'cup'} and not attached(), 30.0, 'the cup laid down')

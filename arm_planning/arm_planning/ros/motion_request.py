@@ -45,6 +45,10 @@ from .scene_snapshot import SceneSnapshot
 
 OMPL, PILZ = PIPELINES
 
+START_BOUNDS_ERROR = 0.01
+"""How far a joint may be beyond a limit at the start in [rad]: drives stand off by some; MoveIt's
+start_state_max_bounds_error. As much is allowed when the motion begins."""
+
 ROUNDING = 1e-9
 """By how much joint constraints may miss each other for rounding in [rad] or [m]."""
 
@@ -55,7 +59,7 @@ class RequestReader:
     """Reads requests of one group in one scene, with the robot at one place.
 
     Attributes:
-        start: Where the joints of the group are in [rad].
+        start: Where the joints of the group are in [rad]; on a limit where they are just beyond.
     """
 
     def __init__(
@@ -76,7 +80,9 @@ class RequestReader:
         self._settings = settings or MoveItSettings()
         self._model, self._snapshot, self._positions = model, snapshot, positions
         place = dict(zip(snapshot.scene.kinematics.joints, positions.tolist(), strict=True))
-        self.start = frozen([place[name] for name in model.joints])
+        start = np.array([place[name] for name in model.joints])
+        within = np.clip(start, model.limits.lower, model.limits.upper)
+        self.start = frozen(np.where(np.abs(start - within) <= START_BOUNDS_ERROR, within, start))
 
     def request(self, message: Any) -> MotionRequest:  # noqa: ANN401  # messages have no type
         """Return a moveit_msgs/MotionPlanRequest; its start state is where the robot is.

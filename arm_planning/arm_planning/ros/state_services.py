@@ -88,7 +88,7 @@ def fk_response(
     positions: Array,
     stamp: Any,  # noqa: ANN401
 ) -> GetPositionFK.Response:
-    """Return poses of links in the frame that a request names.
+    """Return poses of links, bodies and subframes in the frame that a request names.
 
     Args:
         request: The request.
@@ -104,12 +104,13 @@ def fk_response(
     frame = request.header.frame_id or snapshot.root
     outer = inverse(snapshot.frame(frame, positions))
     response = GetPositionFK.Response(error_code=error_code())
-    links = snapshot.scene.kinematics.frames
     for link in request.fk_link_names:
-        if link not in links:
+        try:
+            snapshot.link_of(link)
+        except PlanningError as error:
             raise PlanningError(
-                PlanningCode.INVALID_LINK_NAME, f'no link {link!r}; links: {", ".join(links)}'
-            )
+                PlanningCode.INVALID_LINK_NAME, f'fk_link_names: {error}'
+            ) from error
         pose = combined(outer, snapshot.frame(link, positions))
         header = Header(frame_id=frame, stamp=stamp)
         response.pose_stamped.append(PoseStamped(header=header, pose=pose_message(pose)))
