@@ -203,6 +203,15 @@ def test_a_start_just_beyond_a_limit_is_on_it(rig: MoveGroupRig) -> None:
     assert result.error_code.val == SUCCESS, result.error_code
 
 
+def test_a_motion_of_days_is_planned(rig: MoveGroupRig) -> None:
+    """Slower by a million times, in points that a message can hold."""
+    request = motion_request(joint_goal(MOVED), max_velocity_scaling_factor=1e-6)
+    points = rig.plan(request).trajectory.joint_trajectory.points
+    assert points[-1].time_from_start.sec > 1e5
+    assert list(points[-1].positions) == pytest.approx(MOVED, abs=1e-6)
+    assert len(points) < 10_000
+
+
 def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     """What is not named is free where it cannot stay."""
     back = Quaternion(y=-math.sin(1.2), w=math.cos(1.2))

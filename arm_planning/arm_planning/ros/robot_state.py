@@ -24,6 +24,9 @@ from ..exceptions import PlanningCode, PlanningError
 POINT_PERIOD = 0.1
 """Longest time between two points of a trajectory in [s]: that of MoveIt's plans."""
 
+MAX_SPLITS = 5000
+"""Points that are added to a trajectory at most: those of a very slow one are farther apart."""
+
 
 def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noqa: ANN401
     """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint.
@@ -83,15 +86,16 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
     # of ends in the same nanosecond the last one: points of equal time are no trajectory
     ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}
     times = list(ends.values())
-    parts = [_split(begin, end) for begin, end in pairwise(times)]
+    period = max(POINT_PERIOD, path.duration / MAX_SPLITS)
+    parts = [_split(begin, end, period) for begin, end in pairwise(times)]
     trajectory = JointTrajectory(header=Header(frame_id=root), joint_names=list(joints))
     trajectory.points = [_point(path, time) for time in (*chain(*parts), times[-1])]
     return RobotTrajectory(joint_trajectory=trajectory)
 
 
-def _split(begin: float, end: float) -> Sequence[float]:
+def _split(begin: float, end: float, period: float) -> Sequence[float]:
     """Return times from a begin up to an end, which is left out, that are near to each other."""
-    count = math.ceil((end - begin) / POINT_PERIOD)
+    count = math.ceil((end - begin) / period)
     return [begin + number * (end - begin) / count for number in range(count)]
 
 
