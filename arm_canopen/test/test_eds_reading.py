@@ -186,6 +186,48 @@ def test_values_after_a_reset(
     assert entry.default == value
 
 
+COMPACT_PDOS = """
+[DeviceInfo]
+CompactPDO=0x13
+NrOfRXPDO=1
+NrOfTXPDO=5
+[OptionalObjects]
+SupportedObjects=3
+1=0x1400
+2=0x1600
+3=0x1804
+[1800]
+ObjectType=9
+SubNumber=2
+[1800sub0]
+DataType=5
+AccessType=const
+DefaultValue=1
+[1800sub1]
+DataType=7
+AccessType=rw
+DefaultValue=0x80000000
+"""
+
+
+def test_compact_pdos_are_written_out(tmp_path: Path) -> None:
+    """By their number and the mask of sub-indices; what has a section keeps it."""
+    eds = read(tmp_path, COMPACT_PDOS)
+    dictionary = eds.dictionary.for_node(3)
+    assert not [problem for problem in eds.warnings if 'without a section' in problem.message]
+    for index in (0x1400, 0x1801, 0x1804):
+        assert [entry.subindex for entry in dictionary.subindices(index)] == [0, 1, 2, 5]
+    defaults = {(0x1400, 0): 5, (0x1400, 1): 0x203, (0x1801, 1): 0x283}
+    defaults |= {(0x1804, 1): 0x8000_0000, (0x1800, 1): 0x8000_0000, (0x1A04, 0): 0}
+    for address, default in defaults.items():
+        entry = dictionary.get(*address)
+        assert entry is not None
+        assert entry.default == default
+    assert len(dictionary.subindices(0x1600)) == len(dictionary.subindices(0x1A00)) == 65
+    assert not dictionary.has_index(0x1401)
+    assert not dictionary.has_index(0x1805)
+
+
 def test_compact_arrays_are_named(tmp_path: Path) -> None:
     """[2000Name] names single elements, the others are numbered."""
     text = (

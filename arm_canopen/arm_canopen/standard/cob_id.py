@@ -13,6 +13,7 @@ COB_ID_INVALID = 0x8000_0000  # bit 31 of a COB-ID object: the service does not 
 COB_ID_EXTENDED = 0x2000_0000  # bit 29: 29-bit identifier
 SYNC_PRODUCER = 0x4000_0000  # bit 30 of 0x1005: the device generates SYNC
 RTR_FORBIDDEN = 0x4000_0000  # bit 30 of a TPDO's COB-ID: no remote frame may request it
+PREDEFINED_MAX = 4  # PDOs of each direction with a pre-defined COB-ID
 CAN_ID_MASK = 0x7FF  # 11-bit identifier
 
 
@@ -32,8 +33,8 @@ class CobId(IntEnum):
 
 PREDEFINED: dict[tuple[int, int], int] = {
     (0x1014, 0): CobId.EMCY,
-    **{(0x1400 + number, 1): CobId.RPDO1 + 0x100 * number for number in range(4)},
-    **{(0x1800 + number, 1): CobId.TPDO1 + 0x100 * number for number in range(4)},
+    **{(0x1400 + n, 1): CobId.RPDO1 + 0x100 * n for n in range(PREDEFINED_MAX)},
+    **{(0x1800 + n, 1): CobId.TPDO1 + 0x100 * n for n in range(PREDEFINED_MAX)},
 }
 """Function code of the COB-IDs that devices may change, by index and sub-index."""
 
@@ -83,6 +84,6 @@ def own_cob_id(
 
 
 def _pdo_default(base: int, number: int, node_id: int) -> int:
-    if not 1 <= number <= 4:
+    if not 1 <= number <= PREDEFINED_MAX:
         raise ValueError(f'PDO {number} has no pre-defined COB-ID; only PDOs 1 to 4 have one')
     return base + 0x100 * (number - 1) + node_id

@@ -8,8 +8,7 @@ from arm_canopen.config.findings import Findings, Place
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.read.eds import DUMMY_TYPES, Eds
 from arm_canopen.config.resolve.pdo_mapping import eds_mapping
-from arm_canopen.config.resolve.pdos import PREDEFINED_MAX
-from arm_canopen.standard.cob_id import COB_ID_INVALID
+from arm_canopen.standard.cob_id import COB_ID_INVALID, PREDEFINED_MAX
 from arm_canopen.standard.dictionary import object_address, ObjectEntry
 
 

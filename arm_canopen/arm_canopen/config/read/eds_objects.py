@@ -7,14 +7,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 import re
 
+from ...standard.cob_id import COB_ID_INVALID, CobId, PREDEFINED_MAX
 from ...standard.datatypes import DataType, integer_range, REAL_FORMATS, Value
 from ...standard.dictionary import AccessType, object_address, ObjectCode, ObjectEntry
+from ...standard.objects import Index, PDO_COUNT_MAX
 from .eds_ini import IniFile, IniSection
 from .eds_values import EdsValue, parse_integer, parse_value
 
 OBJECT_SECTION = re.compile(r'([0-9a-f]{1,4})(?:sub([0-9a-f]{1,2}))?')
 LISTS = ('mandatoryobjects', 'optionalobjects', 'manufacturerobjects')
 COMPACT_SUBINDICES_MAX = 254
+COMPACT_MAPPING = 64  # objects of a PDO that CompactPDO abbreviates, one for each bit
+PDO_PARAMETERS: tuple[tuple[str, DataType], ...] = (
+    ('COB-ID', DataType.UNSIGNED32),
+    ('Transmission type', DataType.UNSIGNED8),
+    ('Inhibit time', DataType.UNSIGNED16),
+    ('Compatibility entry', DataType.UNSIGNED8),
+    ('Event timer', DataType.UNSIGNED16),
+    ('SYNC start value', DataType.UNSIGNED8),
+)
+"""Sub-indices of a communication parameter from 1 on (CiA 301, 7.5.2.35)."""
+PDO_KINDS = (
+    ('nrofrxpdo', Index.RPDO_COMMUNICATION, Index.RPDO_MAPPING, CobId.RPDO1),
+    ('nroftxpdo', Index.TPDO_COMMUNICATION, Index.TPDO_MAPPING, CobId.TPDO1),
+)
 COLLECTIONS = (ObjectCode.ARRAY, ObjectCode.RECORD, ObjectCode.DEFSTRUCT)
 
 
@@ -40,7 +56,9 @@ class ObjectReader:
 
     def entries(self) -> Iterator[ObjectEntry]:
         """Yield all entries; what cannot be understood is in ``oddities``."""
-        self._check_lists()
+        compact = list(self._compact_pdos())
+        self._check_lists({entry.index for entry in compact})
+        yield from compact
         for index, section in self._objects.items():
             yield from self._object(index, section)
         for index in self._parts.keys() - self._objects.keys():
@@ -190,14 +208,34 @@ class ObjectReader:
             self._odd(section, key, f'{error}; ignored')
             return default
 
-    def _check_lists(self) -> None:
-        """Compare the three lists of objects with the sections that there are."""
+    def _compact_pdos(self) -> Iterator[ObjectEntry]:
+        """Write out the PDOs that CompactPDO abbreviates (CiA 306-1, 4.5.2).
+
+        Bit 0 stands for sub-index 1 of each communication parameter, and so on.
+        """
+        info = self._ini.sections.get('deviceinfo')
+        mask = self._number(info, 'compactpdo', 0) if info is not None else 0
+        if info is None or mask <= 0:
+            return
+        for key, communication, mapping, base in PDO_KINDS:
+            for number in range(min(self._number(info, key, 0), PDO_COUNT_MAX)):
+                if communication + number not in self._objects:
+                    yield from _compact_parameters(communication + number, base, number, mask)
+                if mapping + number not in self._objects:
+                    yield from _compact_mapping(mapping + number)
+
+    def _check_lists(self, compact: set[int]) -> None:
+        """Compare the three lists of objects with the sections that there are.
+
+        Args:
+            compact: Objects that need no section.
+        """
         listed: set[int] = set()
         for name in LISTS:
             section = self._ini.sections.get(name)
             if section is not None:
                 listed |= self._listed(section)
-        missing = sorted(listed - self._objects.keys())
+        missing = sorted(listed - self._objects.keys() - compact)
         unlisted = sorted(self._objects.keys() - listed)
         if missing:
             self.oddities.append(
@@ -216,6 +254,34 @@ class ObjectReader:
 
     def _odd(self, section: IniSection, key: str, message: str) -> None:
         self.oddities.append((section.line_of(key), f'[{section.title}]', message))
+
+
+def _compact_parameters(index: int, base: int, number: int, mask: int) -> Iterator[ObjectEntry]:
+    """Yield a communication parameter with the sub-indices of a mask."""
+    predefined = number < PREDEFINED_MAX
+    highest = min(mask.bit_length(), len(PDO_PARAMETERS))
+    u8, constant = DataType.UNSIGNED8, AccessType.CONSTANT
+    yield ObjectEntry(index, 0, 'Highest sub-index supported', u8, constant, default=highest)
+    for position, (name, data_type) in enumerate(PDO_PARAMETERS):
+        if mask >> position & 1:
+            is_cob_id = position == 0
+            default = base + 0x100 * number if predefined else COB_ID_INVALID
+            yield ObjectEntry(
+                index,
+                position + 1,
+                name,
+                data_type,
+                default=default if is_cob_id else None,
+                node_relative=is_cob_id and predefined,
+            )
+
+
+def _compact_mapping(index: int) -> Iterator[ObjectEntry]:
+    """Yield a mapping parameter that maps nothing."""
+    yield ObjectEntry(index, 0, 'Number of mapped objects', DataType.UNSIGNED8, default=0)
+    for subindex in range(1, COMPACT_MAPPING + 1):
+        name = f'Application object {subindex}'
+        yield ObjectEntry(index, subindex, name, DataType.UNSIGNED32, default=0)
 
 
 def _plain_number(value: EdsValue | None) -> int | float | None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID, PREDEFINED_MAX
 from ...standard.dictionary import object_address
 from ...standard.objects import PDO_COUNT_MAX
 from ...standard.pdo import SYNCHRONOUS_MAX
@@ -25,7 +25,6 @@ from .pdo_mapping import eds_mapping, is_fixed, read_mapping
 PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}
 """The keys of one PDO."""
 AUTO = 'auto'
-PREDEFINED_MAX = 4  # PDOs with a pre-defined COB-ID (CiA 301, 7.3.3)
 TRANSMISSION_DEFAULT = 255
 EVENT_TYPES = (254, 255)
 SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
