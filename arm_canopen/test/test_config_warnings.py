@@ -37,6 +37,14 @@ def test_reported_with_line_and_key(
     assert warning.remedy
 
 
+def test_a_drive_whose_eds_names_another_profile_is_reported(tmp_path: Path) -> None:
+    """The driver of bus.yml counts, and the simulator, which has the EDS alone, has no drive."""
+    eds = eds_text().replace('0x00020192', '0x00020191')
+    (warning,) = (w for w in load_text(tmp_path, eds=eds).warnings if 'profile 401' in w.message)
+    assert warning.key == 'defaults.driver'
+    assert '0x1000' in warning.remedy
+
+
 def test_scales_of_a_channel_are_checked_as_those_of_a_device(tmp_path: Path) -> None:
     """Against what counts for its axis, its own and its device's."""
     text = added('joint1', 'num_channels: 2\nchannels: [{scale_pos_to_dev: 57.3}, {}]')

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from ...standard.device_profile import drive_axes
+from ...standard.device_profile import drive_axes, is_drive, profile_number
 from ...standard.dictionary import object_address, ObjectDictionary
 from ...standard.objects import AXIS_OFFSET, Index
 from ..findings import Findings, Place
@@ -149,6 +149,13 @@ def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> 
             section.entries['driver'].place,
             f'{config.driver} is for CiA 402 drives, but the EDS has no {names}',
             "take 'ros2_canopen::ProxyDriver', or the EDS of the drive",
+        )
+    elif config.is_drive and not is_drive(config.dictionary):
+        findings.warning(
+            section.entries['driver'].place,
+            f'{config.driver} is for CiA 402 drives, but 0x1000 of the EDS names profile '
+            f'{profile_number(config.dictionary)}, whose objects from 0x6000 on are others',
+            "take 'ros2_canopen::ProxyDriver', or correct 0x1000 in the EDS",
         )
 
 
