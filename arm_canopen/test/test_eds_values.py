@@ -6,7 +6,7 @@ import math
 import re
 import struct
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 import pytest
 
@@ -143,6 +143,7 @@ TEXTS = st.one_of(
 
 
 @given(data_type=st.sampled_from(DataType), text=TEXTS)
+@example(data_type=DataType.REAL32, text='3.5e38')
 def test_any_text_is_a_value_of_the_type_or_refused(data_type: DataType, text: str) -> None:
     """What is read can be written to the device and read back; a refusal has a reason."""
     try:

@@ -103,11 +103,12 @@ def _integer(data_type: DataType, text: str, low: int, high: int) -> EdsValue | 
 
 def _real(data_type: DataType, text: str) -> float:
     text = text.partition(';')[0].strip()
-    if not text.lower().startswith('0x'):
-        return float(text)
     size = FIXED_BITS[data_type] // 8
-    try:  # hexadecimal gives the bits of the number
-        bits = parse_integer(text).to_bytes(size, 'little')
+    try:
+        if not text.lower().startswith('0x'):
+            struct.pack(REAL_FORMATS[data_type], real := float(text))
+            return real
+        bits = parse_integer(text).to_bytes(size, 'little')  # of the number
     except OverflowError as error:
         raise ValueError(f'{text[:40]} does not fit {data_type.name}') from error
     return float(struct.unpack(REAL_FORMATS[data_type], bits)[0])
