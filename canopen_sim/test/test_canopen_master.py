@@ -9,6 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from itertools import count
 import os
 from pathlib import Path
 import subprocess
@@ -18,6 +19,7 @@ import time
 
 from can_addresses import free_multicast
 import canopen
+from drive_samples import bus_config, drive_config
 import pytest
 
 from arm_canopen import (
@@ -33,6 +35,7 @@ from arm_canopen import (
     Refusal,
     Severity,
 )
+from arm_canopen.can.frame import Frame
 from arm_canopen.can.plugin import ArmCanopenBus
 from arm_canopen.exceptions import (
     BootError,
@@ -43,6 +46,7 @@ from arm_canopen.exceptions import (
     OtherMasterError,
     SdoAbortError,
 )
+from arm_canopen.library.bus_master import BusMaster
 from arm_canopen.master import other_master
 from arm_canopen.standard.dictionary import ObjectDictionary
 from canopen_sim.runner import DeviceRunner
@@ -490,6 +494,33 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
         while (word := statusword(network, 2)) & 0x4F == 0x07:  # it brakes
             assert time.monotonic() < deadline
     assert word & 0x4F == 0x40  # Switch on disabled
+
+
+@pytest.mark.parametrize(
+    ('refusals', 'told'),
+    [
+        (3, 'quick stop sent to joint1; nothing else stops joint1'),
+        (1000, 'no quick stop could be sent to joint1 (the queue is full); nothing else stops'),
+    ],
+)
+def test_a_last_quick_stop_that_the_bus_refuses_is_repeated_and_not_called_sent(
+    refusals: int, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever reads of the end of the cycle cuts the power of what goes on."""
+    tries = count()
+    with open_bus('virtual:last_stop') as virtual, open_bus('virtual:last_stop') as device:
+        master = BusMaster(bus_config(drive_config('joint1', 2)), virtual, lambda event: None)
+        master.network.nodes['joint1'].online = True
+        send = virtual.send
+
+        def full(frame: Frame) -> None:
+            if next(tries) < refusals:
+                raise BusError('the queue is full')
+            send(frame)
+
+        monkeypatch.setattr(virtual, 'send', full)
+        assert told in master.thread.on_defect()
+        assert bool(device.receive(0.0)) is ('quick stop sent' in told)
 
 
 def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from contextlib import suppress
 import struct
 import time
 
@@ -38,6 +37,7 @@ from .bus_recording import BusRecording
 THREAD_PRIORITY = 50  # SCHED_FIFO, as ros2_control has it
 QUICK_STOP = struct.pack('<H', Command.QUICK_STOP)
 STOP_TIMEOUT = SHUTDOWN_MAX + 2.0  # [s] for all drives to stop; each has its own shorter limits
+INSISTED, INSIST_PAUSE = 10, 0.01  # times and [s] in which a full queue has to take a last frame
 QUEUED_CYCLES = 2  # whose frames may wait for the bus; older ones are worth nothing
 NO_FAULTS = (EventKind.BOOT, EventKind.BOOT_FAILED, EventKind.SDO)
 """A device that is absent is no fault of one in operation."""
@@ -224,24 +224,29 @@ class BusMaster:
         return self.thread.call(lambda: self._group.detach(source))
 
     def _stop_without_cycle(self) -> str:
-        """Send a quick stop once to each drive that may have power; nobody waits for an answer.
+        """Send a quick stop to each drive that may have power; nobody waits for an answer.
 
         Returns:
-            What was sent, and to which drives it is all that stops them.
+            What was sent, to which drives it is all that stops them, and which did not get it.
         """
         if self.black_box is not None:
             self.black_box.fault('', f'{OWNER} has ended by a defect')
         drives = [axis.drive for axis in self.commands.values()]
         powered = [each for each in drives if each.node.was_booted and not each.stop.disabled]
+        refused: dict[str, BusError] = {}
         for drive in powered:
             index = drive.objects.at(Index.CONTROLWORD)
             request = DownloadRequest(index, 0, QUICK_STOP)
             cob_id = CobId.SDO_REQUEST + drive.node.config.node_id
-            with suppress(BusError):
-                self._transmit(Frame(cob_id, request.encode()))
+            if (refusal := self._insist(Frame(cob_id, request.encode()))) is not None:
+                refused[drive.name] = refusal
         if not powered:
             return ''
-        text = f'; quick stop sent to {", ".join(drive.name for drive in powered)}'
+        sent = ', '.join(drive.name for drive in powered if drive.name not in refused)
+        text = f'; quick stop sent to {sent}' if sent else ''
+        if refused:
+            reason = next(iter(refused.values()))
+            text += f'; no quick stop could be sent to {", ".join(refused)} ({reason})'
         unwatching = [drive.name for drive in powered if not drive.node.watch_slot]
         if unwatching:
             text += (
@@ -249,6 +254,19 @@ class BusMaster:
                 'of the master (0x1016): cut the power of what goes on'
             )
         return text
+
+    def _insist(self, frame: Frame) -> BusError | None:
+        """Send a frame, again and again while the bus refuses it; return why it has not left."""
+        refusal: BusError | None = None
+        for _ in range(INSISTED):
+            try:
+                self._transmit(frame)
+            except BusError as error:  # noqa: PERF203
+                refusal = error
+                time.sleep(INSIST_PAUSE)
+            else:
+                return None
+        return refusal
 
     def _send(self, frame: Frame) -> None:
         self.can.send(frame)
