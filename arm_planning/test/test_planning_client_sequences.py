@@ -142,7 +142,8 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     trajectory = plan.planned_trajectory.joint_trajectory
     assert (list(trajectory.joint_names), trajectory.header.frame_id) == (JOINTS, BASE)
     assert not plan.executed_trajectory.joint_trajectory.points
-    assert states[0] == 'PLANNING'
+    # the first one may leave before the server has found the client's subscription
+    assert states in (['PLANNING', 'IDLE'], ['IDLE'])
     assert not rig.followed
     # execute()
     status, executed = rig.run(
