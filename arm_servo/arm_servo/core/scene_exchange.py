@@ -47,9 +47,12 @@ class SceneExchange:
         future: Future[int] = Future()
 
         def take(_cycle: Cycle) -> bool:
+            # to free a large scene takes milliseconds: in the worker, not in the cycle
+            before = [self._core.scene]
             execution = self._core.use_scene(prepared)
             if execution is not None:
                 self.recheck(execution)
+            self._worker.submit(before.clear)
             future.set_result(version)
             return True
 
