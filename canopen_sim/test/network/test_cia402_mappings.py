@@ -145,7 +145,7 @@ class Reader:
                 cycle = []
 
     def _judge(self, cycle: list[tuple[PdoConfig, dict[int, int]]], time: float) -> Iterator[str]:
-        if not self.values:
+        if CONTROLWORD not in self.values:  # it waits until the state of the drive is known
             return
         for at, (rpdo, values) in enumerate(cycle):
             for edge, target in self._edges(values):
