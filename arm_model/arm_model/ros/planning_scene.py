@@ -164,18 +164,14 @@ def apply_attached_object(
     return draft.scene()
 
 
-def allowed_collisions(
-    message: MatrixMessage, before: AllowedCollisionMatrix | None = None
-) -> AllowedCollisionMatrix:
+def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
     """Return what may touch.
 
-    An entry that says what the defaults of its names say is none, as in MoveIt: whoever takes a
-    default back has not made an entry by sending the matrix that he read.
+    As in MoveIt, the upper triangle counts, and an entry that says what the defaults of its names
+    say is none: a client that changes a default sends back the entries that it has read.
 
     Args:
         message: The message.
-        before: What may touch so far: of a pair whose two entries differ, as in a matrix that is
-            filled in one triangle only, the one that changes this counts.
 
     Raises:
         SceneError: Rows or columns are missing.
@@ -195,13 +191,10 @@ def allowed_collisions(
     by_default = AllowedCollisionMatrix(
         defaults=dict(zip(message.default_entry_names, map(bool, defaults), strict=True))
     )
-    before = before or AllowedCollisionMatrix()
     entries = {}
     for row, first in enumerate(names):
-        for column in range(row):
-            second = names[column]
-            one, other = bool(rows[row].enabled[column]), bool(rows[column].enabled[row])
-            allowed = one if one == other else not before.allows(first, second)
+        for column in range(row + 1, len(names)):
+            second, allowed = names[column], bool(rows[row].enabled[column])
             if not (
                 by_default.defaults.keys() & {first, second}
                 and by_default.allows(first, second) == allowed
@@ -214,7 +207,7 @@ def _merged(scene: PlanningScene, message: MatrixMessage) -> AllowedCollisionMat
     """Return the matrix of a message, and what the scene has for links that it does not name."""
     if not (message.entry_names or message.default_entry_names):
         return None
-    given = allowed_collisions(message, scene.allowed)
+    given = allowed_collisions(message)
     named, links = set(message.entry_names), set(scene.kinematics.frames)
     kept = {
         pair: allowed
