@@ -248,6 +248,26 @@ def test_a_controller_that_was_restarted_frees_its_joints(bench: Bench, fate: st
     bench.start()
 
 
+def test_a_controller_that_is_gone_while_it_moves_ends_the_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also a gripper, whose time is not watched."""
+    hand = controllers.Controller(['left', 'right'], KINDS['ParallelGripperCommand'], 'grip')
+    for known in (ARM, {'hand': hand}):
+        bench = Bench(monkeypatch, known)
+        running = bench.start()
+        bench.watch()
+        bench.controller.is_ready = False
+        bench.watch()
+        running.deadline = 0.0  # STOP_TIMEOUT is over
+        bench.watch()
+        ((code, reason),) = bench.ends
+        assert code is PlanningCode.CONTROL_FAILED
+        assert 'its action is gone' in reason
+        bench.controller.is_ready = True
+        bench.start()
+
+
 def test_a_start_is_reported_with_the_way_to_its_first_point(bench: Bench) -> None:
     """What is refused is not reported."""
     begun: list[Any] = []

@@ -311,21 +311,30 @@ def test_a_gripper_takes_the_time_that_it_needs(panda: MoveGroupRig) -> None:
 
 
 def test_a_speed_override_gives_an_execution_more_time(panda: MoveGroupRig) -> None:
-    """Paused it waits; at full speed again, a controller that does not go on is too slow."""
+    """Paused it waits; at full speed, a controller that does not go on is too slow.
+
+    So is one that leaves the factor at 0, as many releases of joint_trajectory_controller do.
+    """
     server = panda.serve_arm('panda_arm_controller', holds=True)
     topic = '/panda_arm_controller/controller_state'
     states = panda.client.node.create_publisher(JointTrajectoryControllerState, topic, 10)
     state = JointTrajectoryControllerState(speed_scaling_factor=0.0)
     timer = panda.client.node.create_timer(0.02, lambda: states.publish(state))
     panda.client.spin_until(lambda: states.get_subscription_count() > 0, 60.0, 'subscription')
-    result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
-    panda.client.spin_for(allowed + 1.0)
-    assert not panda.held[0].is_cancel_requested
-    state.speed_scaling_factor = 1.0
-    panda.client.spin_until(lambda: panda.held[0].is_cancel_requested, 60.0, 'cancel')
-    panda.held[0].execute()
-    panda.client.spin_until(result.done, 60.0, 'result')
-    assert result.result().result.error_code.val == MoveItErrorCodes.TIMED_OUT
+    for is_filled in (False, True):
+        if is_filled:
+            state.speed_scaling_factor = 1.0
+            panda.client.spin_for(0.5)
+            state.speed_scaling_factor = 0.0
+        result, allowed = held(panda, joint_goal([0.1], JOINTS[:1]), 'panda_arm')
+        if is_filled:
+            panda.client.spin_for(allowed + 1.0)
+            assert not panda.held[0].is_cancel_requested
+            state.speed_scaling_factor = 1.0
+        panda.client.spin_until(lambda: panda.held[0].is_cancel_requested, 60.0, 'cancel')
+        panda.held[0].execute()
+        panda.client.spin_until(result.done, 60.0, 'result')
+        assert result.result().result.error_code.val == MoveItErrorCodes.TIMED_OUT
     panda.client.node.destroy_timer(timer)
     server.destroy()
 

@@ -137,6 +137,7 @@ class TrajectoryExecution:
         self._matches: dict[str, ServerMatch] = {}
         self._states: dict[str, tuple[float, bytes]] = {}
         self._timed = {name for name, each in controllers.items() if each.kind is FOLLOW}
+        self._scaling: set[str] = set()
         for name in self._timed:
             node.create_subscription(
                 JointTrajectoryControllerState,
@@ -411,12 +412,26 @@ class TrajectoryExecution:
         self._states[name] = time.monotonic(), message
 
     def _speed(self, name: str) -> float:
-        """Return the speed override of a controller: 0 in a pause, 1 where it is unknown."""
+        """Return the speed override of a controller: 0 in a pause, 1 where it is unknown.
+
+        Many releases of joint_trajectory_controller do not fill the field: a 0 is a pause only
+        after another number.
+        """
         at, message = self._states.get(name, (-math.inf, b''))
         if time.monotonic() - at > STATE_TIMEOUT:
             return 1.0
         state = deserialize_message(message, JointTrajectoryControllerState)
-        return min(max(float(state.speed_scaling_factor), 0.0), 1.0)
+        factor = float(state.speed_scaling_factor)
+        if factor > 0.0:
+            self._scaling.add(name)
+        return min(factor, 1.0) if name in self._scaling and factor >= 0.0 else 1.0
+
+    def _lost(self, execution: Execution) -> str:
+        """Return the first of the controllers under way whose action is gone; empty for none."""
+        if execution.ending is not None:
+            return ''
+        awaited = sorted(execution.waits_for)
+        return next((name for name in awaited if not self._clients[name].server_is_ready()), '')
 
     def _is_overdue(self, execution: Execution, passed: float) -> bool:
         """Whether an execution takes too long; what a speed override costs does not count.
@@ -438,9 +453,15 @@ class TrajectoryExecution:
         before, self._watched = self._watched, time.monotonic()
         for name in self._clients:
             self._is_found(name)
+        for name in self._timed - self._scaling:
+            self._speed(name)
         for execution in list(self._running):
             if execution.held:
                 self._look_again(execution)
+                continue
+            if lost := self._lost(execution):
+                reason = f'{lost}: its action is gone while it moves; restart the controller'
+                self.stop(execution, PlanningCode.CONTROL_FAILED, reason)
                 continue
             if not self._is_overdue(execution, self._watched - before):
                 continue
