@@ -8,9 +8,9 @@ the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
 """
 
 from .joint_watch import JointWatch
+from .link_poses import joint_transform
 from .state_publisher import (
     FrameTransform,
-    joint_transform,
     MessageProblem,
     Settings,
     StatePublisher,

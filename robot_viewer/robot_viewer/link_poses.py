@@ -6,9 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from urdf_reader import Joint, KinematicTree, multiply, rotate, Transform
-
-from .state_publisher import joint_transform
+from urdf_reader import (
+    about,
+    Joint,
+    JointKind,
+    KinematicTree,
+    MOVABLE,
+    multiply,
+    rotate,
+    Transform,
+)
 
 
 def compose(parent: Transform, child: Transform) -> Transform:
@@ -23,16 +30,53 @@ def compose(parent: Transform, child: Transform) -> Transform:
     return Transform((a + x, b + y, c + z), multiply(parent.rotation, child.rotation))
 
 
-def joint_position(joint: Joint, positions: Mapping[str, float]) -> float:
-    """Return the position of a joint in [rad] or [m], also of one that follows another; else 0.
+def joint_transform(joint: Joint, position: float) -> Transform:
+    """Return the pose of a joint's child link in its parent link.
+
+    Args:
+        joint: A fixed or movable joint.
+        position: Its position in [rad] or [m]; without meaning for a fixed one.
+    """
+    if joint.kind is JointKind.PRISMATIC:
+        x, y, z = joint.axis
+        return compose(joint.origin, Transform((x * position, y * position, z * position)))
+    if joint.kind in MOVABLE:
+        turned = multiply(joint.origin.rotation, about(joint.axis, position))
+        return Transform(joint.origin.translation, turned)
+    return joint.origin
+
+
+def joint_position(
+    joint: Joint, positions: Mapping[str, float], missing: float | None = None
+) -> float | None:
+    """Return the position of a joint in [rad] or [m]; None where nothing says it.
+
+    One that follows another is where it was measured, else where its source puts it, as
+    robot_state_publisher has it.
 
     Args:
         joint: The joint.
         positions: In [rad] or [m] by name.
+        missing: Position of joints without one, which others may follow.
     """
-    if joint.mimic is None:
-        return positions.get(joint.name, 0.0)
-    return joint.mimic.position(positions.get(joint.mimic.source, 0.0))
+    if joint.name in positions or joint.mimic is None:
+        return positions.get(joint.name, missing)
+    source = positions.get(joint.mimic.source, missing)
+    return None if source is None else joint.mimic.position(source)
+
+
+def moved(
+    tree: KinematicTree, positions: Mapping[str, float], goals: Mapping[str, float]
+) -> dict[str, float]:
+    """Return positions with some joints at goals; what follows those is left out, to follow.
+
+    Args:
+        tree: The robot.
+        positions: Measured, in [rad] or [m] by name.
+        goals: In [rad] or [m] by name.
+    """
+    followers = {j.name for j in tree.movable() if j.mimic and j.mimic.source in goals}
+    return {name: at for name, at in positions.items() if name not in followers} | dict(goals)
 
 
 def link_pose(tree: KinematicTree, link: str, positions: Mapping[str, float]) -> Transform:
@@ -48,7 +92,7 @@ def link_pose(tree: KinematicTree, link: str, positions: Mapping[str, float]) ->
     """
     pose = Transform()
     for joint in tree.chain(tree.root, link):
-        pose = compose(pose, joint_transform(joint, joint_position(joint, positions)))
+        pose = compose(pose, joint_transform(joint, joint_position(joint, positions, 0.0) or 0.0))
     return pose
 
 
@@ -65,7 +109,7 @@ def link_poses(tree: KinematicTree, positions: Mapping[str, float]) -> dict[str,
         later: list[Joint] = []
         for joint in waiting:
             if joint.parent in poses:
-                place = joint_transform(joint, joint_position(joint, positions))
+                place = joint_transform(joint, joint_position(joint, positions, 0.0) or 0.0)
                 poses[joint.child] = compose(poses[joint.parent], place)
             else:
                 later.append(joint)

@@ -15,9 +15,8 @@ from trimesh import Trimesh
 from trimesh.visual import TextureVisuals
 from urdf_reader import KinematicTree, MeshFileError, Transform, UrdfShape
 
-from .link_poses import joint_position, link_paths
+from .link_poses import joint_position, joint_transform, link_paths
 from .shapes import Meshes, PLAIN, shapes_of
-from .state_publisher import joint_transform
 
 TIMELINE = 'ros_time'
 BASE = 'robot'
@@ -68,7 +67,7 @@ class RobotLog:
         movable = {joint.name for joint in tree.movable()}
         for joint in tree.joints:
             if joint.name not in movable:
-                place = joint_transform(joint, joint_position(joint, {}))
+                place = joint_transform(joint, 0.0)
                 self._put(self._paths[joint.child], place, static=True)
         meshes, missing = Meshes(), dict[str, list[str]]()
         for number, shape in enumerate(shapes_of(tree)):
@@ -89,9 +88,9 @@ class RobotLog:
             positions: In [rad] or [m] by name.
         """
         for joint in () if self._tree is None else self._tree.movable():
-            source = joint.name if joint.mimic is None else joint.mimic.source
-            if math.isfinite(positions.get(source, math.nan if self._is_placed else 0.0)):
-                place = joint_transform(joint, joint_position(joint, positions))
+            position = joint_position(joint, positions, None if self._is_placed else 0.0)
+            if position is not None and math.isfinite(position):
+                place = joint_transform(joint, position)
                 self._put(self._paths[joint.child], place)
         self._is_placed = self._tree is not None
 

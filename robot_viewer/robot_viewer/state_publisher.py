@@ -13,15 +13,14 @@ from enum import Enum
 import math
 
 from urdf_reader import (
-    about,
     Joint,
     JointKind,
     KinematicTree,
     MOVABLE,
-    multiply,
-    rotate,
     Transform,
 )
+
+from .link_poses import joint_position, joint_transform
 
 HIGHEST_FREQUENCY = 1000.0
 """Greatest ``publish_frequency`` in [Hz] (robot_state_publisher 3.3.3)."""
@@ -99,31 +98,6 @@ class Update:
     stamp: int
     transforms: tuple[FrameTransform, ...] = ()
     problems: tuple[MessageProblem, ...] = ()
-
-
-def joint_transform(joint: Joint, position: float) -> Transform:
-    """Return the pose of a joint's child link in its parent link.
-
-    Args:
-        joint: A fixed or movable joint.
-        position: Its position in [rad] or [m]; without meaning for a fixed one.
-    """
-    origin = joint.origin
-    if joint.kind is JointKind.PRISMATIC:
-        x, y, z = joint.axis
-        along = rotate(origin.rotation, (x * position, y * position, z * position))
-        return Transform(_sum(origin.translation, along), origin.rotation)
-    if joint.kind in MOVABLE:
-        return Transform(
-            origin.translation, multiply(origin.rotation, about(joint.axis, position))
-        )
-    return origin
-
-
-def _sum(
-    left: tuple[float, float, float], right: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    return (left[0] + right[0], left[1] + right[1], left[2] + right[2])
 
 
 class StatePublisher:
@@ -208,11 +182,9 @@ class StatePublisher:
             if joint is not None:
                 yield self._named(joint, joint_transform(joint, position))
         for joint in self._followers:
-            mimic = joint.mimic
-            if mimic is None or joint.name in positions or mimic.source not in positions:
-                continue
-            position = mimic.position(positions[mimic.source])
-            yield self._named(joint, joint_transform(joint, position))
+            followed = joint_position(joint, positions)
+            if joint.name not in positions and followed is not None:
+                yield self._named(joint, joint_transform(joint, followed))
 
     def _named(self, joint: Joint, transform: Transform) -> FrameTransform:
         prefix = self.settings.frame_prefix

@@ -20,7 +20,7 @@ from test_viewer_kinematics import pose_in_root, published
 from urdf_reader import about, DescriptionError, read_urdf, Transform
 from urdf_robots import ARM, POSITIONS, random_urdfs
 
-from robot_viewer.link_poses import link_pose, links_beyond
+from robot_viewer.link_poses import link_pose, links_beyond, moved
 from robot_viewer.nodes.planning_messages import (
     box_message,
     changed,
@@ -74,6 +74,17 @@ def test_a_joint_that_follows_moves_what_hangs_on_it() -> None:
     assert np.allclose(pose.translation, expected[:3, 3], atol=1e-9)
     assert links_beyond(TREE, frozenset({'finger_joint'})) == {'finger', 'thumb'}
     assert links_beyond(TREE, frozenset({'roll'})) == {'wheel', 'finger', 'thumb'}
+
+
+def test_a_joint_that_follows_has_one_position() -> None:
+    """Where it was measured, for the page as for tf; it goes along with a goal of its source."""
+    followers = {joint.name: 0.3 for joint in TREE.movable() if joint.mimic}
+    measured = POSITIONS | followers
+    expected = pose_in_root('thumb', 'base', published(TREE, measured))
+    assert np.allclose(link_pose(TREE, 'thumb', measured).translation, expected[:3, 3], atol=1e-9)
+    goal = moved(TREE, measured, {'finger_joint': 0.1})
+    expected = pose_in_root('thumb', 'base', published(TREE, POSITIONS | {'finger_joint': 0.1}))
+    assert np.allclose(link_pose(TREE, 'thumb', goal).translation, expected[:3, 3], atol=1e-9)
 
 
 def test_groups_with_their_states_arms_first() -> None:

@@ -63,13 +63,16 @@ def test_joints_move_what_hangs_on_them(server: ViserServer, tmp_path: Path) -> 
     frames = scene._frames
     assert frames['slide'].name == '/robot/base/arm/hand/finger'
     assert frames['slide'].position.tolist() == pytest.approx([0.1, 0.0, 0.0]), 'next to zero'
-    scene.place({'turn': 0.4, 'slide': 0.15, 'another': 3.0, 'follow': 9.0})
+    scene.place({'turn': 0.4, 'slide': 0.15, 'another': 3.0})
     assert frames['turn'].position.tolist() == [0.0, 0.0, 1.0]
     turn = [math.cos(0.2), 0.0, 0.0, math.sin(0.2)]
     assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
     follow = [math.cos(-0.35), 0.0, math.sin(-0.35), 0.0]
     assert frames['follow'].wxyz.tolist() == pytest.approx(follow)
     assert frames['slide'].position.tolist() == pytest.approx([0.15, 0.0, 0.0])
+    scene.place({'turn': 0.4, 'follow': 0.6})  # measured, as tf has it
+    follow = [math.cos(0.3), 0.0, math.sin(0.3), 0.0]
+    assert frames['follow'].wxyz.tolist() == pytest.approx(follow)
     scene.place({'turn': math.nan})
     assert frames['turn'].wxyz.tolist() == pytest.approx(turn)
     scene.place_base(Transform((1.0, 2.0, 3.0)))

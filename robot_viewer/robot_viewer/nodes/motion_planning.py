@@ -20,7 +20,7 @@ from urdf_reader import DescriptionError, KinematicTree, Transform
 
 from node_runner import LATCHED
 
-from ..link_poses import link_pose
+from ..link_poses import link_pose, moved
 from ..page.motion_plan import (
     ChooseGoal,
     ChooseGroup,
@@ -212,7 +212,11 @@ class MotionPlanning:
         places = self._motion.shown(time.monotonic() - self._shown_since)
         if places is None:
             self._shown_since, places = None, self._motion.at(self._motion.duration)
-        self._panel.show_ghost({**self._positions, **places})
+        self._show_ghost(places)
+
+    def _show_ghost(self, goals: Mapping[str, float]) -> None:
+        if self._panel is not None and self._tree is not None:
+            self._panel.show_ghost(moved(self._tree, self._positions, goals))
 
     def _choose_group(self, name: str) -> None:
         self._group = self._groups[name]
@@ -235,7 +239,7 @@ class MotionPlanning:
             panel.place_goal(None)
             panel.show_ghost(None)
             return
-        everywhere = {**self._positions, **self._joints}
+        everywhere = moved(tree, self._positions, self._joints)
         panel.place_goal(link_pose(tree, self._group.tip, everywhere))
         panel.show_ghost(everywhere)
 
@@ -273,7 +277,7 @@ class MotionPlanning:
         reason = refusal(response.error_code)
         if not reason:
             self._joints = positions_of(response.solution, self._group)
-            self._panel.show_ghost({**self._positions, **self._joints})
+            self._show_ghost(self._joints)
         if asked != self._pose:
             self._solve()
         else:
@@ -338,7 +342,7 @@ class MotionPlanning:
         self._executed_goal = self._goal, self._joints
         self._panel.allow(execute=False)
         if self._motion is not None:
-            self._panel.show_ghost({**self._positions, **self._motion.at(self._motion.duration)})
+            self._show_ghost(self._motion.at(self._motion.duration))
         self._say('executing ...')
         call = ActionCall(
             links.execute, goal, lambda result, why: self._executed(call, result, why)

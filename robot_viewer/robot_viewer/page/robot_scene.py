@@ -21,9 +21,8 @@ from urdf_reader import (
 )
 from viser import FrameHandle, SceneApi, SceneNodeHandle
 
-from ..link_poses import link_paths
+from ..link_poses import joint_position, joint_transform, link_paths
 from ..shapes import Meshes, PLAIN, shapes_of
-from ..state_publisher import joint_transform
 
 ROOT = '/robot'
 Tint: TypeAlias = tuple[float, float, float, float]
@@ -108,7 +107,8 @@ class RobotScene:
         scene.add_frame(self._paths[tree.root], show_axes=False)
         self._add_joints()
         self._add_shapes()
-        self.place({name: start_position(joint) for name, joint in self._movable.items()})
+        free = (joint for joint in self._movable.values() if joint.mimic is None)
+        self.place({joint.name: start_position(joint) for joint in free})
         self.size = self._reach(tree.root)
 
     def place(self, positions: Mapping[str, float]) -> None:
@@ -118,14 +118,8 @@ class RobotScene:
             positions: In [rad] or [m] by name; names of other robots do not matter.
         """
         for name, joint in self._movable.items():
-            mimic = joint.mimic
-            if mimic is not None and mimic.source in positions:
-                position = mimic.position(positions[mimic.source])
-            elif name in positions:
-                position = positions[name]
-            else:
-                continue
-            if math.isfinite(position):
+            position = joint_position(joint, positions)
+            if position is not None and math.isfinite(position):
                 put(self._frames[name], joint_transform(joint, position))
 
     def place_base(self, pose: Transform) -> None:
