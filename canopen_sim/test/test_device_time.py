@@ -7,7 +7,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta, timezone
 import struct
 
-from device_rig import drive_dictionary, NODE_ID, Rig
+from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig
 import pytest
 
 from arm_canopen.standard.datatypes import DataType
@@ -58,6 +58,8 @@ def test_only_time_messages_count(rig: Rig) -> None:
     """Other lengths, other identifiers and a device that does not listen change nothing."""
     rig.send(0x100, bytes(5))
     rig.send(0x101, time_message(NOON))
+    with pytest.raises(RefusedError):
+        rig.put(0x1012, 0x8000_0181)  # changed while in use
     rig.put(0x1012, 0x0000_0100)
     rig.send(0x100, time_message(NOON))
     assert rig.device.clock.at(rig.now) is None

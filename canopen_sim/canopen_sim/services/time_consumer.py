@@ -10,15 +10,14 @@ from datetime import datetime, timedelta
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import CAN_ID_MASK
+from arm_canopen.standard.cob_id import CAN_ID_MASK, TIME_CONSUMER, TIME_PRODUCER
 from arm_canopen.standard.datatypes import Value
 from arm_canopen.standard.objects import Index
+from arm_canopen.standard.sdo_abort import AbortCode
 from arm_canopen.standard.time_of_day import decode_time_of_day
 
-from ..objects.cob_id_rules import check_can_id
-from ..objects.object_store import ObjectStore
-
-CONSUMES = 0x8000_0000  # bit 31 of 0x1012
+from ..objects.cob_id_rules import check_can_id, FRAME_BITS
+from ..objects.object_store import ObjectStore, refusal
 
 
 class TimeConsumer:
@@ -40,7 +39,7 @@ class TimeConsumer:
     def can_id(self) -> int | None:
         """Identifier of the TIME message, None when the device takes none."""
         value = self._cob_id.value
-        return value & CAN_ID_MASK if value & CONSUMES else None
+        return value & CAN_ID_MASK if value & TIME_CONSUMER else None
 
     def at(self, now: float) -> datetime | None:
         """Return the network's time at steady time ``now`` in [s], None before any message."""
@@ -59,4 +58,8 @@ class TimeConsumer:
             self._received = decode_time_of_day(frame.data), now
 
     def _check(self, value: Value) -> None:
-        check_can_id(self._cob_id.entry, int(value) & CAN_ID_MASK if isinstance(value, int) else 0)
+        word, held = int(value) if isinstance(value, int) else 0, self._cob_id.value
+        used = TIME_CONSUMER | TIME_PRODUCER
+        if word & used and held & used and (word ^ held) & FRAME_BITS:
+            raise refusal(AbortCode.VALUE_RANGE, self._cob_id.entry)
+        check_can_id(self._cob_id.entry, word & CAN_ID_MASK)

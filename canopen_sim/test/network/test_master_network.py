@@ -16,6 +16,8 @@ from arm_canopen.exceptions import SdoAbortError, SdoTimeoutError
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.network import NEVER, UPDATE_SHARE
 from arm_canopen.master.status import node_status
+from arm_canopen.standard.datatypes import DataType
+from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
 from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
 from canopen_sim import Fault, FaultInjection
 
@@ -127,17 +129,33 @@ def test_the_status_has_the_age_of_the_heartbeat() -> None:
 
 
 def test_an_emergency_comes_with_the_identifier_that_bus_yml_has_written() -> None:
-    """The device sends it as 0x1014 says, and there the master listens, not at the usual one."""
+    """The device sends it as 0x1014 says, and there the master listens, not at the usual one.
+
+    A device keeps an identifier in use, so the EMCY is switched off while it changes.
+    """
     config = drive_config('a', 2)
-    changed = (sdo_write(0x1014, 0, value) for value in (0x8000_0082, 0x90))  # off, then elsewhere
-    writes = (*config.sdo_writes, *changed)
-    net = VirtualNetwork(bus_config(replace(config, sdo_writes=writes)))
+    config = replace(config, sdo_writes=(*config.sdo_writes, sdo_write(0x1014, 0, 0x90)))
+    net = VirtualNetwork(bus_config(config))
     net.boot()
     net.devices['a'].faults.inject(FaultInjection(Fault.OVER_TEMPERATURE), net.now)
     net.run(0.1)
     assert net.frames(0x090)
     assert not net.frames(EMCY + 2)
     assert '0x4310' in events(net, EventKind.EMERGENCY, 'a')[0]
+
+
+def test_a_device_gets_another_identifier_of_time() -> None:
+    """It keeps one in use, so TIME is switched off while it changes."""
+    config = drive_config('a', 2)
+    time = ObjectEntry(0x1012, 0, 'TIME', DataType.UNSIGNED32, default=0x8000_0100)
+    config = replace(
+        config,
+        dictionary=ObjectDictionary([*config.dictionary, time]),
+        sdo_writes=(*config.sdo_writes, sdo_write(0x1012, 0, 0x8000_0181)),
+    )
+    net = VirtualNetwork(bus_config(config))
+    net.boot()
+    assert net.devices['a'].clock.can_id == 0x181
 
 
 def test_emergencies_are_reported_in_words_until_they_end() -> None:

@@ -18,7 +18,7 @@ from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.read.shared_keys import U16_MAX
 from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER
+from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER, TIME_PRODUCER
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.dictionary import AccessType, object_address
 from arm_canopen.standard.lss import BIT_RATES_KBIT
@@ -31,7 +31,6 @@ from .text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 RO, RW, CONST = AccessType.READ_ONLY, AccessType.READ_WRITE, AccessType.CONSTANT
-TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012 (CiA 301, 7.5.2.15)
 DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
 """Integer types, which a PDO may have as gaps."""
 

@@ -11,7 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from ...standard.cob_id import (
+    CAN_ID_MASK,
+    COB_ID_EXTENDED,
+    COB_ID_INVALID,
+    SYNC_PRODUCER,
+    TIME_CONSUMER,
+    TIME_PRODUCER,
+)
 from ...standard.datatypes import DataType, encode
 from ...standard.dictionary import object_address
 from ...standard.nmt import ConsumerHeartbeatTime
@@ -26,6 +33,12 @@ COB_ID_BITS = COB_ID_INVALID | COB_ID_EXTENDED | CAN_ID_MASK
 """Bits that bus.yml decides of a COB-ID; the device has bit 30 as it can."""
 BEFORE_PDOS = (Index.TIME_COB_ID, Index.ERROR_BEHAVIOUR)
 """Objects whose keys of their own are written before the PDOs, as dcfgen does."""
+SERVICES_OFF: dict[tuple[int, int], tuple[int, int]] = {
+    (Index.SYNC_COB_ID, 0): (SYNC_PRODUCER, 0),
+    (Index.TIME_COB_ID, 0): (TIME_PRODUCER | TIME_CONSUMER, 0),
+    (Index.EMCY_COB_ID, 0): (COB_ID_INVALID, COB_ID_INVALID),
+}
+"""Bits of a COB-ID, and their value while its identifier may change (CiA 301, 7.5.2)."""
 ERROR_CONTROL = (
     (Index.PRODUCER_HEARTBEAT, DataType.UNSIGNED16, 'heartbeat_producer'),
     (Index.GUARD_TIME, DataType.UNSIGNED16, 'guard_time'),
@@ -202,21 +215,23 @@ class _Plan:
 
     def writes(self) -> Iterator[BootWrite]:
         node = self._node
-        yield from map(_written, node.parameter_writes)
+        for write in node.parameter_writes:
+            yield from _written(write)
         yield from self._watch()
         yield from self._error_control()
         leading = 0
         while leading < len(node.sdo_writes) and node.sdo_writes[leading].index in BEFORE_PDOS:
             leading += 1
         for write in node.sdo_writes[:leading]:
-            yield _written(write, unless_default=True)
+            yield from _written(write, unless_default=True)
         for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
             for pdo in pdos:
                 if pdo.configured:
                     yield from self._pdo(direction, pdo)
                 elif pdo.event_time is not None:
                     yield from self._event_timer(direction, pdo)
-        yield from map(_written, node.sdo_writes[leading:])
+        for write in node.sdo_writes[leading:]:
+            yield from _written(write)
 
     def _watch(self) -> Iterator[BootWrite]:
         """Have the device watch the master, or no longer, in the first entry that is free."""
@@ -380,9 +395,16 @@ def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
                 )
 
 
-def _written(write: SdoWrite, *, unless_default: bool = False) -> BootWrite:
-    key = _key(write.location)
-    return BootWrite(write.index, write.subindex, write.data, key, unless_default=unless_default)
+def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:
+    """Yield a write of a file; before a COB-ID one that ends its service, which fixes it."""
+    address, key = (write.index, write.subindex), _key(write.location)
+    value = int.from_bytes(write.data, 'little')
+    mask, off = SERVICES_OFF.get(address, (0, 0))
+    if value & mask != off:
+        off |= value & ~mask
+        yield _number(address, off, DataType.UNSIGNED32, key, mask=mask, temporary=True)
+        unless_default = False  # or an exported DCF would leave it ended
+    yield BootWrite(*address, write.data, key, unless_default=unless_default)
 
 
 def _key(location: SourceLocation) -> str:

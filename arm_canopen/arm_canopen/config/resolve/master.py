@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from ...standard.cob_id import TIME_PRODUCER
 from ..findings import Findings, RefusedError
 from ..model.identity import Identity
 from ..model.master import MasterConfig
@@ -14,7 +15,6 @@ from ..read.shared_keys import U8_MAX, U16_MAX
 from ..units import MILLISECONDS
 from .settings import MASTER, MasterSettings, Options
 
-TIME_PRODUCER = 0x4000_0000  # bit 30 of 0x1012
 TIME_PERIOD = 1.0  # [s] when only that bit requests it
 TAKEN_OVER = (
     'driver',
