@@ -197,10 +197,13 @@ class Planner:
         Constraints make a search so slow that the first one counts.
         """
 
-        def expired() -> bool:
+        def left() -> float:
             if is_canceled():
                 raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
-            return self._clock() > deadline
+            return deadline - self._clock()
+
+        def expired() -> bool:
+            return left() < 0.0
 
         check = self._checked_in(scene)
         start = self._state(request.start, 'start', PlanningCode.INVALID_ROBOT_STATE)
@@ -209,7 +212,7 @@ class Planner:
         if request.constraints is not None:
             constraints = ConstraintCheck(self._model, request.constraints)
             _require_start(constraints, start)
-        goals = self._goals(request, start, check, constraints, deadline)
+        goals = self._goals(request, start, check, constraints, left)
         limits = scaled_limits(
             self._model.limits, request.velocity_scaling, request.acceleration_scaling
         )
@@ -253,20 +256,32 @@ class Planner:
         start: Array,
         check: ValidityCheck,
         constraints: ConstraintCheck | None,
-        deadline: float,
+        left: Callable[[], float],
     ) -> list[Array]:
-        """Return the states of all goals that are valid, or raise what is wrong with the first."""
+        """Return the states of all goals that are valid, or raise what is wrong with the first.
+
+        Args:
+            request: What is asked for.
+            start: Where it begins.
+            check: Measures in the scene.
+            constraints: Path constraints; None for none.
+            left: Returns how much time is left in [s]; raises PlanningError when canceled.
+        """
         found: list[Array] = []
         for goal in request.goals:
+            if left() < 0.0:
+                break
             with suppress(PlanningError):
                 found += self._states(goal, start, check, constraints, DEFAULT_TIMEOUT)
         if found:
             return found
         refused: PlanningError | None = None
         for goal in request.goals:  # as long as it takes
-            left = max(deadline - self._clock(), DEFAULT_TIMEOUT)
+            timeout = left()
+            if refused is not None and timeout < 0.0:
+                break
             try:
-                return self._states(goal, start, check, constraints, left)
+                return self._states(goal, start, check, constraints, max(timeout, DEFAULT_TIMEOUT))
             except PlanningError as error:
                 refused = refused or error
         raise refused or PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, 'no goal')

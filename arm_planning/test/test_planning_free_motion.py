@@ -304,6 +304,16 @@ def test_a_pose_out_of_reach_is_refused() -> None:
     assert error.code is PlanningCode.NO_IK_SOLUTION
 
 
+def test_a_cancel_ends_the_search_for_goals() -> None:
+    """Most of those that are out of reach are not tried."""
+    planner, looks = Planner(robot('panda')), count()
+    far = [Pose(ORIGIN.rotation, frozen([3.0 + 0.1 * each, 0.0, 0.5])) for each in range(20)]
+    asked = MotionRequest(ready('panda'), list(map(PoseGoal, far)), timeout=TIMEOUT)
+    with pytest.raises(PlanningError) as caught:
+        planner.plan(asked, is_canceled=lambda: next(looks) > 2)
+    assert caught.value.code is PlanningCode.PREEMPTED
+
+
 @pytest.mark.parametrize('link', ['', 'panda_link4'])
 def test_the_speed_of_a_link_is_limited(link: str) -> None:
     """max_cartesian_speed holds on a free motion, whose places it leaves as they are."""

@@ -181,8 +181,8 @@ class GroupKinematics:
             is_valid=None if check is None else lambda state: not check.violated(state),
         )
         path, rows, reason = self._timed(request, model, found.positions, scene)
-        steps = max(len(found.positions) - 1, 1)
-        fraction = found.fraction if rows == steps + 1 else found.fraction * (rows - 1) / steps
+        steps = len(found.positions) - 1
+        fraction = found.fraction * ((rows - 1) / steps if steps else 1.0)
         start = state_message(self._robot.joints, positions, snapshot.root)
         response = GetCartesianPath.Response(
             start_state=start,
