@@ -133,7 +133,9 @@ def stops_all(arm: SimulatedArm) -> None:
     arm.master.wait_for('panda_joint5: heartbeat lost')
     answer = arm.client.trigger('/stop')
     assert not answer.success
-    assert answer.message.startswith('NOT known to stand: panda_joint5 is not seen to come to rest')
+    assert answer.message.startswith(
+        'NOT known to stand: panda_joint5 is not seen to come to rest'
+    )
     assert f'stand: {JOINT[1:]}. not enabled: ' in answer.message
 
 

@@ -254,7 +254,7 @@ def test_an_adapter_that_is_plugged_in_again_is_used_again(vcan: str) -> None:
 
 @pytest.mark.vcan
 def test_few_frames_wait_in_the_transmit_queue_of_the_kernel(vcan: str) -> None:
-    """A bus that carries next to nothing holds as many as it was told, and no hundreds."""
+    """A bus that carries next to nothing holds as many as were set, and no hundreds."""
     ip_link('set', vcan, 'up', 'txqueuelen', '1000')
     slow = ['root', 'tbf', 'rate', '8kbit', 'burst', '100', 'limit', '1000000']
     made = subprocess.run(['tc', 'qdisc', 'add', 'dev', vcan, *slow], check=False)

@@ -497,16 +497,16 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
 
 
 @pytest.mark.parametrize(
-    ('refusals', 'told'),
+    ('refusals', 'text'),
     [
         (3, 'quick stop sent to joint1; nothing else stops joint1'),
         (1000, 'no quick stop could be sent to joint1 (the queue is full); nothing else stops'),
     ],
 )
 def test_a_last_quick_stop_that_the_bus_refuses_is_repeated_and_not_called_sent(
-    refusals: int, told: str, monkeypatch: pytest.MonkeyPatch
+    refusals: int, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever reads of the end of the cycle cuts the power of what goes on."""
+    """The text names the drives whose power has to be cut."""
     tries = count()
     with open_bus('virtual:last_stop') as virtual, open_bus('virtual:last_stop') as device:
         master = BusMaster(bus_config(drive_config('joint1', 2)), virtual, lambda event: None)
@@ -519,8 +519,8 @@ def test_a_last_quick_stop_that_the_bus_refuses_is_repeated_and_not_called_sent(
             send(frame)
 
         monkeypatch.setattr(virtual, 'send', full)
-        assert told in master.thread.on_defect()
-        assert bool(device.receive(0.0)) is ('quick stop sent' in told)
+        assert text in master.thread.on_defect()
+        assert bool(device.receive(0.0)) is ('quick stop sent' in text)
 
 
 def test_drives_that_vanish_are_reported_and_keep_nobody_waiting(

@@ -59,8 +59,8 @@ class Bus(ABC):
             BusError: The interface refuses it (down, transmit queue full).
         """
 
-    def limit_queue(self, frames: int) -> None:  # noqa: B027  # most cannot be told
-        """Let no more frames wait for the bus, as far as the interface can be told.
+    def limit_queue(self, frames: int) -> None:  # noqa: B027  # most cannot do it
+        """Limit the frames that wait for the bus, where the interface can do it.
 
         Those beyond are refused. What waits while the cable is off leaves when it is on again.
 

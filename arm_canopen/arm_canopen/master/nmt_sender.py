@@ -19,7 +19,7 @@ SendNmt: TypeAlias = Callable[[NmtCommand, int], Promise[None]]
 """Sends a command to a node id, or to all with 0; the promise is resolved when it has left,
 rejected with a BusError when the bus has not taken it."""
 REPEAT_AFTER = 0.01  # [s] before a command that the bus refused is sent again
-PATIENCE = 0.5  # [s] in which the bus has to take a command; it would come too late then
+REFUSAL_TIMEOUT = 0.5  # [s] in which the bus has to take a command; it would come too late then
 
 
 class NmtSender:
@@ -76,7 +76,7 @@ class NmtSender:
                         await self._scheduler.timer(self._inhibit_time)
                     continue
                 refused_since = refused_since or self._scheduler.now
-                if self._scheduler.now - refused_since < PATIENCE:
+                if self._scheduler.now - refused_since < REFUSAL_TIMEOUT:
                     self._waiting.appendleft((command, node_id, sent))
                     await self._scheduler.timer(REPEAT_AFTER)
                     continue

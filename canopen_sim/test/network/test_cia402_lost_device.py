@@ -122,16 +122,16 @@ def test_a_device_watches_the_master_until_its_motor_was_seen_to_stand(*, lost: 
 
 
 @OPTIONS
-@pytest.mark.parametrize('hears', [True, False], ids=['hears', 'cut off'])
+@pytest.mark.parametrize('receives', [True, False], ids=['receives', 'cut off'])
 def test_a_device_that_comes_back_in_motion_is_braked_before_it_is_configured(
-    option: int, *, hears: bool
+    option: int, *, receives: bool
 ) -> None:
-    """Nothing of it arrived for a while; where it heard, it was stopped all the same."""
+    """Nothing of it arrived for a while; one that still receives was stopped meanwhile."""
     moving = turning(option)
-    moving.net.wire.loses = lambda sender, frame: sender == JOINT or not hears
+    moving.net.wire.loses = lambda sender, frame: sender == JOINT or not receives
     moving.run(0.6)
     assert not moving.net.network.nodes[JOINT].online
-    assert (moving.device.state is DriveState.OPERATION_ENABLED) is not hears
+    assert (moving.device.state is DriveState.OPERATION_ENABLED) is not receives
     lose(moving)
     while not nmt_commands(moving):
         moving.run(PERIOD)

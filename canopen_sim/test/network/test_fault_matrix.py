@@ -546,7 +546,7 @@ NO_STOP = (Deviation.HALT_IGNORED, Deviation.QUICK_STOP_IGNORED)
 def test_a_stop_that_the_drive_ignores(
     stop: str, ignored: tuple[Deviation, ...], mode: OperationMode
 ) -> None:
-    """A stronger one follows at once, and the answer tells in which state the motor stands."""
+    """A stronger one follows at once, and the answer names the state in which the motor stands."""
     arm = Arm()
     arm.move(mode)
     if mode in POSITION_MODES:

@@ -227,7 +227,7 @@ def test_a_value_published_meanwhile_outlives_a_write_that_is_refused() -> None:
 
 
 def test_a_value_that_the_bus_refuses_is_not_sent_later() -> None:
-    """Its publisher hears of it, and the next value of another object leaves without it."""
+    """Its publisher gets the error, and the next value of another object leaves without it."""
     net = booted()
     publish(net, OUTPUTS, 0x01)
     net.wire.refuses = 'the transmit queue is full'
