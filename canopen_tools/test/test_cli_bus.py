@@ -221,7 +221,7 @@ def test_what_does_not_work_is_reported(
 
 
 @pytest.mark.parametrize(
-    ('deviation', 'remark'),
+    ('deviation', 'warning'),
     [
         (Fault.SDO_FOUR_BYTES, 'INTEGER8 by its EDS, with 4 bytes'),
         (Fault.SDO_NO_SIZE, ''),
@@ -234,7 +234,7 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     bus_yml: str,
     *,
     deviation: Fault,
-    remark: str,
+    warning: str,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """Cut to the type of the object, and what is odd is said once beside them."""
@@ -247,8 +247,8 @@ def test_answers_that_deviate_are_read_as_the_master_reads_them(
     assert main(['read', 'left', '0x6098', '0x6041', '--value', *arguments]) == 0
     captured = capsys.readouterr()
     assert captured.out == '-3\n592\n'
-    assert captured.err.count('canopen: ') == bool(remark)
-    assert remark in captured.err
+    assert captured.err.count('canopen: ') == bool(warning)
+    assert warning in captured.err
 
 
 def test_two_devices_with_one_node_id_make_the_scan_fail(

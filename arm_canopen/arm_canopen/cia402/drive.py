@@ -437,5 +437,5 @@ class Drive:
         if self.node.left_operational:
             cause = RefusalCause.NOT_OPERATIONAL
         self.released(Refusal(cause, reason))
-        if moves:  # it may hear what it does not answer
+        if moves:  # it may receive what it does not answer
             self.stop.begin(quiet=True)

@@ -143,7 +143,7 @@ class DriveView:
 
     @property
     def speed_known(self) -> bool:
-        """Whether it was seen for long enough to tell motion from rest."""
+        """Whether it was seen for long enough to distinguish motion from rest."""
         return self.seen and self._estimate.known
 
     @property

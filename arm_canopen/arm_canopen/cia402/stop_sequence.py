@@ -25,7 +25,7 @@ SHUTDOWN_MAX = STOP_TIMEOUT + RAMP_MAX + 2 * STOP_TIMEOUT
 DISABLED = (DriveState.SWITCH_ON_DISABLED, DriveState.NOT_READY_TO_SWITCH_ON, DriveState.FAULT)
 """States without power; after UNKNOWN and in the reaction to a fault it may still move."""
 FALLEN_RATIO = 0.98  # of the least speed so far, below which a speed is falling
-PATIENCE_RATIO = 0.04  # of the time of a ramp, in which more than that has to be seen
+SLOWING_RATIO = 0.04  # of the time of a ramp, in which more than that has to be seen
 
 
 class BrakingWatch:
@@ -53,7 +53,7 @@ class BrakingWatch:
         speed = max(abs(view.rate), view.rest_speed)
         if speed == view.rest_speed or speed < FALLEN_RATIO * self._least:
             self._least, self._since = speed, now
-        return now - self._since > max(REACTION_TIME, PATIENCE_RATIO * speed / deceleration)
+        return now - self._since > max(REACTION_TIME, SLOWING_RATIO * speed / deceleration)
 
 
 class StopSequence:

@@ -52,7 +52,7 @@ class VelocityEstimate:
 
     @property
     def known(self) -> bool:
-        """Whether the positions span enough time to tell motion from rest."""
+        """Whether the positions span enough time to distinguish motion from rest."""
         if len(self._positions) < 2:
             return False
         return self._positions[-1][0] - self._positions[0][0] >= 0.5 * self.window
