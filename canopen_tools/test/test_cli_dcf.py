@@ -209,7 +209,7 @@ def test_a_device_that_watches_the_master_by_default_is_configured_not_to(
 def test_a_device_that_was_configured_by_the_file_does_what_bus_yml_says(
     tmp_path: Path, options: tuple[str, ...]
 ) -> None:
-    """It takes every write, and then sends and follows the PDOs of the article, at its heartbeat."""
+    """It takes each write, then sends and follows the PDOs of the article, at its heartbeat."""
     assert main(['dcf', str(PANDA), '--out', str(tmp_path), *options]) == 0
     rig = Rig(drive_dictionary(), node_id=2)
     for write in decode_concise((tmp_path / 'panda_joint1.bin').read_bytes()):
