@@ -92,7 +92,7 @@ class Planner:
         Args:
             request: What is asked for.
             scene: What may collide; by default that of the model.
-            is_canceled: Whether the plan is wanted no more; a search ends at once then.
+            is_canceled: Whether the plan is canceled, which ends a search at once.
 
         Raises:
             PlanningError: The request is refused, or no motion was found in time.

@@ -84,6 +84,16 @@ def test_the_scene_of_the_robot_allows_what_no_group_can_help() -> None:
     assert not allowed.allows('left_3_link', 'right_2_link')
 
 
+def test_a_default_of_the_matrix_counts_for_a_group_that_allows_the_pair() -> None:
+    """A client has the pair checked by a default, with which an entry of the same is left out."""
+    whole, model = robot().scene, robot().model('left')
+    pair = ('torso_link', 'left_1_link')
+    assert scene_for(SceneSnapshot(whole), model.scene).allowed.allows(*pair)
+    matrix = whole.allowed.without(pair[1]).with_default(pair[1], False)
+    scene = scene_for(SceneSnapshot(whole.with_allowed(matrix)), model.scene)
+    assert not scene.allowed.allows(*pair)
+
+
 def moved(positions: Array, left: Array) -> Array:
     """Return the robot with its left arm elsewhere."""
     joints = robot().model('left').joints

@@ -39,8 +39,8 @@ MAX_CELLS = 100_000
 """How many occupied cells a map may have."""
 
 BLOCK = 256
-"""Cells of one shape, which lie together: each look at it takes some 30 us, so a control cycle
-waits for none."""
+"""Cells of one shape, which lie together: a distance to it takes about 30 us, so that no control
+cycle waits long for the interpreter."""
 
 MAX_DATA = 2_000_000
 """Bytes of a stream at most; a million nodes take about a second."""

@@ -105,7 +105,7 @@ class PlanningScene:
             scale: By link.
 
         Raises:
-            SceneError: Two things have one name, a link is unknown, or a padding or scale is none.
+            SceneError: Two things have one name, a link is unknown, or a padding is not usable.
         """
         self.kinematics, self.link_shapes, self.allowed = kinematics, link_shapes, allowed
         self.objects = MappingProxyType({each.name: each for each in objects})
@@ -283,7 +283,7 @@ class PlanningScene:
             scale: By link.
 
         Raises:
-            SceneError: Two things have one name, a link is unknown, or a padding or scale is none.
+            SceneError: Two things have one name, a link is unknown, or a padding is not usable.
         """
         objects = self.objects if objects is None else objects
         attached_bodies = self.attached_bodies if attached_bodies is None else attached_bodies
@@ -430,7 +430,7 @@ class PlanningScene:
     def _carried(
         self, body: _Body, shapes: Sequence[PlacedShape], place: Native
     ) -> Sequence[_Body]:
-        """Put in the shapes of what a link carries; padded ones once more, for the world."""
+        """Add the shapes of a link or an attached body; padded ones once more, for the world."""
         padding, scale = self.padding.get(body.link, 0.0), self.scale.get(body.link, 1.0)
         if (padding, scale) == (0.0, 1.0):
             return [self._placed(body, each, place, native(each.shape)) for each in shapes]

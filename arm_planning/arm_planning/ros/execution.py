@@ -436,7 +436,7 @@ class TrajectoryExecution:
     def _is_overdue(self, execution: Execution, passed: float) -> bool:
         """Whether an execution takes too long; what a speed override costs does not count.
 
-        How long a gripper takes is its own affair: it ends when it stalls.
+        The duration of a gripper is not watched: it ends its goal when it stalls.
 
         Args:
             execution: The execution.

@@ -58,7 +58,7 @@ class PlannedMotion:
 
 
 SEEDS = count()
-"""Of planners: a plan that was not found is not searched for in the same way again."""
+"""Seeds of planners: a second attempt at a plan searches in another way."""
 
 
 class GroupPlanners:
@@ -147,7 +147,7 @@ class PlanningThreads:
         Args:
             message: The moveit_msgs/MotionPlanRequest.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
-            is_canceled: Whether the plan is wanted no more; the search ends at once then.
+            is_canceled: Whether the plan is canceled, which ends a search at once.
 
         Raises:
             PlanningError: The request is refused.
@@ -174,7 +174,7 @@ class PlanningThreads:
         Args:
             items: The moveit_msgs/MotionSequenceItem.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
-            is_canceled: Whether the plan is wanted no more.
+            is_canceled: Whether the plan is canceled.
 
         Raises:
             PlanningError: The sequence is refused.
@@ -340,7 +340,7 @@ def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> 
 
 
 def _noted(snapshot: SceneSnapshot, plan: Callable[[], PlannedMotion]) -> PlannedMotion:
-    """Plan, and say in the answer what a person should know of the objects of the scene."""
+    """Plan, and add the notes on objects of the scene to the answer."""
     try:
         planned = plan()
     except PlanningError as error:
@@ -353,7 +353,7 @@ def _changed(
     diff: Any,  # noqa: ANN401
     positions: Array,
 ) -> SceneSnapshot:
-    """Return a scene with a change, where there is one; it is a change whatever is_diff says."""
+    """Return a scene with the change of a request, whether or not that sets is_diff."""
     if diff is None:
         return snapshot
     diff.is_diff = True
@@ -366,7 +366,7 @@ def _read_item(
     message: Any,  # noqa: ANN401
     start: Array | None,
 ) -> MotionRequest:
-    """Return an item of a sequence; what it leaves out is as where the item before ends."""
+    """Return an item of a sequence; the end of the item before stands for what it leaves out."""
     try:
         return reader(start).request(message)
     except PlanningError as error:

@@ -130,10 +130,12 @@ def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningSc
     Args:
         snapshot: The scene of the whole robot.
         robot_alone: The first scene of the group's model: pairs that it allows stay allowed where
-            the matrix of the scene has no entry of them.
+            the matrix of the scene has neither an entry of them nor a default of a name.
     """
-    whole = snapshot.scene
-    entries = {**robot_alone.allowed.entries, **whole.allowed.entries}
+    whole, alone = snapshot.scene, robot_alone.allowed.entries
+    defaults = whole.allowed.defaults.keys()
+    entries = {pair: allowed for pair, allowed in alone.items() if not pair & defaults}
+    entries |= whole.allowed.entries
     return robot_alone.with_contents(
         objects=whole.objects,
         attached_bodies=whole.attached_bodies,

@@ -79,8 +79,9 @@ class SceneMonitor:
         self._places: dict[str, float] = {}
         self._arrivals: dict[str, float] = {}
         self._listeners: list[Callable[[], None]] = []
-        self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
+        # first: a controller that has found it does not read the meshes of the other one
         self._collisions = node.create_publisher(PlanningScene, 'collision_scene', LATCHED)
+        self._published = node.create_publisher(PlanningScene, 'monitored_planning_scene', LATCHED)
         node.create_subscription(JointState, 'joint_states', self._take_joints, 1)
         for kind, topic, apply in (
             (PlanningScene, 'planning_scene', apply_scene),

@@ -88,7 +88,7 @@ class SceneSnapshot:
 
     @property
     def notes(self) -> Sequence[str]:
-        """What a person should know of objects that count as larger than they are."""
+        """Warnings about objects that count as larger than they are."""
         return [
             f'object {name!r} counts as the convex hull of its mesh, of which it fills'
             f' {100.0 * each.fullness:.0f} %; give it several meshes of convex parts where that'

@@ -60,7 +60,7 @@ class SceneExchange:
         return future
 
     def recheck(self, execution: Execution) -> None:
-        """Have the rest of a path checked in the scene that counts; called in the cycle."""
+        """Check the rest of a path in the present scene, in the worker's thread; for the cycle."""
         begin, scene = execution.feedback.time, self._core.scene
         self._worker.submit(lambda: self._check(execution, begin, scene))
 
