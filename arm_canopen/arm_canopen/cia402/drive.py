@@ -212,6 +212,7 @@ class Drive:
         await self.stop.ended()  # that the loss of its device has begun
         state = self.view.state if self.view.fresh else await self.view.look()
         if state in (*POWERED, DriveState.FAULT_REACTION_ACTIVE):
+            self._note_interruption()
             self._take_out(Refusal(RefusalCause.OFFLINE, reason), reason)
             await self.stop.ended()
         if not self.node.operational:
@@ -414,6 +415,12 @@ class Drive:
         await self.view.read_error_code()
         self.report(Severity.ERROR, f'FAULT: {self.describe()}; recover it')
 
+    def _note_interruption(self) -> None:
+        """Keep the mode that it is enabled in, for the time after its device is lost."""
+        control = self.control
+        if control.goal is self.view.state is DriveState.OPERATION_ENABLED:
+            self.interrupted = control.mode.number
+
     def _on_lost(self, reason: str) -> None:
         view, control = self.view, self.control
         view.cache.forget(reason)
@@ -421,9 +428,8 @@ class Drive:
             self._polling.cancel(SdoError(reason))
         by_itself = self.node.left_by_itself
         moves = by_itself and view.state in POWERED
-        enabled = control.goal is view.state is DriveState.OPERATION_ENABLED
-        if enabled and not self.node.left_operational:
-            self.interrupted = control.mode.number
+        if not self.node.left_operational:
+            self._note_interruption()
         self.feed_forward.end()
         self.resetting = self._follows = self._begun = self._announced = False
         self._unknown = True

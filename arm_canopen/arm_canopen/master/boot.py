@@ -136,7 +136,8 @@ class BootProcess:
         await self._check_identity(node.config.identity)
         self._enter(BootPhase.RESTING)
         for lead in node.lead_to_rest:
-            await lead(f'it moved when its device was found ({node.loss or "not led before"})')
+            before = f'lost before: {node.loss}' if node.loss else 'not enabled by this master'
+            await lead(f'it was enabled when its device was found ({before})')
         # PDO parameters may only be written while the device does not process PDOs
         await self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         if node.life.silent and node.config.uses_node_guarding:

@@ -25,6 +25,7 @@ class EventKind(Enum):
     BOOT = 'boot'
     BOOT_FAILED = 'boot failed'
     SDO = 'sdo'
+    HEARTBEAT_LATE = 'heartbeat late'
     HEARTBEAT_LOST = 'heartbeat lost'
     EMERGENCY = 'emergency'
     PDO = 'pdo'

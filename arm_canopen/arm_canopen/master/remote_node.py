@@ -219,7 +219,7 @@ class RemoteNode:
         rested = self._resting is not None and self._resting.done
         if rested:
             self._resting = None
-        if self.life.missed and (rested or not self._lives(now)):
+        if rested or (self.life.missed and not self._lives(now)):
             self.lost(self._missing)
             return True
         if self.operational:
@@ -234,14 +234,15 @@ class RemoteNode:
     def _miss(self, missing: str, now: float) -> None:
         """Have a device led to rest before it is lost, as its configuration would let it coast.
 
-        Only when a life sign is missing twice in a row; the TPDOs show as much.
+        Only when a life sign is missing twice in a row; the TPDOs show as much. From then on it is
+        lost, even if one comes again: its drivers have no power any more.
         """
         self._missing = missing
         if not self._lives(now):
             return
         if self.life.missed == 1:
             text = f'{missing}, but its TPDOs come: it goes on until the next one is missing, too'
-            self.report(EventKind.HEARTBEAT_LOST, Severity.WARNING, text)
+            self.report(EventKind.HEARTBEAT_LATE, Severity.WARNING, text)
         elif self._resting is None:
             ends = [self._scheduler.spawn(lead(missing)) for lead in self.lead_to_rest]
             self._resting = self._scheduler.spawn(self._scheduler.gather(ends))

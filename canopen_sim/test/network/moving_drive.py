@@ -11,6 +11,7 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from canopen_sim.drive.drive import Drive as SimulatedDrive
@@ -36,6 +37,7 @@ class MovingDrive:
         *writes: tuple[int, int, int],
         kept_alive: bool = False,
         mode: OperationMode = OperationMode.CYCLIC_POSITION,
+        recovery: RecoveryPolicy = RecoveryPolicy.MANUAL,
     ) -> None:
         """Set it in motion.
 
@@ -44,10 +46,12 @@ class MovingDrive:
             writes: Index, sub-index and value of objects that differ.
             kept_alive: It passes from one master to the next.
             mode: Mode of operation.
+            recovery: What becomes of it when its device comes back.
         """
         slow = [(0x6085, 0, round(SCALE / RAMP)), (0x605A, 0, option), *writes]
         changed = [sdo_write(*write) for write in slow]
         config = drive_config(JOINT, NODE_ID, sdo_writes=(*MOTION_WRITES, *changed))
+        config = replace(config, axes=(replace(config.axes[0], recovery=recovery),))
         if kept_alive:
             config = replace(config, reset_communication=False)
         self.net = VirtualNetwork(bus_config(config))

@@ -10,9 +10,10 @@ import pytest
 
 from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
+from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
 from arm_canopen.library.bus_master import leave_device
-from arm_canopen.master.events import Severity
+from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import NmtCommand
 
@@ -46,6 +47,7 @@ def test_a_late_heartbeat_stops_nothing_while_tpdos_come() -> None:
     assert moving.states == [DriveState.OPERATION_ENABLED]
     assert nmt_commands(moving) == []
     assert moving.errors == []
+    assert all(event.kind is not EventKind.HEARTBEAT_LOST for event in moving.net.events)
     late = [text for text in moving.net.reported(Severity.WARNING) if 'heartbeat lost' in text]
     assert len(late) == 1
     assert 'but its TPDOs come' in late[0]
@@ -72,6 +74,27 @@ def test_a_heartbeat_that_is_gone_brakes_the_axis_before_its_device_is_configure
     lose(moving)
     moving.net.run_until(moving.net.all_ready)
     assert moving.net.drives[JOINT].failure == ''
+
+
+@pytest.mark.parametrize('policy', list(RecoveryPolicy), ids=lambda policy: policy.value)
+@pytest.mark.parametrize('returns', [RAMP / 2, 3 * RAMP], ids=['while it brakes', 'after it'])
+def test_a_drive_without_heartbeat_is_given_back_by_policy(
+    returns: float, policy: RecoveryPolicy
+) -> None:
+    """Its device is lost and booted again, also when the heartbeat comes while it brakes."""
+    moving = MovingDrive(recovery=policy)
+    lose(moving, 0x700 + NODE_ID)
+    while moving.device.state is DriveState.OPERATION_ENABLED:
+        moving.run(PERIOD)
+    moving.run(returns)
+    lose(moving)
+    moving.net.run_until(lambda: not moving.net.network.nodes[JOINT].operational)
+    moving.net.run_until(moving.net.all_ready)
+    drive = moving.net.drives[JOINT]
+    assert drive.failure == ''
+    moving.net.run(1.0)
+    assert drive.control.accepts_targets is (policy is RecoveryPolicy.AUTO)
+    assert abs(moving.device.velocity) / SCALE < STANDING
 
 
 @OPTIONS
