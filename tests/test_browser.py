@@ -32,7 +32,7 @@ from robot_viewer.page.motion_plan import DRAGGED
 from robot_viewer.page.target_panel import UNLOCK
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 pytestmark = [
     pytest.mark.scenario,
@@ -44,6 +44,7 @@ STARTING = 90.0  # [s]
 REACTION = 15.0  # [s] until a motion begins or ends on a busy machine; real ones are far shorter
 REST = 0.6  # [s] of joint states without motion
 MOVES = 0.01  # [rad/s]
+NEAR = 0.01  # [rad] of a target
 UNDER_WAY = 0.05  # [rad] from its start: STOP names joints that move, and a motion starts softly
 JOG, TARGETS, DRIVES, PLAN = 'Jog', 'Targets', 'Drives', 'Plan'
 TURN, TURN_BACK = '+ about z', '− about z'
@@ -95,13 +96,16 @@ class Seen:
             button.click()
             button.wait_for(state='hidden')  # the sliders below it move up
 
+    def box(self, slider: int) -> Locator:
+        """Return the number box beside a slider of the open tab."""
+        return self.page.locator('input[inputmode=decimal]:visible').nth(slider)
+
     def type_into(self, slider: int, text: str) -> None:
         """Type into the number box beside a slider of the open tab, without an end."""
-        box = self.page.locator('input[inputmode=decimal]:visible').nth(slider)
-        box.click()
-        box.press('Control+a')
+        self.box(slider).click()
+        self.page.keyboard.press('Control+a')
         self.page.keyboard.type(text)
-        assert box.input_value() == text
+        assert self.box(slider).input_value() == text
 
     def jog(self, page: Page) -> None:
         """Hold the button that leads back: at its limit the joint would not move."""
@@ -329,10 +333,17 @@ def test_a_number_counts_when_it_is_complete(seen: Seen) -> None:
     assert abs(seen.position() - wanted) > 0.2
     before = dict(zip(seen.states[-1][1].name, seen.states[-1][1].position, strict=True))
     seen.unlock()
-    seen.type_into(JOINT1, '0.5')
+    for text, end in (('0', 'Enter'), ('0,5', 'Tab')):  # the second is longer than what is shown
+        seen.type_into(JOINT1, text)
+        page.keyboard.press(end)
+        reached = float(text.replace(',', '.'))
+        seen.wait(lambda reached=reached: abs(seen.position() - reached) < NEAR, f'{reached} rad')
+        seen.wait_for_rest()
+    seen.type_into(JOINT1, '1e0')
     page.keyboard.press('Enter')
-    page.get_by_text('target: reached').wait_for()
-    seen.wait(lambda: abs(seen.position() - 0.5) < 0.01, 'its end')
+    assert seen.box(JOINT1).input_value() == '0.5', 'no number'
+    seen.wait_for_rest()
+    assert abs(seen.position() - 0.5) < NEAR
     others = set(before) - {'panda_joint1'}
     assert max(abs(seen.position(joint) - before[joint]) for joint in others) < 0.002
 
