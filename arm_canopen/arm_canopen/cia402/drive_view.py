@@ -137,9 +137,14 @@ class DriveView:
     def stands(self) -> bool:
         """Whether the axis was seen to stand; a real encoder is never quite still.
 
-        Both 0x606C and the rate of the position have to be slow, and seen.
+        Both 0x606C and the rate of the position have to be slow, and seen; of each its own noise
+        counts as rest.
         """
-        return self.speed_known and self.speed <= self.rest_speed
+        rest = self.rest_speed
+        if not self.speed_known or abs(self.rate) > rest:
+            return False
+        reported = 0.0 if self._looks else self.objects.velocity or 0.0
+        return abs(reported) <= NOISE_DEV or abs(self.velocity) <= rest
 
     @property
     def speed_known(self) -> bool:
@@ -148,14 +153,12 @@ class DriveView:
 
     @property
     def rest_speed(self) -> float:
-        """Speed up to which the axis counts as standing, in user units per second.
+        """Rate of the position up to which the axis counts as standing, in user units per second.
 
-        By its own limits, and not below what its sensors resolve.
+        By its own limits, and not below what its encoder resolves.
         """
         profile, units = self.parameters.profile, self.units
         noise = abs(units.rate_from_device(NOISE_DEV / self._estimate.window))
-        if self.objects.velocity is not None:
-            noise = max(noise, abs(units.velocity_from_device(NOISE_DEV)))
         slow = min(REST_SHARE * profile.velocity, REST_TIME * profile.deceleration)
         return max(slow, noise)
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import math
 import struct
 
 from drive_samples import (
@@ -168,6 +169,26 @@ def test_the_speed_of_single_targets_is_by_the_limits_of_the_axis(
         net.run(PERIOD)
         fastest = max(fastest, net.drives[JOINT].view.velocity)
     assert fastest == pytest.approx(speed_limit, rel=0.02)
+
+
+def test_a_coarse_unit_of_velocity_hides_no_motion() -> None:
+    """2 rpm of a joint without gear are noise of 0x606C, and no rest where the position moves."""
+    rpm = 2.0 * math.pi / 60.0
+    scales = {'scale_vel_to_dev': 1.0 / rpm, 'scale_vel_from_dev': rpm}
+    writes = ((0x60C2, 1, 10), (0x6081, 0, 10), *((index, 0, 20) for index in (0x6083, 0x6084)))
+    config = drive_config(
+        JOINT, NODE_ID, scales=scales, sdo_writes=tuple(sdo_write(*write) for write in writes)
+    )
+    net = VirtualNetwork(bus_config(config), rate_units={0: (rpm * SCALE, rpm * SCALE)})
+    net.boot()
+    net.do(JOINT, 'init')
+    net.select(JOINT, OperationMode.PROFILE_VELOCITY)
+    net.commands[JOINT].set_target(2.0 * rpm)
+    net.run(1.0)
+    assert speed(net) == pytest.approx(2.0 * rpm, rel=0.02)
+    assert not net.drives[JOINT].view.stands
+    net.do(JOINT, 'halt')
+    assert speed(net) <= STANDING
 
 
 def test_noise_is_standstill() -> None:
