@@ -27,7 +27,7 @@ IN_ENVIRONMENT = bash -c '. "$(CURDIR)/env.sh" && exec "$$@"' environment
 # some containers set PYTHONDONTWRITEBYTECODE: every worker and process would compile all that it imports
 PYTEST = $(IN_ENVIRONMENT) env -u PYTHONDONTWRITEBYTECODE python -m pytest -n auto --dist loadgroup
 
-.PHONY: help demo demo-arm demo-plan demo-quad test check build lint docs bench train chaos soak setup pins clean distclean
+.PHONY: help demo demo-arm demo-plan demo-quad test check build lint docs bench findings train chaos soak setup pins clean distclean
 .DEFAULT_GOAL := help
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo 'make lint       ruff, its formatter, mypy, who imports whom, dead code, spelling, containers, manual'
 	@echo 'make docs       build the manual as a site in build/site, to be read without a network'
 	@echo 'make bench      print the figures'
+	@echo 'make findings   see whether the surprises of other software are as we found them (installs each anew; minutes)'
 	@echo 'make train      train a policy, check it and compare it: that walks, or gets up after a fall (TASK=walk or getup, MINUTES=30, SEED=1)'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
 	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'
@@ -85,6 +86,9 @@ docs: system
 bench: system
 	@$(BUILD) --dev
 	@$(IN_ENVIRONMENT) tools/bench
+
+findings:
+	@tools/findings
 
 train: system
 	@$(BUILD) --with training quad_controller

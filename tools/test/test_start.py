@@ -92,7 +92,9 @@ def test_usage_errors(arguments: list[str]) -> None:
     assert 'usage: workspace' in done.stderr
 
 
-@pytest.mark.parametrize('target', ['demo', 'test', 'build', 'lint', 'bench', 'clean', 'setup'])
+@pytest.mark.parametrize(
+    'target', ['demo', 'test', 'build', 'lint', 'bench', 'findings', 'clean', 'setup']
+)
 def test_makefile_has_the_target_and_explains_it(target: str) -> None:
     """`make` alone names every target."""
     makefile = ['make', '--no-print-directory', '-C', str(TOOLS.parent)]
