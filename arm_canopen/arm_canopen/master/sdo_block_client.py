@@ -58,7 +58,7 @@ async def write_blocks(
             raise channel.refuse(AbortCode.BLOCK_SIZE)
         frames = block_frames(data, position, segments)
         for number, frame in enumerate(frames[:-1], start=1):
-            channel.send(frame)
+            await channel.deliver(frame, timeout)
             if number % BURST == 0:
                 await scheduler.timer(BURST_PAUSE)
         answer = await channel.exchange(frames[-1], _command(DOWNLOAD_ACKNOWLEDGED), timeout)
@@ -106,7 +106,7 @@ async def read_blocks(channel: SdoChannel, timeout: float, size_max: int) -> byt
         raise channel.refuse(AbortCode.CRC)
     if announced is not None and len(data) != announced:
         raise channel.refuse(AbortCode.LENGTH)
-    channel.send(_client_frame(END_UPLOAD))
+    await channel.deliver(_client_frame(END_UPLOAD), timeout)
     return bytes(data)
 
 

@@ -38,6 +38,7 @@ MARKERS: tuple[Address, ...] = ((0x1000, 0), (0x1001, 0), *((0x1018, sub) for su
 _ABORT = b'\x80'
 SECOND_ANSWER_TIME = 0.02  # [s] in which another device with the same node id answers, too
 OTHER_CLIENT_TIME = 1.0  # [s] in which the answers to another client are there
+REFUSED_PAUSE = 0.005  # [s] before a frame that the bus has refused is sent again
 PENDING_MAX = 16  # answers to remember that never came
 
 
@@ -179,6 +180,13 @@ class SdoChannel:
         """Send a frame that is not answered; return why the bus has not taken it."""
         return self._send(Frame(self._request_id, data))
 
+    async def deliver(self, data: bytes, timeout: float) -> BusError | None:
+        """Send a frame, again while the bus refuses it, for a time in [s]; return the refusal."""
+        end = self._scheduler.now + timeout
+        while (refusal := self.send(data)) is not None and self._scheduler.now < end:
+            await self._scheduler.timer(min(REFUSED_PAUSE, end - self._scheduler.now))
+        return refusal
+
     async def exchange(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool = False
     ) -> T:
@@ -214,13 +222,16 @@ class SdoChannel:
             if left <= 0.0:  # time went by in one leap
                 continue
             if question is not None:
-                refusal = self.send(question)
-            sent += refusal is None
+                refusal = await self.deliver(question, left)
+                left = begin + end - self._scheduler.now
+            if refusal is not None:
+                continue
+            sent += 1
             try:
                 answer = await self._scheduler.wait(promise, left)
             except TimeoutError:
                 continue
-            self.counters.repeated += max(0, sent - 1)
+            self.counters.repeated += sent - 1
             self._pending_replies = [self.address] * (sent - 1)
             return answer
         self._answered = None

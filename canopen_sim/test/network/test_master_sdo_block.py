@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen.exceptions import BusError, SdoAbortError, SdoError, SdoTimeoutError
 from arm_canopen.master.scheduler import Scheduler
 from arm_canopen.master.sdo_block_client import BURST
 from arm_canopen.master.sdo_client import BLOCK_MIN, SdoClient
@@ -35,6 +35,7 @@ class BlockLine:
     Attributes:
         frames: All frames that went over the line, as (from the client, data).
         spoil: Changes a frame on its way; None loses it.
+        room: How many frames of the client may wait for the line; it refuses others.
     """
 
     def __init__(self) -> None:
@@ -44,20 +45,25 @@ class BlockLine:
         self.store = ObjectStore(ObjectDictionary([blob]))
         self.frames: list[tuple[bool, bytes]] = []
         self.spoil: Callable[[bytes], bytes | None] = lambda data: data
+        self.room = 1000
         self._to_client: list[bytes] = []
         self._to_server: list[bytes] = []
-        self._server = SdoServer(
-            REQUEST, RESPONSE, self.store, lambda frame: self._put(frame, to_client=True)
-        )
+        self._server = SdoServer(REQUEST, RESPONSE, self.store, self._answer)
         self.client = SdoClient(
             NODE, 'joint1', self.scheduler, lambda frame: self._put(frame, to_client=False)
         )
 
-    def _put(self, frame: Frame, *, to_client: bool) -> None:
+    def _put(self, frame: Frame, *, to_client: bool) -> BusError | None:
+        if not to_client and len(self._to_server) >= self.room:
+            return BusError('the transmit queue is full')
         self.frames.append((not to_client, frame.data))
         data = self.spoil(frame.data)
         if data is not None:
             (self._to_client if to_client else self._to_server).append(data)
+        return None
+
+    def _answer(self, frame: Frame) -> None:
+        self._put(frame, to_client=True)
 
     def carry(self) -> None:
         """Carry a frame in each direction."""
@@ -145,6 +151,19 @@ def test_one_lost_segment_costs_no_transfer() -> None:
     line.run()
     assert lost
     assert read.result() == value
+
+
+def test_a_block_waits_for_room_in_the_transmit_queue() -> None:
+    """No segment is lost in a full one, and the device is not taken for one without blocks."""
+    line = BlockLine()
+    line.room = BURST // 2
+    value = bytes(range(256)) * 4
+    written = line.client.write(BLOB, 0, value, TIMEOUT)
+    line.run()
+    written.result()
+    assert line.value == value
+    segments = [data[0] & 0x7F for client, data in line.frames if client][1:-1]
+    assert segments == [n % 127 + 1 for n in range(len(segments))]
 
 
 def test_changed_data_are_noticed_by_the_checksum() -> None:

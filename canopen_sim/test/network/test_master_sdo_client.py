@@ -291,6 +291,19 @@ def test_a_request_that_the_bus_refuses_is_no_silence_of_the_device() -> None:
     line.expect('40 18 10 01 00 00 00 00')
 
 
+def test_a_request_that_the_bus_refuses_for_a_moment_is_sent_later() -> None:
+    """Once, also one that must not be repeated, as it has not left before."""
+    line = Line()
+    line.refusal = BusError('the transmit queue is full')
+    promise = write(line, b'\x01', 0x1018, 1)
+    line.pass_time(0.2 * TIMEOUT)
+    line.refusal = None
+    line.pass_time(0.2 * TIMEOUT)
+    line.expect('2F 18 10 01 01 00 00 00')
+    line.receive('60 18 10 01 00 00 00 00')
+    promise.result()
+
+
 def test_the_time_out_counts_for_each_answer() -> None:
     """A long transfer may take longer than the time-out."""
     line = Line()
