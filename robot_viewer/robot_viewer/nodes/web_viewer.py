@@ -125,7 +125,7 @@ class WebViewer(Node):
         self._own = False  # the page publishes joint states, as nobody else ever did
         self._robot_publishes = False
         self._statuses: dict[str, Status] = {}
-        self._received_at: dict[str, float] = {}  # when each of them came
+        self._status_times: dict[str, float] = {}  # when each of them came
         self._set_mode: Client | None = None
         self._root = ''
         self._velocities: Mapping[str, float] = {}
@@ -196,11 +196,11 @@ class WebViewer(Node):
             level = min(status.level[0], STALE)  # others than those of diagnostic_msgs: unknown
             values = {each.key: each.value for each in status.values}
             self._statuses[status.name] = Status(status.name, level, status.message, values)
-            self._received_at[status.name] = time.monotonic()
+            self._status_times[status.name] = time.monotonic()
 
     def _aged(self, status: Status, now: float) -> Status:
         """Return a status as it is known now: whoever has ended says nothing any more."""
-        age = now - self._received_at[status.name]
+        age = now - self._status_times[status.name]
         if age < STATUS_AGE:
             return status
         return replace(
