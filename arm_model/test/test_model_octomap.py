@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import Point, Pose, Quaternion
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from model_robots import chain
 from moveit_msgs.msg import AttachedCollisionObject, CollisionObject, PlanningScene
@@ -89,6 +89,8 @@ def cells_of(shapes: Sequence[PlacedShape]) -> Array:
     st.sampled_from([Box(0.1, 0.2, 0.1), Sphere(0.1), Capsule(0.05, 0.2), Mesh(CUBE)]),
     st.tuples(*[st.integers(-8, 8)] * 3),
 )
+@example({(0, -2, -2), (1, -2, -2)}, Box(0.1, 0.2, 0.1), (3, -1, -2))
+@example({(-1, 1, 0), (0, -1, 0)}, Sphere(0.1), (0, 2, 2))
 def test_cells_count_as_boxes(
     cells: set[tuple[int, int, int]], shape: Shape, place: tuple[int, int, int]
 ) -> None:
@@ -112,7 +114,7 @@ def test_cells_count_as_boxes(
     if by_box > 1e-6:
         assert by_cell == pytest.approx(by_box, abs=1e-5)
     elif by_box < -1e-6:
-        assert by_cell < 0.0
+        assert by_cell < -1e-4  # which checks of paths let pass
 
 
 def test_gradients_of_distances_to_cells_are_differences() -> None:

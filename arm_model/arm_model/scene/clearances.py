@@ -16,8 +16,9 @@ from .planning_scene import PlanningScene
 AT_ONCE = 100
 """Pairs that are measured in one step: other threads wait for it, such as a control cycle."""
 
-TOUCH = 1e-9
-"""Depth of a contact with a cell of an octree whose depth is not known in [m]."""
+TOUCH = 2e-4
+"""Least depth of a contact with an octree in [m]: a cell that is only touched may hide one that is
+overlapped. It is more than checks of paths let pass."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +126,7 @@ class Clearances:
         found = self.measure(positions, pairs)
         of_cells = self._of_cells
         bounds[doubtful] = [
-            # of an octree the first cell counts that is not apart, though it only touches
+            # of an octree coal measures the first cell that is not apart, not the deepest
             min(distance, -TOUCH) if of_cells[pair] and distance <= 0.0 else distance
             for pair, distance in ((pair, found[pair].min_distance) for pair in pairs)
         ]
