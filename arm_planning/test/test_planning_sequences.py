@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any
 
 from hypothesis import given
@@ -112,6 +112,14 @@ def test_each_group_may_have_a_start(thread: PlanningThreads) -> None:
     first, second = (each.joint_trajectory.points[0].positions for each in plan.trajectories)
     assert list(first) == [0.1, 0.2, 0.0]
     assert list(second) == [0.2, 1.0]
+
+
+def test_a_cancel_ends_a_sequence_at_the_next_item(thread: PlanningThreads) -> None:
+    """Also within the items of one group."""
+    items, looks = [left(0.1 * number) for number in range(1, 9)], count(1)
+    with pytest.raises(PlanningError, match='item 2: canceled') as caught:
+        thread.prepare_sequence(items, is_canceled=lambda: next(looks) == 3)()
+    assert caught.value.code is PlanningCode.PREEMPTED
 
 
 def test_no_items_are_no_motion(thread: PlanningThreads) -> None:

@@ -261,10 +261,9 @@ class PlanningThreads:
         trajectories = []
         notes: list[str] = []
         for run in runs:
-            if is_canceled():
-                raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
             model, planner = planners.at(run.group, positions)
-            read = partial(_read_item, partial(self._reader, model, snapshot, positions))
+            reader = partial(self._reader, model, snapshot, positions, is_canceled)
+            read = partial(_read_item, reader)
             items = [
                 SequenceItem(partial(read, number, item.req), item.blend_radius)
                 for number, item in enumerate(run.items, run.first)
@@ -282,9 +281,16 @@ class PlanningThreads:
         )
 
     def _reader(
-        self, model: RobotModel, snapshot: SceneSnapshot, positions: Array, start: Array | None
+        self,
+        model: RobotModel,
+        snapshot: SceneSnapshot,
+        positions: Array,
+        is_canceled: Callable[[], bool],
+        start: Array | None,
     ) -> RequestReader:
         """Return what reads an item that begins at a start of its group, if there is one."""
+        if is_canceled():
+            raise PlanningError(PlanningCode.PREEMPTED, CANCELED)
         if start is not None:
             places = dict(zip(model.joints, start.tolist(), strict=True))
             positions = self._moved(positions, places)
