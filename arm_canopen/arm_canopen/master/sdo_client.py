@@ -157,11 +157,14 @@ class SdoClient:
         return promise
 
     def cancel_all(self, reason: str) -> None:
-        """Reject every transfer, because the device restarted or went away."""
-        queue = [*self._urgent, *self._queue]
-        self._urgent.clear()
+        """Reject every transfer that is not urgent, because the device restarted or went away.
+
+        An urgent one stops it, and it may receive what it does not answer.
+        """
+        queue = [*self._queue]
         self._queue.clear()
-        self._end_running(reason)
+        if self._yields:
+            self._end_running(reason)
         for entry in queue:
             entry.promise.reject(SdoError(f'{self._name}: {reason}'))
 

@@ -173,6 +173,8 @@ def test_a_device_that_leaves_operational_by_itself_in_motion_is_braked_at_once(
     moving.net.devices[JOINT].receive(unseen, moving.net.now)
     moving.run(0.2)
     assert moving.device.state is DriveState.QUICK_STOP_ACTIVE
+    requests = moving.net.frames(0x600 + NODE_ID, since=moving.began)
+    assert not any(data[0] == 0x80 for data in requests), 'an abort could undo the stop'
     moving.run(RAMP + 2.0)
     assert moving.net.all_ready()
     assert moving.fastest < STANDING
