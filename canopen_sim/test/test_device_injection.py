@@ -54,6 +54,13 @@ def test_slow_sdo_answers_late_and_right(rig: Rig) -> None:
     assert rig.device.faults.active == ()
 
 
+def test_an_empty_frame_is_none_to_a_server_that_deviates(rig: Rig) -> None:
+    """It is passed over, as without a fault."""
+    inject(rig, Fault.BLOCK_CRC)
+    assert rig.raw_sdo(b'') is None
+    assert rig.get(0x1000) == 0x20192
+
+
 def test_silence_about_one_object(rig: Rig) -> None:
     """Requests for that object are not answered, others are."""
     inject(rig, Fault.SDO_SILENCE, object=(0x6064, 0))

@@ -222,7 +222,7 @@ class FaultLine:
             if kind in DELAYS:
                 delay += fault.injection.delay
             elif kind in REWRITES:
-                frame = frame._replace(data=REWRITES[kind](frame.data))
+                frame = frame._replace(data=frame.data and REWRITES[kind](frame.data))
             elif kind is Fault.NODE_ID_CONFLICT:
                 self._postpone(OTHER_DEVICE_DELAY, partial(self._send_at, frame))
             else:
