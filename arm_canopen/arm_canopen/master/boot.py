@@ -135,9 +135,8 @@ class BootProcess:
         self._enter(BootPhase.IDENTITY)
         await self._check_identity(node.config.identity)
         self._enter(BootPhase.RESTING)
-        for lead in node.lead_to_rest:
-            before = f'lost before: {node.loss}' if node.loss else 'not enabled by this master'
-            await lead(f'it was enabled when its device was found ({before})')
+        before = f'lost before: {node.loss}' if node.loss else 'not enabled by this master'
+        await node.bring_to_rest(f'it was enabled when its device was found ({before})')
         # PDO parameters may only be written while the device does not process PDOs
         await self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         if node.life.silent and node.config.uses_node_guarding:

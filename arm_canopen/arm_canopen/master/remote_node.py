@@ -244,8 +244,12 @@ class RemoteNode:
             text = f'{missing}, but its TPDOs come: it goes on until the next one is missing, too'
             self.report(EventKind.HEARTBEAT_LATE, Severity.WARNING, text)
         elif self._resting is None:
-            ends = [self._scheduler.spawn(lead(missing)) for lead in self.lead_to_rest]
-            self._resting = self._scheduler.spawn(self._scheduler.gather(ends))
+            self._resting = self.bring_to_rest(missing)
+
+    def bring_to_rest(self, reason: str) -> Promise[list[None]]:
+        """Bring all its axes to rest at the same time; done when the last one has ended."""
+        ends = [self._scheduler.spawn(lead(reason)) for lead in self.lead_to_rest]
+        return self._scheduler.spawn(self._scheduler.gather(ends))
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop its drivers, because a step of the cycle failed; other devices go on.

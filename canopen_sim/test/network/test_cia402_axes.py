@@ -14,6 +14,7 @@ from virtual_network import VirtualNetwork
 from arm_canopen.config import load_bus
 from arm_canopen.exceptions import DriveError
 from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.standard.objects import AXIS_OFFSET, Index
 
 EDS = DRIVE_EDS.with_name('cia402_two_axes.eds')
 BUS = f"""
@@ -75,6 +76,31 @@ def test_the_axes_move_apart(net: VirtualNetwork) -> None:
     net.commands[Y].set_target(-0.25)
     net.run(3.0)
     assert motors(net) == pytest.approx([0.5, -0.25], abs=2e-3)
+
+
+def test_the_axes_of_a_device_that_comes_back_are_braked_at_the_same_time(
+    net: VirtualNetwork,
+) -> None:
+    """No axis goes on until another one stands."""
+    device = net.devices['table']
+    for drive in device.drives:  # which go on without their master
+        device.store.find(Index.ABORT_CONNECTION_OPTION + AXIS_OFFSET * drive.number).value = 0
+    for axis in (X, Y):
+        net.do(axis, 'init')
+        net.select(axis, OperationMode.PROFILE_VELOCITY)
+        net.commands[axis].set_target(0.5)
+    net.run(2.0)
+    net.wire.loses = lambda sender, frame: True
+    net.run(8.0)
+    assert [drive.state for drive in device.drives] == [DriveState.OPERATION_ENABLED] * 2
+    net.wire.loses = lambda sender, frame: False
+    left: dict[int, float] = {}
+    while len(left) < len(device.drives):
+        net.run(0.01)
+        for drive in device.drives:
+            if drive.state is not DriveState.OPERATION_ENABLED:
+                left.setdefault(drive.number, net.now)
+    assert max(left.values()) - min(left.values()) < 0.05
 
 
 def test_a_fault_stops_its_axis_and_is_said_by_name(net: VirtualNetwork) -> None:
