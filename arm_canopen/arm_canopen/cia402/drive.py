@@ -430,6 +430,8 @@ class Drive:
         moves = by_itself and view.state in POWERED
         if not self.node.left_operational:
             self._note_interruption()
+        elif not by_itself:
+            self.interrupted = None
         self.feed_forward.end()
         self.resetting = self._follows = self._begun = self._announced = False
         self._unknown = True

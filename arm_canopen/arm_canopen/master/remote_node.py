@@ -219,7 +219,7 @@ class RemoteNode:
         rested = self._resting is not None and self._resting.done
         if rested:
             self._resting = None
-        if rested or (self.life.missed and not self._lives(now)):
+        if (rested and self.operational) or (self.life.missed and not self._lives(now)):
             self.lost(self._missing)
             return True
         if self.operational:

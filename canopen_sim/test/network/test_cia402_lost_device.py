@@ -97,6 +97,23 @@ def test_a_drive_without_heartbeat_is_given_back_by_policy(
     assert abs(moving.device.velocity) / SCALE < STANDING
 
 
+def test_a_device_that_is_commanded_away_while_it_brakes_is_left_there() -> None:
+    """Its heartbeat is back, so it is not booted, and its drive is enabled no more."""
+    moving = MovingDrive(recovery=RecoveryPolicy.AUTO)
+    net = moving.net
+    lose(moving, 0x700 + NODE_ID)
+    while moving.device.state is DriveState.OPERATION_ENABLED:
+        moving.run(PERIOD)
+    lose(moving)
+    net.network.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL, NODE_ID)
+    moving.run(3.0 * RAMP)
+    assert nmt_commands(moving) == [NmtCommand.ENTER_PRE_OPERATIONAL]
+    net.network.send_nmt(NmtCommand.RESET_NODE, NODE_ID)
+    net.run(3.0)
+    assert net.all_ready()
+    assert moving.device.state is DriveState.SWITCH_ON_DISABLED
+
+
 @OPTIONS
 @pytest.mark.parametrize('begins', ['NMT', 'silence'])
 def test_an_axis_that_turns_when_its_device_starts_is_braked(begins: str, option: int) -> None:
