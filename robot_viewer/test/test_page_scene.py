@@ -14,6 +14,7 @@ from urdf_reader import read_urdf, Transform
 from viser import ViserServer
 
 from robot_viewer.page.robot_scene import Ground, RobotScene, start_position, travel
+from robot_viewer.page.sliders import add_speed
 from robot_viewer.shapes import Meshes, shapes_of
 
 URDF = """
@@ -149,3 +150,14 @@ def test_a_slider_has_two_ends(kind: str, limit: str, ends: tuple[float, float])
     (found,) = read_urdf(f'<robot name="r">{links}{joint}</robot>').movable()
     assert travel(found) == ends
     assert ends[0] <= start_position(found) <= ends[1]
+
+
+@pytest.mark.parametrize(('typed', 'share'), [(40.0, 0.4), (500.0, 1.0), (-3.0, 0.05)])
+def test_a_speed_that_is_typed_stays_in_the_range_of_its_slider(
+    server: ViserServer, typed: float, share: float
+) -> None:
+    """A number box takes any number until it is left."""
+    speed = add_speed(server.gui)
+    (slider,) = server.gui._gui_input_handle_from_uuid.values()
+    slider._impl.value = typed
+    assert speed() == share

@@ -169,13 +169,14 @@ def test_stop_is_answered_by_the_robot_alone(robot: Robot) -> None:
     context = Context()
     rclpy.init(args=[], context=context, domain_id=robot.node.context.get_domain_id())
     hung = Node('hung', context=context)  # it serves nothing
+    hung.create_service(CONmtID, '~/set_nmt', lambda _, response: response)  # as a master has it
     hung.create_service(Trigger, 'stop', lambda _, response: response)
     robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
     client = robot.viewer._trigger_clients['/stop']
     robot.spin_until(client.service_is_ready, 'a connection')
     answer = robot.viewer.stop()
-    assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']
-    assert not answer.done(), 'one of those that were asked has not answered'
+    assert not robot.called_until_enable()
+    assert not answer.done(), 'the one that was asked has not answered'
     hung.destroy_node()
     rclpy.shutdown(context=context)
     robot.spin_until(lambda: not client.service_is_ready(), 'its end')
@@ -200,7 +201,7 @@ def test_stop_calls_one_service_that_stops_all(robot: Robot) -> None:
 
 
 @contextmanager
-def conveyor(isolation: Isolation, kind: Any) -> Iterator[list[Any]]:
+def conveyor(isolation: Isolation, kind: Any, *, success: bool = False) -> Iterator[list[Any]]:
     """Run a process's worth of somebody else with a service `stop`; yield what it was asked."""
     context = Context()
     rclpy.init(args=[], context=context, domain_id=isolation.domain_id)
@@ -208,6 +209,8 @@ def conveyor(isolation: Isolation, kind: Any) -> Iterator[list[Any]]:
 
     def answer(request: Any, response: Any) -> Any:
         asked.append(request)
+        if success:
+            response.success = True
         return response
 
     node.create_service(kind, 'stop', answer)
@@ -266,6 +269,20 @@ def test_a_stop_of_somebody_else_leaves_no_drive_moving(
         assert is_asked or not asked
     robot.spin_until(lambda: robot.node.count_services('/stop') == 1, 'the end of the other one')
     assert stopped() == ['stop']
+
+
+def test_a_stop_of_somebody_else_is_no_answer_of_the_robot(
+    robot: Robot, isolation: Isolation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A node that leads neither drives nor legs has confirmed, and there are no drives."""
+    monkeypatch.setattr(web_viewer, 'of_robot', lambda *_: [])
+    with conveyor(isolation, Trigger, success=True) as asked:
+        robot.spin_until(lambda: '/stop' in robot.viewer._stops, 'the service')
+        client = robot.viewer._trigger_clients['/stop']
+        robot.spin_until(client.service_is_ready, 'a connection')
+        answer = robot.viewer.stop()
+        robot.spin_until(lambda: bool(asked), 'the request')
+        assert not robot.answer_to(answer).stands
 
 
 def test_who_does_not_look_takes_no_messages(

@@ -60,19 +60,21 @@ def spin(
     try:
         # the unbounded spin() of some EventsExecutors burns a core and runs nothing
         while ok() and not stop.is_set():
-            _spin_once(executor, survive)
+            _spin_once(executor, WAKE_PERIOD, survive)
         end = time.monotonic() + linger
         while ok() and (left := end - time.monotonic()) > 0.0:
-            executor.spin_once(timeout_sec=min(left, WAKE_PERIOD))
+            _spin_once(executor, min(left, WAKE_PERIOD), survive)
     except ExternalShutdownException:
         pass
     finally:
         executor.shutdown()
 
 
-def _spin_once(executor: Executor, survive: Callable[[Exception], None] | None) -> None:
+def _spin_once(
+    executor: Executor, timeout: float, survive: Callable[[Exception], None] | None
+) -> None:
     try:
-        executor.spin_once(timeout_sec=WAKE_PERIOD)
+        executor.spin_once(timeout_sec=timeout)
     except ExternalShutdownException:
         raise
     except Exception as error:

@@ -64,6 +64,9 @@ def test_what_a_callback_raises_ends_nothing_where_it_is_reported(
         node.create_timer(0.005, lambda: others.append(1))
         spin([node], stop, make(), survive=report)
         assert set(reported) == {'no such thing'}
+        reported.clear()
+        spin([node], stop, make(), linger=0.1, survive=report)
+        assert set(reported) == {'no such thing'}, 'while it lingers, too'
         with pytest.raises(ValueError, match='no such thing'):
             spin([node], threading.Event(), make())
         node.destroy_node()

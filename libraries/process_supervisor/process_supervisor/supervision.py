@@ -239,7 +239,7 @@ class Supervision:
         elif child.spec.required:
             early = '' if child.ready else ' before it was ready'
             self._fail(name, f'{name} {how}{early}', now)
-        elif child.ready:
+        elif child.ready or child.ends:
             if now - child.started > RESTART_DELAYS[-1]:
                 child.ends = 0
             self._plan_restart(child, how, now)

@@ -289,7 +289,11 @@ def test_an_optional_process_that_ends_is_started_again() -> None:
     bench.supervision.advance(now + 32.0)
     cannot = 'viewer cannot be started: no such file; it is started again in 5 s'
     assert bench.notices[-1].text == cannot
-    bench.supervision.interrupt(now + 33.0)
+    bench.missing = ''
+    bench.supervision.advance(now + 37.0)
+    bench.supervision.exited('viewer', 1, now + 37.1)
+    assert bench.notices[-1].text.endswith('again in 30 s'), 'before it was ready'
+    bench.supervision.interrupt(now + 38.0)
     bench.supervision.advance(now + 100.0)
     assert bench.supervision.running == ('master',)
 

@@ -413,12 +413,13 @@ class WebViewer(Node):
             who = ', '.join(others) or 'a node that the graph does not show'
             text = f'offered by {who}, which leads neither drives nor legs: each drive is halted'
             self._report(service, f'{text}, too. Give that service another name', failed=True)
-        if not calls:
+        counted = {name: call for name, call in calls.items() if name not in doubtful}
+        if not counted:
             text = 'nothing here offers to be stopped'
             self.page.say(f'STOP: {text}', failed=True)
             answer.set_result(StopAnswer(stands=False, text=text))
             return
-        _StopCalls(calls, answer)
+        _StopCalls(counted, answer)
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
         """Return those that are not a robot's own alone, with the other nodes that offer them.

@@ -18,6 +18,7 @@ from viser import (
     ViserServer,
 )
 
+from .sliders import value_of
 from .standing import Contacts, Support
 from .style import NEUTRAL, WANTED
 from .target_panel import UNLOCK
@@ -71,7 +72,7 @@ class BodyPanel:
 
         def moved(event: GuiEvent[GuiSliderHandle[float]]) -> None:
             if event.client_id is not None and not self._unlock.visible:
-                roll, pitch, height = (slider.value for slider in self._sliders)
+                roll, pitch, height = map(value_of, self._sliders)
                 send((roll, pitch, height))
 
         def level() -> None:

@@ -8,6 +8,7 @@ connect to a loopback port. So each request is looked at before viser sees it.
 
 from __future__ import annotations
 
+from asyncio import CancelledError
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -27,7 +28,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from ..loopback import is_loopback
-from .overlay import Overlay, text_response
+from .overlay import ANSWER_TIMEOUT, Overlay, text_response
 
 COOKIE = 'robot_viewer_token_{}'
 """By port: a browser sends the cookies of a host to all its ports, and each page has one."""
@@ -108,6 +109,7 @@ class Gate:
         def guarded(*args: Any, **options: Any) -> Any:  # noqa: ANN401  # as they are
             self._serving = True
             options['process_request'] = partial(self._process, options.get('process_request'))
+            options['open_timeout'] = 2.0 * ANSWER_TIMEOUT  # or it would end before the answer
             return serve(*args, **options)
 
         websocket_server.serve = guarded  # type: ignore[assignment, misc]
@@ -125,6 +127,8 @@ class Gate:
         request: Request,
     ) -> Response | None:
         answer = self.answer(request.path, request.headers) or await self._overlay.answer(request)
+        if connection.transport.is_closing():
+            raise CancelledError  # a browser that waits no more; websockets would fail to answer
         if answer is not None or next_one is None:
             return answer
         result = next_one(connection, request)

@@ -14,6 +14,7 @@ from urdf_reader import Joint, JointKind, KinematicTree
 from viser import GuiDropdownHandle, GuiFolderHandle, GuiHtmlHandle, ViserServer
 
 from .robot_scene import travel
+from .sliders import add_speed
 from .style import JOINT_ROWS, NEUTRAL, THREE_COLUMNS
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
@@ -89,7 +90,7 @@ class JogPanel:
         movable = {joint.name: joint for joint in tree.movable()}
         self._folder: GuiFolderHandle = self._gui.add_folder(None)
         with self._folder:
-            self._speed = self._gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
+            self._speed = add_speed(self._gui)
             tabs = self._gui.add_tab_group()
             with tabs.add_tab('Tool'):
                 self._add_twists(tool_frames(tree, jogged.joints))
@@ -143,11 +144,11 @@ class JogPanel:
         self._actions.grip(gripper, opens=opens)
 
     def _jog(self, axes: GuiDropdownHandle[str], twist: Twist) -> None:
-        x, y, z, a, b, c = (self._speed.value / 100.0 * part for part in twist)
+        x, y, z, a, b, c = (self._speed() * part for part in twist)
         self._actions.jog((x, y, z, a, b, c), '' if axes.value == BASE else axes.value)
 
     def _jog_joint(self, joint: str, way: float) -> None:
-        self._actions.jog_joint(joint, self._speed.value / 100.0 * way)
+        self._actions.jog_joint(joint, self._speed() * way)
 
 
 def tool_frames(tree: KinematicTree, joints: Sequence[str]) -> list[str]:

@@ -23,8 +23,9 @@ STOP_PATH = '/stop'
 STOP_HEADER = 'X-Robot-Stop'
 """What no page of another site can send without being asked."""
 END = b'</body>'
-ANSWER_TIMEOUT = 8.0
-"""Time in [s] that a request for STOP waits for the robot; the page warns long before."""
+ANSWER_TIMEOUT = 30.0
+"""Time in [s] that a request for STOP waits for the robot, which may have a long ramp; the page
+warns long before."""
 NO_ANSWER = 'no answer from the robot: use the emergency stop'
 
 

@@ -45,6 +45,7 @@ from .motion_plan import (
 )
 from .robot_scene import put, RobotScene, Tint
 from .scene_objects import SceneObjects
+from .sliders import add_speed
 from .style import Color, NEUTRAL, WANTED
 
 GHOST_TINT: Tint = (0.91, 0.35, 0.05, 0.45)
@@ -91,8 +92,8 @@ class PlanPanel:
         with self._folder:
             self._group = self._dropdown('Group', groups, ChooseGroup)
             self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), ChooseGoal)
-            self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
-            self._button('Plan', lambda: Plan(self._speed.value / 100.0))
+            speed = add_speed(gui)
+            self._button('Plan', lambda: Plan(speed()))
             self._execute = self._button('Execute', Execute, WANTED)
             self._again = self._button('Show again', ShowAgain)
             self._outcome: GuiHtmlHandle = gui.add_html('')

@@ -42,6 +42,7 @@ from .motion_plan import PlanRequest
 from .overlay import Overlay, StopAnswer
 from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
+from .sliders import add_speed, Share, value_of
 from .style import CAUTION, NEUTRAL, THREE_COLUMNS, WANTED
 from .target_panel import PlotPanel, TargetPanel
 
@@ -421,18 +422,21 @@ class RobotPage:
                 color = BUTTON_COLORS.get(mode, NEUTRAL)
                 button = self._server.gui.add_button(mode, color=color)
                 button.on_click(partial(self._request, mode))
-            speed = self._speed()
+            speed = add_speed(self._server.gui)
             rest = partial(self._actions.walk, (0.0, 0.0, 0.0))
             for title, velocity in WALKS.items():
                 self._held(title, partial(self._walk, speed, velocity), rest)
 
     def _stop(self) -> Future[StopAnswer]:
         self._deadman.stop()  # or a button that is held would go on
-        for panel in list(self._targets.values()):
-            panel.lock()  # or a slider that is dragged
-        if self._body is not None:
-            self._body.lock()
-        return self._actions.stop()
+        try:
+            for panel in list(self._targets.values()):
+                panel.lock()  # or a slider that is dragged
+            if (body := self._body) is not None:
+                body.lock()
+        finally:  # whatever fails on the page
+            answer = self._actions.stop()
+        return answer
 
     def say(self, text: str, *, failed: bool = False) -> None:
         """Show what became of the last request."""
@@ -470,9 +474,6 @@ class RobotPage:
             self._pages[label] = self._tabs.add_tab(label)
         return self._pages[label]
 
-    def _speed(self) -> GuiSliderHandle[float]:
-        return self._server.gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 30.0)
-
     def _held(
         self, label: str, act: Callable[[], None], rest: Callable[[], None]
     ) -> GuiButtonHandle:
@@ -492,8 +493,8 @@ class RobotPage:
         button.on_click(release)  # a click ends where the button is let go
         return button
 
-    def _walk(self, speed: GuiSliderHandle[float], velocity: Velocity) -> None:
-        x, y, turn = (speed.value / 100.0 * part for part in velocity)
+    def _walk(self, speed: Share, velocity: Velocity) -> None:
+        x, y, turn = (speed() * part for part in velocity)
         self._actions.walk((x, y, turn))
 
     def _call(
@@ -512,7 +513,7 @@ class RobotPage:
         self._actions.set_mode(mode)
 
     def _publish_sliders(self) -> None:
-        self._actions.publish_joints({n: slider.value for n, slider in self._sliders.items()})
+        self._actions.publish_joints({n: value_of(each) for n, each in self._sliders.items()})
 
 
 def _line(text: str, color: str, *, strong: bool = False) -> str:

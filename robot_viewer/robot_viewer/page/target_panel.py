@@ -21,6 +21,7 @@ from viser import (
 
 from .aim import History, KEPT
 from .robot_scene import travel
+from .sliders import add_speed, value_of
 from .style import WANTED
 
 UNTOUCHED = 1.0
@@ -55,7 +56,7 @@ class TargetPanel:
         gui.add_markdown('Moves to where a slider is put; STOP ends it.')
         self._unlock = gui.add_button(UNLOCK, color=WANTED, visible=False)
         self._unlock.on_click(lambda _: self._set_locked(locked=False))
-        self._speed = gui.add_slider('Speed [%]', 5.0, 100.0, 5.0, 20.0)
+        self._speed = add_speed(gui, 20.0)
         self._sliders: dict[str, GuiSliderHandle[float]] = {}
         for joint in joints:
             low, high = travel(joint)
@@ -90,9 +91,7 @@ class TargetPanel:
         if self._unlock.visible:
             return
         self._touched = time.monotonic()
-        slider = event.target
-        target = min(max(slider.value, slider.min), slider.max)  # numbers are typed, too
-        self._aim({joint: target}, self._speed.value / 100.0)
+        self._aim({joint: value_of(event.target)}, self._speed())
 
 
 class PlotPanel:
