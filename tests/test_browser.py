@@ -2,18 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of an arm in a real browser: seen, moved and stopped by mouse and keys.
 
-One browser and one arm for all: each test leaves the arm enabled and at rest. Those that plan come
-first: they begin and end in the state 'ready'; sliders and jogs lead anywhere.
+One browser and one arm for all: each test leaves the arm at rest, and chooses on the page what it
+needs there.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import closing
 from dataclasses import dataclass, field
 import re
+import threading
 import time
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import cast, TYPE_CHECKING
 
 import browser as chromium
 from geometry_msgs.msg import Point, Pose
@@ -28,7 +32,10 @@ from sensor_msgs.msg import JointState
 from shape_msgs.msg import SolidPrimitive
 
 from arm_msgs.srv import InjectFault
+from robot_viewer.page.jog_panel import BASE
 from robot_viewer.page.motion_plan import DRAGGED
+from robot_viewer.page.overlay import StopAnswer
+from robot_viewer.page.robot_page import Actions, RobotPage
 from robot_viewer.page.target_panel import UNLOCK
 
 if TYPE_CHECKING:
@@ -108,7 +115,10 @@ class Seen:
         assert self.box(slider).input_value() == text
 
     def jog(self, page: Page) -> None:
-        """Hold the button that leads back: at its limit the joint would not move."""
+        """Turn the tool about the base's axis; back, as at its limit the joint would not move."""
+        page.get_by_role('tab', name=JOG).click()
+        page.get_by_role('tab', name='Tool', exact=True).click()
+        chromium.choose(page, 'Along the axes of', BASE)
         chromium.hold(page, TURN if self.position(WRIST) > self.wrist else TURN_BACK)
         self.wait(self.moves, 'a jog')
 
@@ -140,6 +150,11 @@ class Seen:
     def wait(self, condition: Callable[[], bool], what: str) -> None:
         """Wait until it does something."""
         self.client.spin_until(condition, REACTION, what)
+
+    def wait_until_at(self, target: float) -> None:
+        """Wait until the first joint stands at a target in [rad]."""
+        self.wait(lambda: abs(self.position() - target) < NEAR, f'{target} rad')
+        self.wait_for_rest()
 
     def wait_for_rest(self) -> None:
         """Wait until it has come to rest since now."""
@@ -173,6 +188,11 @@ def seen() -> Iterator[Seen]:
             client.spin_until(lambda: bool(states), REACTION, 'joint states')
             with chromium.browser() as browser:
                 yield Seen(bringup, browser, url, chromium.open_page(browser, url), client, states)
+
+
+def words_of_stop(page: Page, pattern: str) -> Locator:
+    """Return the words on the STOP button once they match."""
+    return page.locator('#robot-stop small').filter(has_text=re.compile(pattern))
 
 
 def press(page: Page, button: str) -> None:
@@ -222,6 +242,11 @@ def test_a_dragged_goal_and_a_box(seen: Seen) -> None:
 
 def test_stop_ends_what_was_planned(seen: Seen) -> None:
     """On its way; what was planned cannot be executed any more."""
+    seen.show(TARGETS)
+    seen.unlock()
+    seen.type_into(JOINT1, '1')
+    seen.page.keyboard.press('Enter')
+    seen.wait_until_at(1.0)
     page = seen.show(PLAN)
     chromium.choose(page, 'Goal', 'ready')
     chromium.drag(page, 0, 0.0)  # slowly: it is on its way for long
@@ -268,10 +293,10 @@ def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
     before = chromium.picture(page, 'arm')
     assert chromium.colors_of_scene(before) > 100
     start = seen.position()
-    chromium.drag(page, JOINT1, 0.65)
+    chromium.drag(page, JOINT1, 0.65 if start < 0.0 else 0.35)
     wanted = chromium.slider_value(page, JOINT1)
-    assert wanted > start + 0.3
-    seen.wait(lambda: abs(seen.position() - wanted) < 0.02, f'{wanted} rad')
+    assert abs(wanted - start) > 0.3
+    seen.wait_until_at(wanted)
     page.get_by_text('target: reached').wait_for()
     seen.wait(lambda: abs(chromium.slider_value(other, JOINT1) - wanted) < 0.02, 'the other page')
     assert chromium.picture(page, 'arm-moved') != before
@@ -280,11 +305,11 @@ def test_a_slider_moves_a_joint_that_is_seen_on_all_pages(seen: Seen) -> None:
 
 def test_stop_of_any_page_ends_a_jog(seen: Seen) -> None:
     """Also while the button is still held: only a new press moves the arm again."""
-    page, other = seen.show(JOG), chromium.open_page(seen.browser, seen.url)
+    page, other = seen.page, chromium.open_page(seen.browser, seen.url)
     seen.jog(page)
     other.locator('#robot-stop').click()
+    words_of_stop(other, '^(stopped|stand): ').wait_for()
     seen.wait_for_rest()
-    other.get_by_text('stopped', exact=True).wait_for()
     other.close()
     page.mouse.up()
     seen.wait_for_rest()
@@ -297,20 +322,21 @@ def test_the_space_bar_ends_a_trajectory(seen: Seen) -> None:
     """The arm stands on the way, and the page says so; the key presses no button."""
     page = seen.show(TARGETS)
     seen.unlock()
-    chromium.drag(page, JOINT1, 0.1)
+    share = 0.1 if seen.position() > 0.0 else 0.9
+    chromium.drag(page, JOINT1, share)
     wanted, start = chromium.slider_value(page, JOINT1), seen.position()
     seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
     page.keyboard.press('Space')
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.2
-    page.get_by_text('stopped: panda_joint1').wait_for()
+    words_of_stop(page, 'stopped: panda_joint1').wait_for()
     chromium.picture(page, 'stopped')
     page.get_by_role('button', name=UNLOCK).wait_for()
-    chromium.drag(page, JOINT1, 0.1)  # as if one were dragged on, or late
+    chromium.drag(page, JOINT1, share)  # as if one were dragged on, or late
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.2
     seen.unlock()
-    chromium.drag(page, JOINT1, 0.1)
+    chromium.drag(page, JOINT1, share)
     seen.wait(seen.moves, 'a motion again')
     page.get_by_text('target: reached').wait_for()
 
@@ -328,7 +354,7 @@ def test_a_number_counts_when_it_is_complete(seen: Seen) -> None:
     page.keyboard.press('Enter')
     seen.wait(lambda: abs(seen.position() - start) > UNDER_WAY, 'a motion')
     page.keyboard.press('Space')
-    page.get_by_text('stopped', exact=True).wait_for()
+    words_of_stop(page, 'stopped: panda_joint1').wait_for()
     seen.wait_for_rest()
     assert abs(seen.position() - wanted) > 0.2
     before = dict(zip(seen.states[-1][1].name, seen.states[-1][1].position, strict=True))
@@ -336,9 +362,7 @@ def test_a_number_counts_when_it_is_complete(seen: Seen) -> None:
     for text, end in (('0', 'Enter'), ('0,5', 'Tab')):  # the second is longer than what is shown
         seen.type_into(JOINT1, text)
         page.keyboard.press(end)
-        reached = float(text.replace(',', '.'))
-        seen.wait(lambda reached=reached: abs(seen.position() - reached) < NEAR, f'{reached} rad')
-        seen.wait_for_rest()
+        seen.wait_until_at(float(text.replace(',', '.')))
     seen.type_into(JOINT1, '1e0')
     page.keyboard.press('Enter')
     assert seen.box(JOINT1).input_value() == '0.5', 'no number'
@@ -372,7 +396,7 @@ def test_a_single_joint_and_the_tool_along_its_own_axes(seen: Seen) -> None:
 @pytest.mark.parametrize('way', ['asleep', 'elsewhere'])
 def test_who_does_not_look_moves_nothing(seen: Seen, way: str) -> None:
     """A browser that is stopped, and a window that loses the focus."""
-    page = seen.show(JOG)
+    page = seen.page
     seen.jog(page)
     if way == 'asleep':
         with chromium.asleep():
@@ -388,7 +412,6 @@ def test_a_page_that_is_killed_moves_nothing(seen: Seen) -> None:
     """With a button held; the browser has no time to say so."""
     others = chromium.processes()
     page = chromium.open_page(chromium.launch(seen.browser.browser_type), seen.url)
-    page.get_by_role('tab', name=JOG).click()
     seen.jog(page)
     for process in chromium.processes():
         if process not in others:
@@ -409,7 +432,7 @@ def test_stop_is_in_reach_on_a_phone(seen: Seen) -> None:
     assert box is not None
     assert min(box['width'], box['height']) > 48  # [px] what a thumb hits
     page.touchscreen.tap(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
-    page.get_by_text('stopped', exact=True).wait_for()
+    words_of_stop(page, '^(stand|not enabled): ').wait_for()
     page.get_by_role('tab', name='Joints').wait_for()
     jog = page.get_by_role('tab', name=JOG)
     jog.tap()
@@ -456,4 +479,35 @@ def test_a_robot_that_does_not_answer_has_not_stopped(seen: Seen) -> None:
     finally:
         for process in robot:
             process.resume()
-    page.get_by_text(re.compile('stopped|NOT confirmed')).first.wait_for()
+    words_of_stop(page, 'stand|not enabled|NOT confirmed').wait_for()
+
+
+def test_a_robot_that_stops_late(seen: Seen) -> None:
+    """The warning gives way to its words, however often STOP was pressed until then."""
+    answers, stands = list[Future[StopAnswer]](), threading.Event()
+    answer = StopAnswer(stands=True, text='stopped: legs')
+
+    def stop() -> Future[StopAnswer]:
+        answers.append(Future())
+        if stands.is_set():
+            answers[-1].set_result(answer)
+        return answers[-1]
+
+    with closing(
+        RobotPage('127.0.0.1', 8600, cast(Actions, SimpleNamespace(stop=stop)))
+    ) as served:
+        page = seen.browser.new_page()
+        page.goto(served.url)
+        words_of_stop(page, 'space bar').wait_for()
+        for _ in range(9):  # more than a browser sends at once
+            page.keyboard.press('Space')
+        words_of_stop(page, 'no answer from the robot: use the emergency stop').wait_for()
+        count = len(answers)
+        page.keyboard.press('Space')
+        seen.wait(lambda: len(answers) > count, 'a STOP behind those that are not answered')
+        stands.set()
+        for each in answers:
+            if not each.done():
+                each.set_result(answer)
+        words_of_stop(page, '^stopped: legs$').wait_for()
+        page.close()
