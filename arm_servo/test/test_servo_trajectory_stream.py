@@ -116,7 +116,7 @@ def test_the_tolerance_at_the_goal_is_by_the_range_of_the_joint(node: Any) -> No
     low, high = np.array([0.0, -3.0, -np.inf]), np.array([0.5, 3.0, np.inf])
     limits = JointLimits(names, low, high, *(np.ones(3) for _ in range(3)))
     goal = declare_trajectory(node, names, limits).goal
-    assert [goal[name].position for name in names] == pytest.approx([0.005, 0.05, 0.05])
+    assert [goal[name].position for name in names] == pytest.approx([0.01, 0.05, 0.05])
 
 
 def halts(arm: Arm) -> None:

@@ -21,7 +21,7 @@ RATE_RANGE = (0.1, 1000.0)
 GOAL_TOLERANCE = 0.05
 """Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
 
-GOAL_RANGE_SHARE = 0.01
+GOAL_RANGE_SHARE = 0.02
 """Share of the range of an arm's joint that the default is at most: 0.05 m is far on a slide."""
 
 GOAL_TIME = 5.0
