@@ -307,10 +307,10 @@ def test_what_is_not_allowed_is_not_there(rig: Rig) -> None:
         'capabilities:=[parameters]',
         "topic_whitelist:=['/joint_.*']",
         "param_whitelist:=['/robot.sp.*']",
-        'send_buffer_limit:=10000000',
+        'num_threads:=2',
     ) as process:
         url = url_of(process).replace(gethostname(), '127.0.0.1')
-        process.wait_for('send_buffer_limit has no effect: set message_backlog_size')
+        process.wait_for('num_threads has no effect: the node has one thread')
         with pytest.raises(InvalidStatus):
             FoxgloveClient(url.partition('?')[0])
         client = FoxgloveClient(url)

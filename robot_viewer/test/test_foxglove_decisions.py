@@ -187,6 +187,35 @@ def test_bytes_pass_both_ways_after_the_head(echo: tuple[str, int]) -> None:
     relay.close()
 
 
+def test_a_slow_client_holds_few_bytes_and_gets_every_answer() -> None:
+    """Messages of topics are left out while too much waits for it; what comes is whole."""
+    message = b'\x82\x7f' + (100_000).to_bytes(8, 'big') + b'\x01' + bytes(99_999)
+    answer = b'\x81\x05later'
+    with socket.create_server((hidden_address(), 0)) as server:
+        relay = Relay(
+            ('127.0.0.1', 0), server.getsockname(), Admission.to('127.0.0.1', ()), limit=1_000_000
+        )
+        with socket.create_connection(('127.0.0.1', relay.port), 30.0) as client:
+            client.sendall(head())
+            inner, _ = server.accept()
+            with inner:
+                inner.settimeout(30.0)
+                inner.sendall(b'HTTP/1.1 101 Switching Protocols\r\n\r\n')
+                for _ in range(1000):  # all is taken while the client reads nothing
+                    inner.sendall(message)
+                inner.sendall(answer)
+                received = bytearray()
+                while not received.endswith(answer):
+                    part = client.recv(1 << 20)
+                    assert part
+                    received += part
+        relay.close()
+    _, _, frames = bytes(received).partition(b'\r\n\r\n')
+    whole, rest = divmod(len(frames) - len(answer), len(message))
+    assert (rest, frames) == (0, message * whole + answer)
+    assert 10 <= whole < 500
+
+
 def test_a_refused_client_reads_why(echo: tuple[str, int]) -> None:
     """And reaches nothing; the relay goes on, and lets a client go when it is closed."""
     relay = Relay(('127.0.0.1', 0), echo, Admission.to('127.0.0.1', ()))

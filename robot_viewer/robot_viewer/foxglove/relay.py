@@ -3,7 +3,9 @@
 """The port of the bridge: admits a connection, then passes its bytes on to the server behind it.
 
 The server of foxglove-sdk asks nobody who connects. So it is bound to a loopback address that
-nobody can guess, and stands behind this.
+nobody can guess, and stands behind this. It limits the number of messages that wait for a slow
+client, not their bytes: a thousand images are gigabytes. So messages of topics are dropped here
+while more than a number of bytes waits for their client.
 """
 
 from __future__ import annotations
@@ -19,9 +21,15 @@ from .admission import Admission
 
 HEAD_TIMEOUT = 5.0
 """Time for the head of a request in [s]."""
+SEND_BUFFER_LIMIT = 10_000_000
+"""Bytes that may wait for a client, as of the bridge in C++."""
 MAX_HEAD = 16 * 1024
 """Its greatest size in [byte]."""
 CHUNK = 64 * 1024
+BINARY = 0x82
+"""First byte of a whole binary frame (RFC 6455, section 5.2)."""
+MESSAGE_DATA = 0x01
+"""First byte of a message of a topic (Foxglove WebSocket protocol, Message Data)."""
 
 
 def hidden_address() -> str:
@@ -42,6 +50,8 @@ class Relay:
         behind: tuple[str, int],
         admission: Admission,
         tls: ssl.SSLContext | None = None,
+        *,
+        limit: int = SEND_BUFFER_LIMIT,
     ) -> None:
         """Bind, and serve from now on.
 
@@ -50,11 +60,13 @@ class Relay:
             behind: Host and port of the server behind.
             admission: Looks at each request.
             tls: Certificate and key, where connections are encrypted.
+            limit: Number of bytes that may wait for a client.
 
         Raises:
             OSError: The address cannot be bound.
         """
         self._behind, self._admission, self._tls = behind, admission, tls
+        self._limit = limit
         self._loop = asyncio.new_event_loop()
         self._connections: set[asyncio.Task[None]] = set()
         try:
@@ -108,7 +120,7 @@ class Relay:
         try:
             inner_writer.write(head)
             there = asyncio.create_task(_pass(reader, inner_writer))
-            back = asyncio.create_task(_pass(inner_reader, writer))
+            back = asyncio.create_task(_pass_messages(inner_reader, writer, self._limit))
             try:
                 await asyncio.wait((there, back), return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -123,6 +135,31 @@ async def _pass(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
     while data := await reader.read(CHUNK):
         writer.write(data)
         await writer.drain()
+
+
+async def _pass_messages(
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limit: int
+) -> None:
+    """Pass frames of a WebSocket on; leave messages of topics out while too many bytes wait."""
+    head = await reader.readuntil(b'\r\n\r\n')
+    writer.write(head)
+    if b' 101 ' not in head.partition(b'\r\n')[0]:
+        await _pass(reader, writer)
+        return
+    while True:
+        start = await reader.readexactly(2)
+        size = start[1]
+        if size >= 126:  # the length follows in 2 or 8 bytes
+            length = await reader.readexactly(2 if size == 126 else 8)
+            start, size = start + length, int.from_bytes(length, 'big')
+        body = await reader.readexactly(size)
+        waiting = writer.transport.get_write_buffer_size()
+        of_topic = start[0] == BINARY and body[:1] == bytes([MESSAGE_DATA])
+        if of_topic and waiting and waiting + size > limit:
+            continue
+        writer.write(start + body)
+        if waiting > 2 * limit:  # of answers, none of which may be lost
+            await writer.drain()
 
 
 def _forbidden(reason: str) -> bytes:

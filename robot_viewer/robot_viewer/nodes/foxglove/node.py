@@ -104,7 +104,13 @@ class FoxgloveBridge(Node):
         admission = Admission.to(settings.address, settings.origins)
         address = (settings.address, settings.port)
         try:
-            self._relay = Relay(address, (behind, self._server.port), admission, settings.tls)
+            self._relay = Relay(
+                address,
+                (behind, self._server.port),
+                admission,
+                settings.tls,
+                limit=settings.buffer,
+            )
         except OSError as error:
             self._server.stop()
             raise BridgeError(

@@ -20,6 +20,7 @@ from node_runner import (
 from ...foxglove.admission import FOXGLOVE_ORIGINS
 from ...foxglove.assets import MESHES
 from ...foxglove.names import EVERYTHING, NameFilter, NOTHING
+from ...foxglove.relay import SEND_BUFFER_LIMIT
 
 PORT = 8765
 CLIENT_PUBLISH = 'clientPublish'
@@ -43,7 +44,6 @@ WITHOUT_EFFECT = {
     'num_threads': 'the node has one thread',
     'publish_client_count': 'clients are not counted',
     'remote_access': 'there is no remote access',
-    'send_buffer_limit': 'set message_backlog_size, which counts messages',
     'sysinfo': 'use psutil or top',
     'sysinfo_refresh_interval': 'use psutil or top',
     'sysinfo_topic': 'use psutil or top',
@@ -62,7 +62,8 @@ class Settings:
         tls: Certificate and key; None for connections that are not encrypted.
         origins: Sites whose pages may connect, besides those of this host.
         capabilities: What clients may do.
-        backlog: How many messages may wait for a slow client.
+        backlog: How many messages may wait for a slow client in the server.
+        buffer: How many bytes of messages may wait for a slow client.
         topics: Which topics are shown.
         services: Which services are offered.
         parameters: Which parameters are shown, and may be set.
@@ -79,6 +80,7 @@ class Settings:
     origins: list[str]
     capabilities: frozenset[str]
     backlog: int
+    buffer: int
     topics: NameFilter
     services: NameFilter
     parameters: NameFilter
@@ -118,6 +120,12 @@ def read_settings(node: Node) -> Settings:
         capabilities=_capabilities(read),
         backlog=read.whole(
             'message_backlog_size', 1024, (1, 2**20), 'messages that wait for a slow client'
+        ),
+        buffer=read.whole(
+            'send_buffer_limit',
+            SEND_BUFFER_LIMIT,
+            (1, 2**40),
+            'bytes that wait for a slow client; messages of topics beyond are dropped',
         ),
         topics=names('topic_whitelist', EVERYTHING, 'topics that are shown'),
         services=names('service_whitelist', EVERYTHING, 'services that may be called'),
