@@ -107,7 +107,7 @@ def test_values_out_of_range() -> None:
     query(rig, 0x04, 1)
     for node_id in (0, 128, 254):
         assert query(rig, 0x11, node_id) == b'\x11\x01' + bytes(6)
-    for table, rate, error in ((0, 0, 0), (0, 8, 0), (0, 5, 1), (0, 9, 1), (1, 0, 1)):
+    for table, rate, error in ((0, 0, 0), (0, 8, 0), (0, 5, 0), (0, 9, 1), (1, 0, 1)):
         assert query(rig, 0x13, table, rate) == bytes((0x13, error)) + bytes(6)
 
 
