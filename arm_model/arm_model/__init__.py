@@ -5,6 +5,12 @@
 A :class:`RobotModel` is made of URDF, SRDF and limits; a :class:`RobotState` says how its joints
 move; a :class:`PlanningScene` holds what may collide, :class:`Clearances` measures it.
 :mod:`arm_model.ros` brings a model from parameters, and frames of TF.
+
+Conventions: joint vectors (n) are in the order of the group's joints in [rad], of joints that
+slide in [m]; velocities, accelerations and jerks in their units per [s], [s2] and [s3]. Poses of a
+:class:`RobotModel` are in its base link, those of a scene in the root link. Quaternions are x, y,
+z, w; twists linear before angular. ``now`` and all times are on the steady clock in [s].
+``folder`` is that of the URDF, where relative names of mesh files begin.
 """
 
 from __future__ import annotations

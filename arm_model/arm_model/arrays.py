@@ -15,22 +15,13 @@ from .exceptions import CommandError
 Array = NDArray[np.float64]
 """Numbers in double precision; the shape stands in the docstring of each use."""
 
-Places = NDArray[np.int_]
-"""Numbers of rows, from 0."""
-
-Mask = NDArray[np.bool_]
-"""Yes or no for each joint or axis."""
-
-Native = Any
-"""An object of a library that has no types."""
+Places = NDArray[np.int_]  # numbers of rows, from 0
+Mask = NDArray[np.bool_]  # yes or no for each joint or axis
+Native = Any  # an object of a library that has no types
 
 
 def frozen(values: Sequence[float] | Array) -> Array:
-    """Return a read-only copy.
-
-    Args:
-        values: The numbers.
-    """
+    """Return a read-only copy."""
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
@@ -42,7 +33,6 @@ def checked(values: Sequence[float] | Array, length: int, what: str) -> Array:
     Args:
         values: The numbers, from outside.
         length: How many there must be.
-        what: What they are, for the message.
 
     Raises:
         CommandError: The count is wrong, or a number is not finite.

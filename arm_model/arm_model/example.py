@@ -11,17 +11,11 @@ FOLDER = Path(__file__).with_name('panda')
 
 
 class ArmFiles(NamedTuple):
-    """The files of an arm, in the order of :meth:`.RobotModel.from_files`.
+    """The files of an arm, in the order of :meth:`.RobotModel.from_files`."""
 
-    Attributes:
-        urdf: The description.
-        srdf: Groups, named poses, pairs of links that may touch.
-        limits: Limits of the joints, in the format of MoveIt's joint_limits.yaml.
-    """
-
-    urdf: Path
-    srdf: Path
-    limits: Path
+    urdf: Path  # the description
+    srdf: Path  # groups, named poses, pairs of links that may touch
+    limits: Path  # limits of the joints, in the format of MoveIt's joint_limits.yaml
 
 
 def example_files() -> ArmFiles:

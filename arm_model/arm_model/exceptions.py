@@ -96,11 +96,7 @@ def description_refused(place: str = '') -> Iterator[None]:
 
 @contextmanager
 def limits_refused(path: Path | str) -> Iterator[None]:
-    """Name the limits file in what is wrong with it.
-
-    Args:
-        path: The file.
-    """
+    """Name the limits file in what is wrong with it."""
     try:
         yield
     except LimitsError as error:

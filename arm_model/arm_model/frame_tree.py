@@ -11,8 +11,7 @@ import numpy as np
 
 from .pose import combined, inverse, Pose
 
-TRANSFORM_TIMEOUT = 1.0
-"""Age at which a transform of /tf counts no more in [s]."""
+TRANSFORM_TIMEOUT = 1.0  # age at which a transform of /tf counts no more in [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,14 +25,12 @@ class FrameTree:
     """The newest transforms of /tf and /tf_static."""
 
     def __init__(self) -> None:
-        """Know no frame."""
         self._links: dict[str, _Link] = {}
 
     def learn(self, child: str, parent: str, pose: Pose, time: float) -> None:
         """Take a transform.
 
         Args:
-            child: Name of a frame.
             parent: Name of the frame in which its pose is given.
             pose: Its pose.
             time: Steady time of its arrival in [s]; infinity for a static one.
@@ -41,23 +38,12 @@ class FrameTree:
         self._links[child] = _Link(parent, pose, time)
 
     def age(self, frame: str, now: float) -> float:
-        """Return how old the newest transform of a frame is in [s]; infinity where it has none.
-
-        Args:
-            frame: Name of the frame.
-            now: Steady time in [s].
-        """
+        """Return how old the newest transform of a frame is in [s]; infinity where it has none."""
         link = self._links.get(frame)
         return math.inf if link is None else max(now - link.time, 0.0)
 
     def pose(self, frame: str, base: str, now: float) -> Pose | None:
-        """Return the pose of a frame in another; None where they are not connected.
-
-        Args:
-            frame: Name of the frame.
-            base: Name of the other.
-            now: Steady time in [s].
-        """
+        """Return the pose of a frame in another; None where they are not connected."""
         up, over = self._to_root(frame, now), self._to_root(base, now)
         for name, pose in up.items():
             if name in over:

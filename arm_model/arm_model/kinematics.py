@@ -21,25 +21,20 @@ from .pose import Pose
 CONTINUOUS_BOUND = 1e9
 """Range that a continuous joint is given in [rad], so that its position is one plain angle."""
 
-LINK = 'link '
-"""What the frame of a link is called in pinocchio, before the name of the link."""
+LINK = 'link '  # what the frame of a link is called in pinocchio, before the name of the link
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RelativeMotion:
-    """How the joints between two bodies move them against each other.
+    """How the joints between two bodies move them against each other."""
 
-    Attributes:
-        sign: Sense in which each joint moves the second body against the first: 1, -1, or 0 for
-            a joint that is not between them.
-        rate: How far each joint moves a point of the first at most in [m/rad], less the extent
-            of the first where the joint turns.
-        turning: The joints between them that turn.
-    """
-
+    # sense in which each joint moves the second body against the first: 1, -1, or 0 for a joint
+    # that is not between them
     sign: Array
+    # how far each joint moves a point of the first at most in [m/rad], less the extent of the
+    # first where the joint turns
     rate: Array
-    turning: Mask
+    turning: Mask  # the joints between them that turn
 
 
 class Kinematics:
@@ -63,7 +58,6 @@ class Kinematics:
         """Build.
 
         Args:
-            tree: The description.
             group: Joints that move; the others stand at 0, or at the limit next to it, until
                 :meth:`with_others` says where.
 
@@ -123,19 +117,11 @@ class Kinematics:
         return moved
 
     def of_joints(self, joints: Sequence[str]) -> Kinematics:
-        """Return the robot with other joints moving; those that move in neither stay.
-
-        Args:
-            joints: Joints that move.
-        """
+        """Return the robot with other joints moving; those that move in neither stay."""
         return Kinematics(self._tree, joints).with_others(self.others)
 
     def expanded(self, positions: Array) -> Array:
-        """Return the positions of all columns.
-
-        Args:
-            positions: Positions of the joints of the group in [rad].
-        """
+        """Return the positions of all columns."""
         if self._plain:
             return positions
         expanded: Array = self._factors @ positions + self._offsets
@@ -150,12 +136,7 @@ class Kinematics:
         return columns if self._plain else columns @ np.abs(self._factors)
 
     def link_pose(self, link: str, positions: Array) -> Pose:
-        """Return the pose of a link in the root link; not for a cycle.
-
-        Args:
-            link: The link.
-            positions: Joint positions in [rad].
-        """
+        """Return the pose of a link in the root link; not for a cycle."""
         data = self.native.createData()
         pin.forwardKinematics(self.native, data, self.expanded(np.asarray(positions, dtype=float)))
         placement = pin.updateFramePlacement(self.native, data, self.frames[link])

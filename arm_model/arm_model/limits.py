@@ -46,16 +46,12 @@ KEYS = {
 
 DEFAULT_VELOCITY, DEFAULT_SLIDING_VELOCITY = 1.0, 0.1
 """Velocity where description and limits file have none, or 0, in [rad/s] and in [m/s]."""
-DEFAULT_ACCELERATION = 1.0
-"""Acceleration where the limits file has none in [rad/s2], as in MoveIt."""
+DEFAULT_ACCELERATION = 1.0  # acceleration where the limits file has none in [rad/s2], as in MoveIt
 DEFAULT_JERK_RATIO = 10.0
 """Jerk over acceleration where the limits file has no jerk in [1/s]: 0.1 s to the full one."""
 
-TURN = 2.0 * math.pi
-"""A whole turn in [rad]."""
-
-ROUNDING_TOLERANCE = 1e-3
-"""How much a limit may exceed the description's for rounding, as a share."""
+TURN = 2.0 * math.pi  # a whole turn in [rad]
+ROUNDING_TOLERANCE = 1e-3  # how much a limit may exceed the description's for rounding, as a share
 
 _Row = tuple[float, float, float, float, float]
 """Lower, upper, velocity, acceleration and jerk of a joint."""
@@ -75,23 +71,14 @@ KNOWN_KEYS = frozenset(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLimits:
-    """Limits of every joint of a group, in its order; radians or metres.
+    """Limits of every joint of a group, in its order; radians or metres."""
 
-    Attributes:
-        names: Names of the joints.
-        lower: Least positions in [rad]; minus infinity for a continuous joint.
-        upper: Greatest positions in [rad]; infinity for a continuous joint.
-        velocity: Greatest speeds in [rad/s].
-        acceleration: Greatest accelerations in [rad/s2].
-        jerk: Greatest jerks in [rad/s3].
-    """
-
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
+    names: tuple[str, ...]  # names of the joints
+    lower: Array  # least positions in [rad]; minus infinity for a continuous joint
+    upper: Array  # greatest positions in [rad]; infinity for a continuous joint
+    velocity: Array  # greatest speeds in [rad/s]
+    acceleration: Array  # greatest accelerations in [rad/s2]
+    jerk: Array  # greatest jerks in [rad/s3]
 
     def __len__(self) -> int:
         """Return the number of joints."""
@@ -112,7 +99,6 @@ class JointLimits:
         """Return positions, those of continuous joints in the turn that is nearest to a seed.
 
         Args:
-            positions: Positions in [rad].
             seed: Positions in [rad].
         """
         return np.where(self.continuous, seed + self.error(positions, seed), positions)
@@ -126,9 +112,6 @@ class JointLimits:
 
 def load_limits(path: Path | str) -> Mapping[str, Any]:
     """Read the ``joint_limits`` of a limits file.
-
-    Args:
-        path: The file.
 
     Raises:
         LimitsError: The file cannot be read, or has no table ``joint_limits``.
@@ -149,9 +132,6 @@ def merge_limits(
     """Join a description's ranges with the table of a limits file.
 
     Args:
-        names: The joints of the group, in its order.
-        tree: The description.
-        table: The limits file's entries by joint; others than the group's are passed over.
         notes: Gets a line for each kind of limit that has a default, with the joints.
 
     Raises:

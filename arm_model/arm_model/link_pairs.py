@@ -22,25 +22,17 @@ from .scene.planning_scene import PlanningScene
 
 @dataclass(frozen=True, slots=True)
 class LinkPairs:
-    """Pairs of links that have collision shapes.
+    """Pairs of links that have collision shapes."""
 
-    Attributes:
-        adjacent: Pairs that a joint connects.
-        fixed: Other pairs that no joint moves against each other.
-        shares: Share of the drawn poses in which the links touch, by every other pair.
-        least: Least distance in [m] that was found, by the same pairs; negative for an overlap.
-        samples: Number of poses that were drawn, evenly over the ranges of all joints.
-        searched: Poses that were tried besides for each pair that never touched.
-        notes: What was passed over in the description, in words.
-    """
-
-    adjacent: frozenset[Pair]
-    fixed: frozenset[Pair]
+    adjacent: frozenset[Pair]  # pairs that a joint connects
+    fixed: frozenset[Pair]  # other pairs that no joint moves against each other
+    # share of the drawn poses in which the links touch, by every other pair
     shares: Mapping[Pair, float]
+    # least distance in [m] that was found, by the same pairs; negative for an overlap
     least: Mapping[Pair, float]
-    samples: int
-    searched: int
-    notes: tuple[str, ...]
+    samples: int  # number of poses that were drawn, evenly over the ranges of all joints
+    searched: int  # poses that were tried besides for each pair that never touched
+    notes: tuple[str, ...]  # what was passed over in the description, in words
 
     @property
     def always(self) -> frozenset[Pair]:
@@ -57,9 +49,7 @@ def sample_link_pairs(urdf: str, samples: int, folder: Path | None = None) -> Li
     """Find out which links of a robot touch always, at times and never.
 
     Args:
-        urdf: Robot description as XML text.
         samples: Number of poses to be drawn.
-        folder: Folder of the URDF, where names of mesh files are relative.
 
     Raises:
         ModelError: The description makes no robot.

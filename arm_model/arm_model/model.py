@@ -32,8 +32,7 @@ from .scene.default_collisions import with_default_collisions
 from .scene.link_shapes import link_shapes
 from .scene.planning_scene import PlanningScene
 
-MIN_REACH = 0.01
-"""Reach of a group that is shorter, such as a finger that slides, in [m]."""
+MIN_REACH = 0.01  # reach of a group that is shorter, such as a finger that slides, in [m]
 
 
 class RobotModel:
@@ -76,12 +75,9 @@ class RobotModel:
         """Build and check the arm.
 
         Args:
-            urdf: Robot description as XML text.
-            srdf: Semantic description as XML text.
             limits: The table ``joint_limits`` of a limits file.
             group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
-            folder: Folder of the URDF, where names of mesh files are relative.
             moved_by_others: Joints of other groups that move by themselves, by group: links that
                 they move against each other are not checked, until a scene says where they are.
 
@@ -144,8 +140,6 @@ class RobotModel:
         """Build an arm from its files; meshes with relative names lie beside the URDF.
 
         Args:
-            urdf: Robot description.
-            srdf: Semantic description.
             limits: Limits of the joints, as MoveIt's joint_limits.yaml has them.
             group: As in the constructor.
             tip: As in the constructor.
@@ -214,7 +208,6 @@ class RobotModel:
         """Return the pose of a link in the base link.
 
         Args:
-            positions: Joint positions in [rad].
             link: Name of the link; by default the tip.
 
         Raises:
@@ -226,11 +219,7 @@ class RobotModel:
         return Pose(placement.rotation.copy(), placement.translation.copy())
 
     def jacobian(self, positions: Array) -> Array:
-        """Return the Jacobian of the tip (6, n), expressed in the base link.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return the Jacobian of the tip (6, n), expressed in the base link."""
         self._update(positions)
         world = pin.getFrameJacobian(
             self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -239,11 +228,7 @@ class RobotModel:
         return turned_twists(rotation, self.kinematics.projected(world))
 
     def lowest(self, positions: Array) -> float:
-        """Return the least height of a joint or the tip over the base link in [m], along its z.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return the least height of a joint or the tip over the base link in [m], along its z."""
         self._update(positions)
         base = self._placement(self._base_frame)
         places = [self._data.oMi[joint].translation for joint in self._trunk()]
@@ -254,7 +239,6 @@ class RobotModel:
         """Return the nearest pairs of shapes with the gradients of their distances.
 
         Args:
-            positions: Joint positions in [rad].
             within: Greatest distance of interest in [m].
             count: How many pairs at most.
         """
@@ -264,7 +248,6 @@ class RobotModel:
         """Return the least distance between two shapes in [m]; infinity when none are checked.
 
         Args:
-            positions: Joint positions in [rad].
             within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
         distances = self._clearances.least(positions, within)
@@ -296,11 +279,7 @@ class RobotModel:
         return self._clearances.apart(lower, upper, within)
 
     def clearances(self, scene: PlanningScene | None = None) -> Clearances:
-        """Return what measures distances for another thread than the owner's.
-
-        Args:
-            scene: What to measure; by default the present one.
-        """
+        """Return what measures distances for another thread than the owner's."""
         return Clearances(self.scene if scene is None else scene)
 
     def use_scene(self, clearances: Clearances) -> None:
@@ -318,9 +297,6 @@ class RobotModel:
 
     def check_scene(self, scene: PlanningScene) -> None:
         """Make sure that a scene is of this group.
-
-        Args:
-            scene: The scene.
 
         Raises:
             SceneError: It is of another group or robot.

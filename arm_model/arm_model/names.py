@@ -13,17 +13,11 @@ from .exceptions import description_refused
 
 @dataclass(frozen=True, slots=True)
 class ArmNames:
-    """What an arm's parts are called; empty for what is not known.
+    """What an arm's parts are called; empty for what is not known."""
 
-    Attributes:
-        joints: The joints, from the base to the tool.
-        base: The base link.
-        tool: The tool link.
-    """
-
-    joints: tuple[str, ...] = ()
-    base: str = ''
-    tool: str = ''
+    joints: tuple[str, ...] = ()  # the joints, from the base to the tool
+    base: str = ''  # the base link
+    tool: str = ''  # the tool link
 
 
 @description_refused()
@@ -31,9 +25,7 @@ def names_of(urdf: str, srdf: str = '', group: str = '', tip: str = '') -> ArmNa
     """Find the names of an arm.
 
     Args:
-        urdf: Robot description as XML text.
         srdf: Semantic description as XML text; without it, the arm is the longest chain.
-        group: Group of the SRDF; by default its first arm.
         tip: The tool link; by default the end of the chain.
 
     Raises:

@@ -14,8 +14,7 @@ import pinocchio as pin
 from .arrays import Array, frozen
 from .exceptions import CommandError
 
-UNIT_LENGTH_TOLERANCE = 1e-3
-"""How far the length of a quaternion may be off."""
+UNIT_LENGTH_TOLERANCE = 1e-3  # how far the length of a quaternion may be off
 
 ROUNDING_TOLERANCE = 1e-9
 """How far numbers of equal poses may be apart, which come from different products."""
@@ -23,15 +22,10 @@ ROUNDING_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Position and orientation of a frame in another.
+    """Position and orientation of a frame in another."""
 
-    Attributes:
-        rotation: Rotation matrix (3, 3), from the frame to the other.
-        position: Origin of the frame in the other in [m].
-    """
-
-    rotation: Array
-    position: Array
+    rotation: Array  # rotation matrix (3, 3), from the frame to the other
+    position: Array  # origin of the frame in the other in [m]
 
     def is_close(self, other: Pose) -> bool:
         """Whether another pose is the same but for rounding."""
@@ -41,8 +35,7 @@ class Pose:
         )
 
 
-ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))
-"""Where a frame is in itself."""
+ORIGIN = Pose(frozen(np.eye(3)), frozen(np.zeros(3)))  # where a frame is in itself
 
 
 def combined(outer: Pose, inner: Pose) -> Pose:

@@ -24,33 +24,20 @@ from .arrays import Array, frozen
 from .exceptions import ModelError
 from .model import RobotModel
 
-PREFERRED = 'ready'
-"""Pose of the SRDF that is taken without a question."""
-
-SAMPLES = 1500
-"""Poses that are tried."""
-
-SEED = 0
-"""Of the poses: the same robot has the same pose each time."""
-
-GOOD_CLEARANCE = 0.05
-"""Distance of links that is enough in [m]."""
+PREFERRED = 'ready'  # pose of the SRDF that is taken without a question
+SAMPLES = 1500  # poses that are tried
+SEED = 0  # of the poses: the same robot has the same pose each time
+GOOD_CLEARANCE = 0.05  # distance of links that is enough in [m]
 
 MIN_QUALITY = 0.02
 """Quality of a pose of the SRDF at least: it is taken before any that is searched for."""
 
-BELOW = 0.01
-"""Share of its quality that a pose below the mounting plane has."""
-
-DECIMALS = 2
-"""Places of the numbers that are found: somebody copies them into an SRDF."""
+BELOW = 0.01  # share of its quality that a pose below the mounting plane has
+DECIMALS = 2  # places of the numbers that are found: somebody copies them into an SRDF
 
 
 def start_pose(model: RobotModel) -> Array:
     """Return a pose to start from: ``ready``, another good one of the SRDF, or one that is found.
-
-    Args:
-        model: The arm.
 
     Raises:
         ModelError: No pose was found that is free and not singular.
@@ -77,8 +64,6 @@ def pose_quality(model: RobotModel, positions: Array, least: float = 0.0) -> flo
     """Return how good a pose is to start from: 0 for a singular, colliding or extreme one.
 
     Args:
-        model: The arm.
-        positions: Joint positions in [rad].
         least: Quality of interest: where it cannot be more, distances are not measured.
     """
     quality = _room(model, positions) * _dexterity(model, positions)

@@ -14,25 +14,15 @@ from .arrays import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotState:
-    """State of motion of every joint.
+    """State of motion of every joint."""
 
-    Attributes:
-        position: Positions in [rad].
-        velocity: Velocities in [rad/s].
-        acceleration: Accelerations in [rad/s2].
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  # positions in [rad]
+    velocity: Array  # velocities in [rad/s]
+    acceleration: Array  # accelerations in [rad/s2]
 
     @classmethod
     def at_rest(cls, position: Sequence[float] | Array) -> RobotState:
-        """Return the state of standing still.
-
-        Args:
-            position: Positions in [rad].
-        """
+        """Return the state of standing still."""
         zero = np.zeros(len(position))
         return cls(frozen(position), frozen(zero), frozen(zero))
 

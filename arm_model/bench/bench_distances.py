@@ -26,11 +26,8 @@ from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
 from arm_model import Box, Clearances, CollisionObject, load_limits, Pose, RobotModel
 
-CYCLE = 0.001
-"""Period of the cycle in [s]."""
-
-SPEED = 2.0
-"""Of each joint in [rad/s]."""
+CYCLE = 0.001  # period of the cycle in [s]
+SPEED = 2.0  # of each joint in [rad/s]
 
 CYCLES, POSES = 4000, 500
 

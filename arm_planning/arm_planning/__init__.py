@@ -4,6 +4,11 @@
 
 A :class:`Planner` plans: a :class:`MotionRequest` goes in, a :class:`MotionPlan` comes out, or a
 :class:`PlanningError` with MoveIt's code and the reason in words.
+
+Conventions: joint vectors (n) are in the order of the group's joints in [rad], of joints that
+slide in [m]; where all joints of the robot are meant, ``positions`` are by name. Places on a path
+are rows (m, n). Poses are in the root link. Times and durations are in [s], factors of velocity
+and acceleration above 0 and at most 1.
 """
 
 from __future__ import annotations

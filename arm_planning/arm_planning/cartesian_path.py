@@ -39,26 +39,17 @@ from .industrial.timing import FullSpeedPath, timed
 MIN_STEPS_FOR_JUMPS = 10
 """Steps of a path at least for which a jump is judged by the mean step, as in MoveIt."""
 
-MAX_STEPS = 100_000
-"""Places on a path at most."""
-
-ROTATION_STEP = 0.05
-"""Greatest rotation between two places in [rad], where the way says less."""
+MAX_STEPS = 100_000  # places on a path at most
+ROTATION_STEP = 0.05  # greatest rotation between two places in [rad], where the way says less
 
 
 @dataclass(frozen=True, slots=True)
 class JumpThresholds:
-    """What counts as a jump of the joints between two places; 0 does not look.
+    """What counts as a jump of the joints between two places; 0 does not look."""
 
-    Attributes:
-        relative: Times the mean step of the path, in joint space.
-        revolute: Greatest step of a joint that turns in [rad].
-        prismatic: Greatest step of a joint that slides in [m].
-    """
-
-    relative: float = 0.0
-    revolute: float = 0.0
-    prismatic: float = 0.0
+    relative: float = 0.0  # times the mean step of the path, in joint space
+    revolute: float = 0.0  # greatest step of a joint that turns in [rad]
+    prismatic: float = 0.0  # greatest step of a joint that slides in [m]
 
     def __post_init__(self) -> None:
         """Refuse thresholds that are none."""
@@ -73,17 +64,11 @@ class JumpThresholds:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CartesianPath:
-    """Joint positions along way-points.
+    """Joint positions along way-points."""
 
-    Attributes:
-        positions: Joint positions in [rad] (k, n), the start among them.
-        fraction: Share of the way that they lead, from 0 to 1.
-        reason: Why they end there, in words; empty where they lead to the end.
-    """
-
-    positions: Array
-    fraction: float
-    reason: str
+    positions: Array  # joint positions in [rad] (k, n), the start among them
+    fraction: float  # share of the way that they lead, from 0 to 1
+    reason: str  # why they end there, in words; empty where they lead to the end
 
 
 def cartesian_path(
@@ -100,8 +85,6 @@ def cartesian_path(
     """Return joint positions along straight lines through way-points.
 
     Args:
-        model: The arm.
-        start: Joint positions to begin at in [rad] (n).
         waypoints: Poses of the link in the root link.
         max_step: Greatest way of the link between two places in [m].
         link: The link; empty for the tip.
@@ -147,7 +130,6 @@ def timed_rows(rows: Array, limits: JointLimits) -> Path:
 
     Args:
         rows: Joint positions in [rad] (k, n), as dense as the path is to be close to the lines.
-        limits: Limits of the joints, scaled.
     """
     steps = np.diff(rows, axis=0)
     lasts = (np.abs(steps) / limits.velocity).max(axis=1)

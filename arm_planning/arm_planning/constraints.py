@@ -42,46 +42,31 @@ from .requests import (
 )
 from .validity import Violation
 
-TOLERANCE = 1e-6
-"""Rounding beyond a constraint that is let pass in [rad] and [m]."""
+TOLERANCE = 1e-6  # rounding beyond a constraint that is let pass in [rad] and [m]
 
 
-STEP = 4e-3
-"""Turn of all joints together between two looks at a path in [rad] or [m]."""
+STEP = 4e-3  # turn of all joints together between two looks at a path in [rad] or [m]
 
 LEAST_ROOMS = 4.0
 """Width of a constraint that a path can be kept in, in what may happen between two looks."""
 
-WIDEST = 0.1
-"""Half width beyond which the share of a constraint grows no more, in [rad] or [m]."""
-
-COARSE_LOOKS = 2000
-"""Looks at a path by which the others are laid out."""
-
-INNER = 0.8
-"""Share of a constraint into which a state is led that broke it."""
+WIDEST = 0.1  # half width beyond which the share of a constraint grows no more, in [rad] or [m]
+COARSE_LOOKS = 2000  # looks at a path by which the others are laid out
+INNER = 0.8  # share of a constraint into which a state is led that broke it
 
 STEEPEST = 0.5 * np.pi - 0.01
 """Second of three Euler angles up to which the others are distinguished in [rad]."""
 
-MAX_ITERATIONS = 12
-"""Newton steps at most."""
-
-DAMPING = 1e-3
-"""Of the steps, for rows of which the joints can move one with another only."""
+MAX_ITERATIONS = 12  # newton steps at most
+DAMPING = 1e-3  # of the steps, for rows of which the joints can move one with another only
 
 
 @dataclass(frozen=True, slots=True)
 class ConstraintResult:
-    """What became of one constraint in a state.
+    """What became of one constraint in a state."""
 
-    Attributes:
-        violation: What is wrong, in words; empty where it is heeded.
-        distance: How far the state is beyond it, in [rad] or [m]; 0 where it is heeded.
-    """
-
-    violation: str
-    distance: float
+    violation: str  # what is wrong, in words; empty where it is heeded
+    distance: float  # how far the state is beyond it, in [rad] or [m]; 0 where it is heeded
 
 
 HEEDED = ConstraintResult('', 0.0)
@@ -89,21 +74,13 @@ HEEDED = ConstraintResult('', 0.0)
 
 @dataclass(frozen=True, slots=True)
 class _Rows:
-    """Functions of the joint positions, and between what they are to be.
+    """Functions of the joint positions, and between what they are to be."""
 
-    Attributes:
-        values: In [rad] or [m] (k).
-        lower: Least values (k).
-        upper: Greatest values (k).
-        gradients: By the joint positions (k, n).
-        room: How far a value changes between a look at a path and the middle to the next.
-    """
-
-    values: Array
-    lower: Array
-    upper: Array
-    gradients: Array
-    room: float
+    values: Array  # in [rad] or [m] (k)
+    lower: Array  # least values (k)
+    upper: Array  # greatest values (k)
+    gradients: Array  # by the joint positions (k, n)
+    room: float  # how far a value changes between a look at a path and the middle to the next
 
     @property
     def beyond(self) -> float:
@@ -135,7 +112,6 @@ class ConstraintCheck:
         """Prepare.
 
         Args:
-            model: The arm.
             *constraints: What must hold, all of it.
 
         Raises:
@@ -150,37 +126,24 @@ class ConstraintCheck:
         self._links = {name: LinkKinematics(model, name) for name in names}
 
     def violated(self, positions: Array) -> str:
-        """Return what a state violates first, in words; empty for nothing.
-
-        Args:
-            positions: Joint positions in [rad] (n).
-        """
+        """Return what a state violates first, in words; empty for nothing."""
         violations = (each.violation for each in self.results(positions))
         return next(filter(None, violations), '')
 
     def results(self, positions: Array) -> Iterator[ConstraintResult]:
-        """Yield what becomes of each constraint: of joints, orientations, then positions.
-
-        Args:
-            positions: Joint positions in [rad] (n).
-        """
+        """Yield what becomes of each constraint: of joints, orientations, then positions."""
         for rows, words in self._all(positions):
             beyond = rows.beyond
             yield ConstraintResult(words(), beyond) if beyond > TOLERANCE else HEEDED
 
     def heeds(self, positions: Array) -> bool:
-        """Whether all constraints hold, and go on to hold until the next look at a path.
-
-        Args:
-            positions: Joint positions in [rad] (n).
-        """
+        """Whether all constraints hold, and go on to hold until the next look at a path."""
         return not any(rows.excess(1.0, 1.0).any() for rows, _ in self._all(positions))
 
     def projected(self, positions: Array, *, rooms: float = 1.0) -> Array | None:
         """Return a state that heeds the constraints near one that may not; None for none.
 
         Args:
-            positions: Joint positions in [rad] (n).
             rooms: 1 for states of a path, 0 for one that nothing follows.
         """
         state = positions
@@ -200,7 +163,6 @@ class ConstraintCheck:
         """Return where a path breaks a constraint first; None for nowhere.
 
         Args:
-            path: The path.
             at_looks: Constraints need not hold between two looks, as where one is held exactly
                 by a line.
         """

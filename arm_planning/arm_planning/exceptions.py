@@ -66,7 +66,6 @@ class PlanningError(ArmError):
 
         Args:
             code: What MoveIt reports for it.
-            reason: What is wrong, and the remedy.
         """
         super().__init__(reason)
         self.code = code

@@ -18,8 +18,7 @@ from .ik.link_kinematics import LinkKinematics
 SAMPLES = 200
 """Places at which the speed is looked at, and again between the two beside the greatest."""
 
-MARGIN = 1.001
-"""Factor of the time, for what is between two places."""
+MARGIN = 1.001  # factor of the time, for what is between two places
 
 
 def speed_limited(path: Path, link: LinkKinematics, most: float) -> tuple[Path, tuple[str, ...]]:
@@ -28,8 +27,6 @@ def speed_limited(path: Path, link: LinkKinematics, most: float) -> tuple[Path, 
     The places of the path stay the same.
 
     Args:
-        path: The path.
-        link: The link.
         most: Its greatest speed in [m/s]; 0 for no limit.
 
     Raises:
@@ -55,7 +52,6 @@ def slower(path: Path, factor: float) -> Path:
     """Return the same path with more time everywhere.
 
     Args:
-        path: The path.
         factor: How many times the time.
     """
     powers = (factor ** -np.arange(6.0))[:, None]

@@ -47,14 +47,9 @@ FREE_MOTION = ('RRTConnectkConfigDefault', 'RRTConnect', 'geometric::RRTConnect'
 GOAL_SAMPLES = 60
 """States that are led into the tolerances of a goal which cannot be reached itself, at most."""
 
-IK_SOLUTIONS = 4
-"""Solutions of inverse kinematics that are goals of a free motion at most."""
-
-CANCELED = 'canceled while it was planned'
-"""Why a plan was not found."""
-
-DEFAULT_PLANNER = FREE_MOTION[0]
-"""What plans a request without a planner_id."""
+IK_SOLUTIONS = 4  # solutions of inverse kinematics that are goals of a free motion at most
+CANCELED = 'canceled while it was planned'  # why a plan was not found
+DEFAULT_PLANNER = FREE_MOTION[0]  # what plans a request without a planner_id
 
 
 class Planner:
@@ -90,7 +85,6 @@ class Planner:
         """Return a motion that is valid everywhere.
 
         Args:
-            request: What is asked for.
             scene: What may collide; by default that of the model.
             is_canceled: Whether the plan is canceled, which ends a search at once.
 
@@ -159,7 +153,6 @@ class Planner:
         """Return why the arm may not be somewhere; None where it may.
 
         Args:
-            positions: Joint positions in [rad] (n).
             scene: What may collide; by default that of the model.
 
         Raises:
@@ -172,7 +165,6 @@ class Planner:
         """Return the pose of a link in the root link.
 
         Args:
-            positions: Joint positions in [rad] (n).
             link: The link; empty for the tip.
 
         Raises:
@@ -258,15 +250,7 @@ class Planner:
         constraints: ConstraintCheck | None,
         left: Callable[[], float],
     ) -> list[Array]:
-        """Return the states of all goals that are valid, or raise what is wrong with the first.
-
-        Args:
-            request: What is asked for.
-            start: Where it begins.
-            check: Measures in the scene.
-            constraints: Path constraints; None for none.
-            left: Returns how much time is left in [s]; raises PlanningError when canceled.
-        """
+        """Return the states of all goals that are valid, or raise what is wrong with the first."""
         found: list[Array] = []
         for goal in request.goals:
             if left() < 0.0:
@@ -444,7 +428,6 @@ def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningErro
     """Return the refusal of a planner that there is not.
 
     Args:
-        planner_id: The planner by a request's name.
         planner_ids: Names of the planners of free motion.
     """
     known = ', '.join((*planner_ids, *PLANNER_IDS))

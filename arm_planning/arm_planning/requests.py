@@ -17,20 +17,15 @@ import numpy as np
 from arm_model import Array, frozen, PlacedShape, Pose
 from arm_trajectory import Path
 
-DEFAULT_TIMEOUT = 5.0
-"""Time for planning in [s], as MoveGroupInterface has it."""
+DEFAULT_TIMEOUT = 5.0  # time for planning in [s], as MoveGroupInterface has it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointGoal:
-    """A goal in joint space.
+    """A goal in joint space."""
 
-    Attributes:
-        positions: Joint positions in [rad] (n).
-        tolerance: How far each may be off in [rad] (n); empty for exactly there.
-    """
-
-    positions: Array
+    positions: Array  # joint positions in [rad] (n)
+    # how far each may be off in [rad] (n); empty for exactly there
     tolerance: Array = field(default_factory=lambda: frozen(np.zeros(0)))
 
 
@@ -43,70 +38,48 @@ class Parameterization(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrientationConstraint:
-    """How a link is to be turned.
+    """How a link is to be turned."""
 
-    Attributes:
-        link: The link; empty for the tip.
-        rotation: Rotation matrix (3, 3) from the link that is wanted to the root link.
-        tolerance: Greatest angles about the wanted axes in [rad] (3); pi and more is any angle.
-        parameterization: Which angles these are.
-        in_link: Rotation matrix (3, 3) to the link of the body or subframe that is turned so.
-    """
-
-    link: str
-    rotation: Array
+    link: str  # the link; empty for the tip
+    rotation: Array  # rotation matrix (3, 3) from the link that is wanted to the root link
+    # greatest angles about the wanted axes in [rad] (3); pi and more is any angle
     tolerance: Array
-    parameterization: Parameterization = Parameterization.ROTATION_VECTOR
+    parameterization: Parameterization = Parameterization.ROTATION_VECTOR  # which angles these are
+    # rotation matrix (3, 3) to the link of the body or subframe that is turned so
     in_link: Array = field(default_factory=lambda: frozen(np.eye(3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionConstraint:
-    """Where a point of a link is to be.
+    """Where a point of a link is to be."""
 
-    Attributes:
-        link: The link; empty for the tip.
-        offset: The point in the link in [m] (3).
-        regions: Boxes, spheres, cylinders and cones in the root link, one of which holds it.
-    """
-
-    link: str
-    offset: Array
+    link: str  # the link; empty for the tip
+    offset: Array  # the point in the link in [m] (3)
+    # boxes, spheres, cylinders and cones in the root link, one of which holds it
     regions: Sequence[PlacedShape]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathConstraints:
-    """What holds everywhere on a path.
+    """What holds everywhere on a path."""
 
-    Attributes:
-        joints: Least and greatest position in [rad], by joint.
-        orientations: How links are turned.
-        positions: Where points of links are.
-    """
-
+    # least and greatest position in [rad], by joint
     joints: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    orientations: Sequence[OrientationConstraint] = ()
-    positions: Sequence[PositionConstraint] = ()
+    orientations: Sequence[OrientationConstraint] = ()  # how links are turned
+    positions: Sequence[PositionConstraint] = ()  # where points of links are
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseGoal:
-    """A goal for a link.
+    """A goal for a link."""
 
-    Attributes:
-        pose: Where the link is to be, in the root link.
-        link: The link; empty for the tip.
-        tolerances: What is enough where that cannot be reached; None for the pose alone.
-    """
-
-    pose: Pose
-    link: str = ''
+    pose: Pose  # where the link is to be, in the root link
+    link: str = ''  # the link; empty for the tip
+    # what is enough where that cannot be reached; None for the pose alone
     tolerances: PathConstraints | None = None
 
 
-Goal = JointGoal | PoseGoal
-"""What a motion is to reach."""
+Goal = JointGoal | PoseGoal  # what a motion is to reach
 
 
 class CircPointKind(str, Enum):
@@ -118,60 +91,34 @@ class CircPointKind(str, Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CircPoint:
-    """The point that makes a circle of a start and a goal.
+    """The point that makes a circle of a start and a goal."""
 
-    Attributes:
-        kind: A point on the arc, or its center.
-        position: The point in the root link in [m] (3).
-    """
-
-    kind: CircPointKind
-    position: Array
+    kind: CircPointKind  # a point on the arc, or its center
+    position: Array  # the point in the root link in [m] (3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionRequest:
-    """A motion that is asked for, from rest to rest.
+    """A motion that is asked for, from rest to rest."""
 
-    Attributes:
-        start: Joint positions at which it begins in [rad] (n).
-        goals: Alternatives, of which one is reached.
-        planner_id: The planner by MoveIt's name; empty for the default.
-        velocity_scaling: Factor of the velocity limits, above 0 and up to 1.
-        acceleration_scaling: Factor of the acceleration limits, above 0 and up to 1.
-        timeout: Time for planning in [s].
-        attempts: How many paths are planned, of which the shortest counts.
-        constraints: What holds everywhere on the path.
-        via: The point of a circle, for CIRC.
-        max_cartesian_speed: Of the link below in [m/s]; 0 for no limit.
-        cartesian_speed_link: The link whose speed is limited; empty for the tip.
-    """
-
-    start: Array
-    goals: Sequence[Goal]
-    planner_id: str = ''
-    velocity_scaling: float = 1.0
-    acceleration_scaling: float = 1.0
-    timeout: float = DEFAULT_TIMEOUT
-    attempts: int = 1
-    constraints: PathConstraints | None = None
-    via: CircPoint | None = None
-    max_cartesian_speed: float = 0.0
-    cartesian_speed_link: str = ''
+    start: Array  # joint positions at which it begins in [rad] (n)
+    goals: Sequence[Goal]  # alternatives, of which one is reached
+    planner_id: str = ''  # the planner by MoveIt's name; empty for the default
+    velocity_scaling: float = 1.0  # factor of the velocity limits, above 0 and up to 1
+    acceleration_scaling: float = 1.0  # factor of the acceleration limits, above 0 and up to 1
+    timeout: float = DEFAULT_TIMEOUT  # time for planning in [s]
+    attempts: int = 1  # how many paths are planned, of which the shortest counts
+    constraints: PathConstraints | None = None  # what holds everywhere on the path
+    via: CircPoint | None = None  # the point of a circle, for CIRC
+    max_cartesian_speed: float = 0.0  # of the link below in [m/s]; 0 for no limit
+    cartesian_speed_link: str = ''  # the link whose speed is limited; empty for the tip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionPlan:
-    """A motion that was found.
+    """A motion that was found."""
 
-    Attributes:
-        path: The path with its times, jerk-limited, from rest to rest.
-        planner_id: The planner that found it.
-        notes: What a person should know, such as where it is slower than asked.
-        planning_time: How long it took in [s]; 0 where nobody measured.
-    """
-
-    path: Path
-    planner_id: str
-    notes: Sequence[str] = ()
-    planning_time: float = 0.0
+    path: Path  # the path with its times, jerk-limited, from rest to rest
+    planner_id: str  # the planner that found it
+    notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
+    planning_time: float = 0.0  # how long it took in [s]; 0 where nobody measured

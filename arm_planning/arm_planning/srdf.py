@@ -30,49 +30,33 @@ from arm_model import (
     start_pose,
 )
 
-SAMPLES = 20_000
-"""Poses that are drawn."""
-MARGIN = 0.005
-"""Distance in [m] that links keep which count as never in contact."""
+SAMPLES = 20_000  # poses that are drawn
+MARGIN = 0.005  # distance in [m] that links keep which count as never in contact
 MIN_ARM_JOINTS = 3
 """Joints of a branch of the description that is an arm; one with fewer is a tool."""
-MISS = 1e-4
-"""Probability with which the share that the report names would have been missed."""
+MISS = 1e-4  # probability with which the share that the report names would have been missed
 READY = 'ready'
-USER = 'User'
-"""How the reason of a pair begins that a person decided on."""
+USER = 'User'  # how the reason of a pair begins that a person decided on
 PAIR_LINE = re.compile(r'^[ \t]*<disable_collisions\b[^>]*/>[ \t]*\n', re.MULTILINE)
 END = re.compile(r'\s*</robot>\s*\Z')
 
 
 @dataclass(frozen=True, slots=True)
 class SrdfDraft:
-    """An SRDF, and what there is to say about it.
+    """An SRDF, and what there is to say about it."""
 
-    Attributes:
-        text: The SRDF as XML text.
-        report: What was found, line by line.
-    """
-
-    text: str
-    report: Sequence[str]
+    text: str  # the SRDF as XML text
+    report: Sequence[str]  # what was found, line by line
 
 
 @dataclass(frozen=True, slots=True)
 class _Chain:
-    """An arm of a description, and the tool at its end.
+    """An arm of a description, and the tool at its end."""
 
-    Attributes:
-        name: Name of its group.
-        base: Its base link.
-        tip: Its tip link.
-        tool: Links of the tool that move against the tip.
-    """
-
-    name: str
-    base: str
-    tip: str
-    tool: Sequence[str]
+    name: str  # name of its group
+    base: str  # its base link
+    tip: str  # its tip link
+    tool: Sequence[str]  # links of the tool that move against the tip
 
 
 def make_srdf(
@@ -85,11 +69,9 @@ def make_srdf(
     """Make an SRDF, or refresh one.
 
     Args:
-        urdf: Robot description as XML text.
         previous: The SRDF that is there already; empty when there is none.
         limits: The table ``joint_limits`` of a limits file; what it lacks is taken from the URDF.
         samples: Number of poses that are drawn.
-        folder: Folder of the URDF, where names of mesh files are relative.
 
     Raises:
         ModelError: The description or the SRDF cannot be used, or there is no good pose.

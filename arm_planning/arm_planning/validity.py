@@ -27,52 +27,29 @@ from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
 
-MARGIN = 1e-3
-"""Distance that every pair keeps in [m] where a path is measured."""
-
-MIN_MARGIN = 1e-4
-"""The same where start or goal are nearer to contact in [m]."""
-
-LIMIT_TOLERANCE = 1e-6
-"""How far a position may be beyond a limit, for rounding, in [rad]."""
-
-DEGREE = 5
-"""Of the polynomials of a path."""
-
-CELLS = 8
-"""Parts of a segment of a path of which each has its own bound of the motion."""
-
-FIRST_PART = 1.0
-"""Motion of a shape within the parts of a path that are looked at first in [m]."""
+MARGIN = 1e-3  # distance that every pair keeps in [m] where a path is measured
+MIN_MARGIN = 1e-4  # the same where start or goal are nearer to contact in [m]
+LIMIT_TOLERANCE = 1e-6  # how far a position may be beyond a limit, for rounding, in [rad]
+DEGREE = 5  # of the polynomials of a path
+CELLS = 8  # parts of a segment of a path of which each has its own bound of the motion
+FIRST_PART = 1.0  # motion of a shape within the parts of a path that are looked at first in [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Violation:
-    """Why a state or a path is not valid.
+    """Why a state or a path is not valid."""
 
-    Attributes:
-        reason: In words: the joint and its limit, or the bodies, how deep and where.
-        positions: Joint positions there in [rad].
-        contact: The deepest contact; None where a limit is the matter or bodies are only near.
-        time: When on the path in [s]; 0 for a state.
-    """
-
-    reason: str
-    positions: Array
+    reason: str  # in words: the joint and its limit, or the bodies, how deep and where
+    positions: Array  # joint positions there in [rad]
+    # the deepest contact; None where a limit is the matter or bodies are only near
     contact: Contact | None = None
-    time: float = 0.0
+    time: float = 0.0  # when on the path in [s]; 0 for a state
 
 
 class ValidityCheck:
     """Checks states and paths in one scene; belongs to one thread."""
 
     def __init__(self, limits: JointLimits, scene: PlanningScene) -> None:
-        """Prepare.
-
-        Args:
-            limits: Limits of the joints.
-            scene: What may collide.
-        """
         self._limits = limits
         self._clearances = Clearances(scene)
 
@@ -82,11 +59,7 @@ class ValidityCheck:
         return self._clearances.scene
 
     def state(self, positions: Array) -> Violation | None:
-        """Return why the arm may not be somewhere; None where it may.
-
-        Args:
-            positions: Joint positions in [rad] (n).
-        """
+        """Return why the arm may not be somewhere; None where it may."""
         return self._beyond(positions, positions, 0.0) or self._touching(positions, 0.0)
 
     def required(self, *ends: Array) -> Array:
@@ -141,11 +114,7 @@ class ValidityCheck:
         return None
 
     def path(self, path: Path) -> Violation | None:
-        """Return what is wrong with a path, of its positions; None for nothing.
-
-        Args:
-            path: The path.
-        """
+        """Return what is wrong with a path, of its positions; None for nothing."""
         control = _control_values(path)
         lower, upper = control.min(axis=1), control.max(axis=1)
         outside = (lower < self._limits.lower - LIMIT_TOLERANCE) | (
@@ -157,19 +126,12 @@ class ValidityCheck:
         return self.contact(path)
 
     def contact(self, path: Path) -> Violation | None:
-        """Return where a pair comes nearer on a path than it may; None for nowhere.
-
-        Args:
-            path: The path.
-        """
+        """Return where a pair comes nearer on a path than it may; None for nowhere."""
         found = self._near_time(path, _control_values(path))
         return None if found is None else self._near(path.at(found).position, found)
 
     def refuse_start(self, start: Array) -> None:
         """Refuse to begin where the arm may not be.
-
-        Args:
-            start: Joint positions in [rad] (n).
 
         Raises:
             PlanningError: A joint is beyond its limits, or something is in contact.
@@ -186,12 +148,7 @@ class ValidityCheck:
         )
 
     def _near_time(self, path: Path, control: Array) -> float | None:
-        """Return a time at which a pair is nearer than it may be; None where none is.
-
-        Args:
-            path: The path.
-            control: Control values of its segments.
-        """
+        """Return a time at which a pair is nearer than it may be; None where none is."""
         times, turned = _cells(path, control)
         rates, cells = self._clearances.distance_rate_bounds, np.arange(float(len(times)))
         required = self.required(path.at(0.0).position, path.end.position).tolist()
@@ -229,13 +186,6 @@ class ValidityCheck:
         share: float,
     ) -> dict[int, float] | None:
         """Return the pairs that may come near within a part, and their distances there in [m].
-
-        Args:
-            place: The middle of the part in [rad] (n).
-            pairs: Those that are measured.
-            required: Distance of each pair in [m] (k).
-            motions: How far the shapes of each move at most on some way in [m] (k).
-            share: Of that way, from the middle to an end of the part.
 
         Returns:
             The pairs; None where one is too near already.
@@ -293,10 +243,6 @@ def _cells(path: Path, control: Array) -> tuple[Array, Array]:
 
     Within a cell the latter grows evenly, and nowhere less than a joint turns: it is bounded by
     the velocity at the ends of the cell and how much it changes between them.
-
-    Args:
-        path: The path.
-        control: Control values of its segments.
     """
     count = len(path.durations)
     segments = np.repeat(np.arange(count), CELLS)

@@ -23,8 +23,7 @@ from arm_planning.industrial.planner import IndustrialPlanner, PLANNER_IDS
 
 GOALS = 60
 
-REACH = 0.25
-"""Greatest way along each axis in [m]."""
+REACH = 0.25  # greatest way along each axis in [m]
 
 
 def main() -> None:

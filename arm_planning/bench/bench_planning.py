@@ -52,17 +52,10 @@ try:
 except ImportError:
     roboplan = None
 
-TIMEOUT = 1.0
-"""Time for one problem in [s]."""
-
-FEW = 10
-"""Problems of each scene, unless all are asked for."""
-
-DENSE = 1e-3
-"""Motion of a joint from one look of the sampler to the next in [rad]."""
-
-SAMPLES = 2000
-"""Places of a timed path that are compared."""
+TIMEOUT = 1.0  # time for one problem in [s]
+FEW = 10  # problems of each scene, unless all are asked for
+DENSE = 1e-3  # motion of a joint from one look of the sampler to the next in [rad]
+SAMPLES = 2000  # places of a timed path that are compared
 
 RESOLUTION = 0.01
 """Of OMPL's motion check, as a share of the space: MoveIt's longest_valid_segment_fraction."""

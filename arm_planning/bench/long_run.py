@@ -28,11 +28,8 @@ from arm_planning.free.shortcut import shortened
 
 FILE = Path(__file__).with_name('best_lengths.json')
 
-RUNS, SHORTCUTS = 16, 6
-"""How often a way is searched, and how often each is shortened."""
-
-LONGEST = 30.0
-"""Time for one problem in [s]."""
+RUNS, SHORTCUTS = 16, 6  # how often a way is searched, and how often each is shortened
+LONGEST = 30.0  # time for one problem in [s]
 
 
 def length(places: Array) -> float:

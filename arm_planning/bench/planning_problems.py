@@ -25,36 +25,21 @@ from arm_model import (
 )
 from arm_planning import ValidityCheck
 
-CLEARANCE = 0.01
-"""Least distance at start and goal in [m]."""
-
-MIN_DISTANCE = 1.5
-"""Least distance of start and goal in [rad]: what is nearer is no problem."""
-
-PROBLEMS = 100
-"""Problems of each kind: their seeds are 0 to 99."""
-
-MAX_DRAWS = 3000
-"""States that are drawn for a problem at most."""
+CLEARANCE = 0.01  # least distance at start and goal in [m]
+MIN_DISTANCE = 1.5  # least distance of start and goal in [rad]: what is nearer is no problem
+PROBLEMS = 100  # problems of each kind: their seeds are 0 to 99
+MAX_DRAWS = 3000  # states that are drawn for a problem at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """A planning problem.
+    """A planning problem."""
 
-    Attributes:
-        kind: What the scene is.
-        seed: Seed that it was made of.
-        scene: The scene.
-        start: Where the arm is in [rad].
-        goal: Where it is to go in [rad].
-    """
-
-    kind: str
-    seed: int
-    scene: PlanningScene
-    start: Array
-    goal: Array
+    kind: str  # what the scene is
+    seed: int  # seed that it was made of
+    scene: PlanningScene  # the scene
+    start: Array  # where the arm is in [rad]
+    goal: Array  # where it is to go in [rad]
 
 
 Boxes = Iterator[tuple[Box, tuple[float, float, float]]]
@@ -122,9 +107,7 @@ def problem(model: RobotModel, kind: str, seed: int) -> Problem:
     """Return the problem of a seed.
 
     Args:
-        model: The arm.
         kind: One of :data:`KINDS`.
-        seed: Its seed.
     """
     draw = np.random.default_rng([seed, sorted(KINDS).index(kind)])
     scene = model.scene

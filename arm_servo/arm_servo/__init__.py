@@ -1,6 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging, trajectories and single targets of an arm on one jerk-limited motion core."""
+"""Jogging, trajectories and single targets of an arm on one jerk-limited motion core.
+
+Conventions: joint vectors are in the order of the arm's joints in [rad], of joints that slide in
+[m]; velocities and accelerations in their units per [s] and [s2]. Twists (6) are linear before
+angular; scaled ones have lengths as shares of the arm's reach. ``now``, ``begin`` and ``time`` are
+on the steady clock in [s], ``period`` is the time to the next cycle in [s]. ``state`` is what was
+commanded last, ``measured`` what the drives report. A ``reason`` says what happened, with the
+remedy, and is the outcome of the motion that it ends.
+"""
 
 from __future__ import annotations
 

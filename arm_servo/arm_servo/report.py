@@ -22,19 +22,13 @@ class Cause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limiter:
-    """One thing that limits a motion.
+    """One thing that limits a motion."""
 
-    Attributes:
-        cause: Its kind.
-        name: What it is: a joint, two links, an axis of the tool.
-        amount: Way left in [rad] or [m], speed asked in [rad/s], or measure of the singularity.
-        factor: What it leaves of the asked speed, 0 to 1.
-    """
-
-    cause: Cause
-    name: str
+    cause: Cause  # its kind
+    name: str  # what it is: a joint, two links, an axis of the tool
+    # way left in [rad] or [m], speed asked in [rad/s], or measure of the singularity
     amount: float
-    factor: float
+    factor: float  # what it leaves of the asked speed, 0 to 1
 
     def __str__(self) -> str:
         """Say it in a few words."""
@@ -50,15 +44,10 @@ class Limiter:
 
 @dataclass(frozen=True, slots=True)
 class MotionReport:
-    """How a command is carried out.
+    """How a command is carried out."""
 
-    Attributes:
-        factor: Achieved share of the asked speed; 1 when nothing limits it.
-        limiters: What limits it, the strongest first.
-    """
-
-    factor: float = 1.0
-    limiters: tuple[Limiter, ...] = ()
+    factor: float = 1.0  # achieved share of the asked speed; 1 when nothing limits it
+    limiters: tuple[Limiter, ...] = ()  # what limits it, the strongest first
 
     def __post_init__(self) -> None:
         """Sort the limiters, so that the first is the one that matters."""

@@ -45,16 +45,12 @@ ROUNDS = 30
 
 CYCLES = 500
 
-STEP = 1e-3
-"""Motion of each joint in a cycle in [rad]."""
+STEP = 1e-3  # motion of each joint in a cycle in [rad]
 
 VERTICES, CELLS = 20_000, 5_000
 
-SWITCH_INTERVAL = 0.0005
-"""Time for which Python keeps the interpreter in [s], as in the master."""
-
-WITHIN = 0.05
-"""Distance that the cycle asks for in [m]."""
+SWITCH_INTERVAL = 0.0005  # time for which Python keeps the interpreter in [s], as in the master
+WITHIN = 0.05  # distance that the cycle asks for in [m]
 
 
 def boxes(root: str) -> PlanningSceneMessage:

@@ -30,8 +30,6 @@ class MoveitServoModel:
         """Start at rest.
 
         Args:
-            model: The arm.
-            start: Joint positions in [rad].
             period: Cycle in [s].
         """
         self._model = model

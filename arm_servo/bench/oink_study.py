@@ -38,7 +38,6 @@ class OinkServo:
     """A servo as one would write it first on Oink: a frame task, limits, a barrier."""
 
     def __init__(self, name: str) -> None:
-        """Set it up for a robot."""
         self.model = robot(name)
         urdf, srdf = texts(name)
         self.scene = rc.Scene(name, rc.loadUrdfSceneDescriptionFromXml(urdf))

@@ -16,8 +16,7 @@ from arm_model import Array, frozen, load_limits, RobotModel
 
 ROBOTS = ('panda', 'prbt', 'gp110')
 
-SPEED = frozen([0.1] * 3 + [0.3] * 3)
-"""Speed of a command along each axis in [m/s] and [rad/s]."""
+SPEED = frozen([0.1] * 3 + [0.3] * 3)  # speed of a command along each axis in [m/s] and [rad/s]
 
 TWISTS = [sign * SPEED * axis for axis in np.eye(6) for sign in (1.0, -1.0)]
 """Commands along each axis, both ways."""

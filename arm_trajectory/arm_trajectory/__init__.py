@@ -7,6 +7,10 @@ points, corners rounded, time scaled to the limits of the joints. :class:`PathCh
 links meet on it. A :class:`TrajectoryTimer` scales the speed of its execution, a
 :class:`CatchUpInterpolator` leads to it, an :class:`OnlineTrajectoryGenerator` from state to
 state.
+
+Conventions: joint vectors are in the order of the arm's joints in [rad], of joints that slide in
+[m]; velocities and accelerations in their units per [s] and [s2]. Times are in [s], ``period`` is
+that of the cycle. ``state`` is what was commanded last, ``measured`` what the drives report.
 """
 
 from __future__ import annotations

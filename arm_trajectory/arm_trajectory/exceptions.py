@@ -41,7 +41,6 @@ class GoalError(CommandError):
 
         Args:
             code: Code of the action's result.
-            reason: What is wrong, and the remedy.
         """
         super().__init__(reason)
         self.code = code

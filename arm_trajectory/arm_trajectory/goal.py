@@ -10,65 +10,40 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class GoalPoint:
-    """A point of a trajectory; empty where a field is not given.
+    """A point of a trajectory; empty where a field is not given."""
 
-    Attributes:
-        time: Time from the start in [s].
-        positions: Positions in [rad].
-        velocities: Velocities in [rad/s].
-        accelerations: Accelerations in [rad/s2].
-    """
-
-    time: float
-    positions: Sequence[float]
-    velocities: Sequence[float] = ()
-    accelerations: Sequence[float] = ()
+    time: float  # time from the start in [s]
+    positions: Sequence[float]  # positions in [rad]
+    velocities: Sequence[float] = ()  # velocities in [rad/s]
+    accelerations: Sequence[float] = ()  # accelerations in [rad/s2]
 
 
 @dataclass(frozen=True, slots=True)
 class JointTolerance:
-    """How far a joint may be off; 0 keeps the default, -1 takes it away.
+    """How far a joint may be off; 0 keeps the default, -1 takes it away."""
 
-    Attributes:
-        position: In [rad].
-        velocity: In [rad/s].
-    """
-
-    position: float = 0.0
-    velocity: float = 0.0
+    position: float = 0.0  # in [rad]
+    velocity: float = 0.0  # in [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryGoal:
-    """A trajectory to follow.
+    """A trajectory to follow."""
 
-    Attributes:
-        joints: Names of the joints, in the order of the points' numbers.
-        points: Its points.
-        age: How long ago it began in [s]; 0 begins now, less than 0 begins later.
-        path_tolerance: Tolerances on the way, by joint.
-        goal_tolerance: Tolerances at the end, by joint.
-        goal_time: Time to reach the goal within tolerance after the end in [s]; 0 is the default.
-    """
-
-    joints: Sequence[str]
-    points: Sequence[GoalPoint]
-    age: float = 0.0
-    path_tolerance: Mapping[str, JointTolerance] | None = None
-    goal_tolerance: Mapping[str, JointTolerance] | None = None
+    joints: Sequence[str]  # names of the joints, in the order of the points' numbers
+    points: Sequence[GoalPoint]  # its points
+    age: float = 0.0  # how long ago it began in [s]; 0 begins now, less than 0 begins later
+    path_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances on the way, by joint
+    goal_tolerance: Mapping[str, JointTolerance] | None = None  # tolerances at the end, by joint
+    # time to reach the goal within tolerance after the end in [s]; 0 is the default
     goal_time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class GoalRules:
-    """What is accepted.
+    """What is accepted."""
 
-    Attributes:
-        partial: Whether joints may be missing; they stay where they are.
-        end_velocity: Whether the last point may have a velocity; the arm comes to rest behind it.
-        start: How far a first point without time may be from the arm in [rad].
-    """
-
-    partial: bool = False
+    partial: bool = False  # whether joints may be missing; they stay where they are
+    # whether the last point may have a velocity; the arm comes to rest behind it
     end_velocity: bool = False
-    start: float = 0.05
+    start: float = 0.05  # how far a first point without time may be from the arm in [rad]

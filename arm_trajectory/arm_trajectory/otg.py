@@ -12,8 +12,7 @@ import ruckig
 
 from arm_model import Array, frozen, JointLimits, Native, RobotState
 
-CONTINUOUS_DISTANCE = 1e6
-"""What counts for the way of a joint without end in [rad]."""
+CONTINUOUS_DISTANCE = 1e6  # what counts for the way of a joint without end in [rad]
 
 MIN_ACCELERATION_FACTOR = 0.05
 """Least share of its acceleration that a joint keeps while others take longer."""
@@ -34,7 +33,6 @@ class Plan:
         """Wrap a trajectory of ruckig.
 
         Args:
-            trajectory: The trajectory.
             begin: Where it begins in [rad], for one that was planned from zero.
         """
         self._begin = begin
@@ -44,11 +42,7 @@ class Plan:
         self._upper: Array | None = None
 
     def at(self, time: float) -> RobotState:
-        """Return the state at a time since the start; beyond the end it goes on evenly.
-
-        Args:
-            time: Time in [s].
-        """
+        """Return the state at a time since the start; beyond the end it goes on evenly."""
         position, velocity, acceleration = self._trajectory.at_time(time)
         places = np.array(position)
         if self._begin is not None:
@@ -84,11 +78,6 @@ class OnlineTrajectoryGenerator:
     """
 
     def __init__(self, limits: JointLimits) -> None:
-        """Prepare.
-
-        Args:
-            limits: Limits of the joints.
-        """
         count = len(limits)
         self._limits = limits
         self._otg = ruckig.Ruckig(count)
@@ -107,10 +96,6 @@ class OnlineTrajectoryGenerator:
         Each joint gets the share of its acceleration and jerk that its change of speed has in the
         change of the joint that needs longest. Other than ruckig's own synchronisation this holds
         when the target changes in every cycle.
-
-        Args:
-            state: Where to start.
-            velocity: Velocities to reach in [rad/s], within the limits.
         """
         limits, demand = self._limits, self._to_velocity
         present = np.abs(state.acceleration) / limits.acceleration
@@ -130,9 +115,6 @@ class OnlineTrajectoryGenerator:
         """Plan the shortest way to a standstill, each joint for itself.
 
         It is planned from zero, since ruckig counts zero among the extremes of such a motion.
-
-        Args:
-            state: Where to start.
         """
         demand = self._to_standstill
         demand.current_velocity = state.velocity
@@ -145,7 +127,6 @@ class OnlineTrajectoryGenerator:
         """Plan to a state.
 
         Args:
-            state: Where to start.
             target: Where to arrive, its velocity and acceleration within the limits.
             shortest: Least duration in [s].
         """
@@ -212,11 +193,6 @@ def _shares(change: Array, acceleration: Array) -> Array:
 def hard_brake(state: RobotState, limits: JointLimits, period: float) -> RobotState:
     """Slow down for a period with the greatest deceleration: for when ruckig has no answer.
 
-    Args:
-        state: State at the start of the period.
-        limits: Limits of the joints.
-        period: Its length in [s].
-
     Returns:
         The state at the end; the jerk limit does not hold on the way.
     """
@@ -238,7 +214,6 @@ def brakeable_velocity(distance: Array, limits: JointLimits) -> Array:
 
     Args:
         distance: Ways left in [rad] (n) or (k, n); negative ones count as zero.
-        limits: Limits of the joints.
 
     Returns:
         Velocities in [rad/s], at most those of the limits.

@@ -27,10 +27,6 @@ def seconds(stamp: Any) -> float:  # noqa: ANN401  # Time and Duration
 
 
 def duration_fields(time: float) -> dict[str, int]:
-    """Return the fields of a duration.
-
-    Args:
-        time: In [s].
-    """
+    """Return the fields of a duration."""
     total = round(time * 1e9)
     return {'sec': total // 1_000_000_000, 'nanosec': total % 1_000_000_000}

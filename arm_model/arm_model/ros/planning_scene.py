@@ -85,8 +85,6 @@ def apply_planning_scene(
     in the message count nowhere. An octomap is the object ``<octomap>``.
 
     Args:
-        scene: The scene before.
-        message: The message.
         positions: Joint positions in [rad], for frames that move with the arm.
         frame_of: Returns frames that are no links; without it there are none.
 
@@ -128,8 +126,6 @@ def apply_collision_object(
     """Return a scene with an object added, moved, extended or removed.
 
     Args:
-        scene: The scene before.
-        message: The message; REMOVE without an id removes all objects of the world.
         positions: Joint positions in [rad], for frames that move with the arm.
         frame_of: Returns frames that are no links; without it there are none.
 
@@ -150,7 +146,6 @@ def apply_attached_object(
     """Return a scene with an object attached to a link, or laid down in the world.
 
     Args:
-        scene: The scene before.
         message: The message; ADD without shapes takes up an object of the world, REMOVE without
             an id lays down all bodies of the link.
         positions: Joint positions in [rad]: where the arm is then.
@@ -169,9 +164,6 @@ def allowed_collisions(message: MatrixMessage) -> AllowedCollisionMatrix:
 
     As in MoveIt, the upper triangle counts, and an entry that says what the defaults of its names
     say is none: a client that changes a default sends back the entries that it has read.
-
-    Args:
-        message: The message.
 
     Raises:
         SceneError: Rows or columns are missing.
@@ -431,10 +423,6 @@ def _shapes(message: ObjectMessage) -> Iterator[PlacedShape]:
 
 def primitive_shape(message: SolidPrimitive, name: str) -> Shape:
     """Return a primitive.
-
-    Args:
-        message: The message.
-        name: The object that it is a part of, for the message of the error.
 
     Raises:
         SceneError: Its type is unknown, or it has another number of dimensions.

@@ -22,15 +22,10 @@ from ..model import RobotModel
 
 @dataclass(frozen=True, slots=True)
 class GroupModels:
-    """The groups of a robot that are moved, each by itself.
+    """The groups of a robot that are moved, each by itself."""
 
-    Attributes:
-        arms: Arms; the first is that of the parameter ``group``.
-        tools: End effectors.
-    """
-
-    arms: Sequence[RobotModel]
-    tools: Sequence[RobotModel] = ()
+    arms: Sequence[RobotModel]  # arms; the first is that of the parameter ``group``
+    tools: Sequence[RobotModel] = ()  # end effectors
 
     @property
     def notes(self) -> list[str]:
@@ -42,26 +37,18 @@ class GroupModels:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What describes a robot.
+    """What describes a robot."""
 
-    Attributes:
-        urdf: Robot description as XML text.
-        srdf: Semantic description as XML text.
-        limits: The table ``joint_limits`` of the limits file.
-        limits_file: That file; empty where there is none.
-    """
-
-    urdf: str
-    srdf: str
-    limits: Mapping[str, Any]
-    limits_file: str = ''
+    urdf: str  # robot description as XML text
+    srdf: str  # semantic description as XML text
+    limits: Mapping[str, Any]  # the table ``joint_limits`` of the limits file
+    limits_file: str = ''  # that file; empty where there is none
 
 
 def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> Description:
     """Declare what describes a robot, for a node that has all groups.
 
     Args:
-        node: The node.
         limits: The table ``joint_limits`` where no file of limits is given; None needs a file.
 
     Raises:
@@ -74,9 +61,6 @@ def declare_description(node: Node, limits: Mapping[str, Any] | None = None) -> 
 def declare_robot(node: Node) -> RobotModel:
     """Declare what describes an arm, and build it.
 
-    Args:
-        node: The node.
-
     Raises:
         ModelError: A parameter is missing, or they do not make an arm.
     """
@@ -88,9 +72,6 @@ def declare_robot(node: Node) -> RobotModel:
 
 def declare_groups(node: Node) -> GroupModels:
     """Declare what describes a robot of several groups that are moved, and build them.
-
-    Args:
-        node: The node.
 
     Raises:
         ModelError: A parameter is missing, they do not make an arm, or groups share a joint.
@@ -139,10 +120,6 @@ def _given(node: Node, *, needs_limits: bool = True) -> tuple[str, str, str, str
 
 def same_robot(node: Node, model: RobotModel) -> None:
     """Declare what describes an arm on a further node, where clients ask for it too.
-
-    Args:
-        node: The node.
-        model: The arm.
 
     Raises:
         ModelError: The node is given another group or tip.

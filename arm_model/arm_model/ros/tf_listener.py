@@ -33,7 +33,6 @@ class TfListener:
         """Do not listen yet.
 
         Args:
-            node: The node that subscribes.
             model: The arm; its links need no TF.
             prefix: Before the names of its links in TF.
         """
@@ -51,9 +50,6 @@ class TfListener:
 
     def pose(self, frame: str) -> Pose:
         """Return the pose of a frame of TF in the base of the arm.
-
-        Args:
-            frame: Name of the frame.
 
         Raises:
             CommandError: It is not known, or not yet.
@@ -87,9 +83,6 @@ def learn_transforms(tree: FrameTree, message: TFMessage, now: float, clock: flo
     """Take a message of /tf; what comes late is as old as its stamps say.
 
     Args:
-        tree: What takes it.
-        message: The message.
-        now: Steady time of its arrival in [s].
         clock: Time of its arrival by the clock of the stamps in [s].
     """
     for transform in message.transforms:
@@ -97,12 +90,7 @@ def learn_transforms(tree: FrameTree, message: TFMessage, now: float, clock: flo
 
 
 def learn_static(tree: FrameTree, message: TFMessage) -> None:
-    """Take a message of /tf_static.
-
-    Args:
-        tree: What takes it.
-        message: The message.
-    """
+    """Take a message of /tf_static."""
     for transform in message.transforms:
         _learn(tree, transform, math.inf)
 

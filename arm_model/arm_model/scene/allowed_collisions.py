@@ -17,13 +17,11 @@ class AllowedCollisionMatrix:
 
     An entry of a pair decides. Where there is none, the defaults of its two names do: with one
     default, that; with two, both must allow. Where there are none, the pair is checked.
-
-    Attributes:
-        entries: True where a pair may touch, by pair.
-        defaults: True where a name may touch anything, by name.
     """
 
+    # true where a pair may touch, by pair
     entries: Mapping[Pair, bool] = field(default_factory=dict)
+    # true where a name may touch anything, by name
     defaults: Mapping[str, bool] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -33,11 +31,7 @@ class AllowedCollisionMatrix:
 
     @classmethod
     def of_srdf(cls, semantic: SemanticDescription) -> AllowedCollisionMatrix:
-        """Return what an SRDF allows; ``disable_collisions`` has the last word, as in MoveIt.
-
-        Args:
-            semantic: The SRDF.
-        """
+        """Return what an SRDF allows; ``disable_collisions`` has the last word, as in MoveIt."""
         entries = dict.fromkeys(semantic.enabled, False) | dict.fromkeys(semantic.disabled, True)
         return cls(entries, dict.fromkeys(semantic.unchecked, True))
 

@@ -23,49 +23,31 @@ overlapped. It is more than checks of paths let pass."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proximity:
-    """Two shapes that are near to each other.
+    """Two shapes that are near to each other."""
 
-    Attributes:
-        pair: Number of the pair, a place in :attr:`PlanningScene.pairs`.
-        links: Names of their links or objects.
-        distance: Between their surfaces in [m]; negative when they overlap.
-        gradient: Change of the distance with each joint in [m/rad].
-    """
-
-    pair: int
-    links: tuple[str, str]
-    distance: float
-    gradient: Array
+    pair: int  # number of the pair, a place in :attr:`PlanningScene.pairs`
+    links: tuple[str, str]  # names of their links or objects
+    distance: float  # between their surfaces in [m]; negative when they overlap
+    gradient: Array  # change of the distance with each joint in [m/rad]
 
 
 @dataclass(frozen=True, slots=True)
 class LeastClearance:
-    """The two links that are nearest to each other.
+    """The two links that are nearest to each other."""
 
-    Attributes:
-        distance: Between their surfaces in [m], or a lower bound where it is more than asked for.
-        links: Their names, or those of objects; empty where nothing is as near.
-    """
-
+    # between their surfaces in [m], or a lower bound where it is more than asked for
     distance: float
-    links: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()  # their names, or those of objects; empty where nothing is as near
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """Two shapes that overlap.
+    """Two shapes that overlap."""
 
-    Attributes:
-        bodies: Names of their links or objects.
-        position: A point between their surfaces, in the root link in [m].
-        normal: Unit vector from the first body to the second, in the root link.
-        depth: How far they overlap in [m].
-    """
-
-    bodies: tuple[str, str]
-    position: Array
-    normal: Array
-    depth: float
+    bodies: tuple[str, str]  # names of their links or objects
+    position: Array  # a point between their surfaces, in the root link in [m]
+    normal: Array  # unit vector from the first body to the second, in the root link
+    depth: float  # how far they overlap in [m]
 
 
 class Clearances:
@@ -77,11 +59,6 @@ class Clearances:
     """
 
     def __init__(self, scene: PlanningScene) -> None:
-        """Begin with nothing known.
-
-        Args:
-            scene: The shapes and their pairs.
-        """
         self._scene = scene
         self._kinematics = scene.kinematics
         self._data = scene.kinematics.native.createData()
@@ -110,7 +87,6 @@ class Clearances:
         """Return distances: exact ones below a distance of interest, else least ones.
 
         Args:
-            positions: Joint positions in [rad].
             within: The distance of interest in [m].
 
         Returns:
@@ -138,7 +114,6 @@ class Clearances:
         """Measure some pairs, regardless of what is known of them.
 
         Args:
-            positions: Joint positions in [rad].
             pairs: Numbers of the pairs.
 
         Returns:
@@ -186,7 +161,6 @@ class Clearances:
         """Return the nearest pairs with the gradients of their distances.
 
         Args:
-            positions: Joint positions in [rad].
             within: Greatest distance of interest in [m].
             count: How many pairs at most.
 
@@ -205,11 +179,7 @@ class Clearances:
         ]
 
     def contacts(self, positions: Array) -> list[Contact]:
-        """Return all pairs of shapes that overlap, the deepest first.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return all pairs of shapes that overlap, the deepest first."""
         distances = self.least(positions, 0.0)
         touching = (distances < 0.0).nonzero()[0].tolist()
         found = []

@@ -21,25 +21,18 @@ from ..arrays import Array
 from .clearances import Clearances
 from .planning_scene import PlanningScene
 
-SAMPLES = 200
-"""Poses that are tried."""
+SAMPLES = 200  # poses that are tried
 
 MIN_SHARE = 0.95
 """Share of the poses in which links touch that touch always; the setup assistant's."""
 
-SEED = 0
-"""Of the poses: the same robot has the same pairs each time."""
+SEED = 0  # of the poses: the same robot has the same pairs each time
 
 HALF_TURN = np.pi
 
-MAX_NAMED = 12
-"""Pairs that one note names."""
-
-DESCENTS = 6
-"""Nearest poses of a pair from which nearer ones are searched."""
-
-DESCENT_STEPS = 200
-"""Poses that are tried from each of them."""
+MAX_NAMED = 12  # pairs that one note names
+DESCENTS = 6  # nearest poses of a pair from which nearer ones are searched
+DESCENT_STEPS = 200  # poses that are tried from each of them
 
 FIRST_STEP, LAST_STEP = 0.2, 0.002
 """Standard deviation of the steps of a search, as a share of the range of each joint."""
@@ -47,18 +40,12 @@ FIRST_STEP, LAST_STEP = 0.2, 0.002
 
 @dataclass(frozen=True, slots=True)
 class SampledContacts:
-    """What many poses say about the links of a robot.
+    """What many poses say about the links of a robot."""
 
-    Attributes:
-        samples: Number of poses that were drawn, evenly over the ranges of the joints.
-        searched: Poses that were tried besides for each pair that was never in contact.
-        shares: Share of the drawn poses in which the links touch, by pair.
-        least: Least distance in [m] that was found, by pair; negative where they overlap.
-    """
-
-    samples: int
-    searched: int
-    shares: Mapping[Pair, float]
+    samples: int  # number of poses that were drawn, evenly over the ranges of the joints
+    searched: int  # poses that were tried besides for each pair that was never in contact
+    shares: Mapping[Pair, float]  # share of the drawn poses in which the links touch, by pair
+    # least distance in [m] that was found, by pair; negative where they overlap
     least: Mapping[Pair, float]
 
 
@@ -71,9 +58,6 @@ def with_default_collisions(
     them in it with a purpose. What ``enable_collisions`` names is checked in any case.
 
     Args:
-        scene: The scene.
-        tree: The description.
-        lower: Least positions of the scene's joints in [rad] or [m].
         upper: Greatest positions.
         notes: Where pairs are named that were not in the SRDF.
     """
@@ -109,12 +93,7 @@ def with_default_collisions(
 
 
 def adjacent_links(tree: KinematicTree, scene: PlanningScene) -> frozenset[Pair]:
-    """Return pairs of links that a joint connects; links without a shape do not part them.
-
-    Args:
-        tree: The description.
-        scene: What has shapes.
-    """
+    """Return pairs of links that a joint connects; links without a shape do not part them."""
     above = {joint.child: joint.parent for joint in tree.joints}
 
     def solid(link: str) -> str:
@@ -130,7 +109,6 @@ def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> froze
     """Return pairs of links that touch in nearly all poses.
 
     Args:
-        scene: The scene.
         lower: Least positions of its joints; minus infinity for one that turns without end.
         upper: Greatest positions.
     """

@@ -21,8 +21,7 @@ from .shapes import Box, Capsule, Cylinder, Mesh, native, PlacedShape, Shape, Sp
 CAPSULE_TOLERANCE = 1e-6
 """How exactly spheres must sit on a cylinder's ends in [m] to make a capsule of it."""
 
-MIN_FULLNESS = 0.4
-"""Share of its hull that a mesh fills at least without a note."""
+MIN_FULLNESS = 0.4  # share of its hull that a mesh fills at least without a note
 
 PRIMITIVES = {
     'box': (Box, ('size',)),
@@ -34,22 +33,17 @@ PRIMITIVES = {
 
 @dataclass(frozen=True, slots=True)
 class LinkShapes:
-    """What the links are made of.
+    """What the links are made of."""
 
-    Attributes:
-        by_link: Shapes of each link that has any, in the link's frame.
-        notes: What cannot be checked, or not well, in words.
-    """
-
+    # shapes of each link that has any, in the link's frame
     by_link: Mapping[str, Sequence[PlacedShape]]
-    notes: Sequence[str]
+    notes: Sequence[str]  # what cannot be checked, or not well, in words
 
 
 def link_shapes(tree: KinematicTree, folder: Path | None = None) -> LinkShapes:
     """Return the collision shapes of a description.
 
     Args:
-        tree: The description.
         folder: Its folder, where names of mesh files are relative.
 
     Raises:

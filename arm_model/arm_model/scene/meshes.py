@@ -25,8 +25,7 @@ from urdf_reader import mesh_unit
 
 from ..arrays import Array, frozen, Native, Places
 
-MIN_THICKNESS = 1e-3
-"""Thickness that a flat mesh is given in [m]: a hull needs a volume."""
+MIN_THICKNESS = 1e-3  # thickness that a flat mesh is given in [m]: a hull needs a volume
 
 MAX_CORNERS = 250
 """Corners of a hull that coal refuses for the number of neighbours of a corner: 255 at most."""
@@ -37,14 +36,12 @@ GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 MAX_BODIES = 16
 """Bodies of one mesh that get a hull each; one with more of them gets a single hull."""
 
-MAX_PARTS = 500
-"""Parts of a mesh without a common corner of which bodies are made."""
+MAX_PARTS = 500  # parts of a mesh without a common corner of which bodies are made
 
 APART = 1e-3
 """Distance between the bounds of two bodies at least, as a share of the size of the mesh."""
 
-FORMAT = 'v2'
-"""Version of the files in the cache: part of their names."""
+FORMAT = 'v2'  # version of the files in the cache: part of their names
 
 
 class MeshError(ValueError):
@@ -53,22 +50,14 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """The convex hull of a body.
+    """The convex hull of a body."""
 
-    Attributes:
-        points: Its corners (m, 3), in the unit of the mesh.
-        fullness: Volume of the body as a share of the hull's; 1 where it has no inside.
-    """
-
-    points: Array
-    fullness: float
+    points: Array  # its corners (m, 3), in the unit of the mesh
+    fullness: float  # volume of the body as a share of the hull's; 1 where it has no inside
 
 
 def load_hulls(path: Path) -> Sequence[Hull]:
     """Return the convex hulls of the bodies of a mesh file, from the cache if they are there.
-
-    Args:
-        path: The file.
 
     Raises:
         MeshError: The file cannot be read, or is no mesh.

@@ -13,25 +13,18 @@ from .shapes import native, PlacedShape, Shape
 
 @dataclass(frozen=True, slots=True, init=False)
 class CollisionObject:
-    """A thing that the robot must not touch.
+    """A thing that the robot must not touch."""
 
-    Attributes:
-        name: Its name, which no link has.
-        shapes: Its shapes, in its own frame.
-        pose: Where it is: in the root link, or in the link that it is attached to.
-    """
-
-    name: str
-    shapes: tuple[PlacedShape, ...]
+    name: str  # its name, which no link has
+    shapes: tuple[PlacedShape, ...]  # its shapes, in its own frame
+    # where it is: in the root link, or in the link that it is attached to
     pose: Pose = field(default=ORIGIN, compare=False)
 
     def __init__(self, name: str, *shapes: Shape | PlacedShape, pose: Pose = ORIGIN) -> None:
         """Put an object together.
 
         Args:
-            name: Its name.
             shapes: Its shapes; without a pose of their own they are at its origin.
-            pose: Where it is.
 
         Raises:
             SceneError: It has no name or no shape, or a shape is not usable.
@@ -50,11 +43,7 @@ class CollisionObject:
         object.__setattr__(self, 'pose', pose)
 
     def at(self, pose: Pose) -> CollisionObject:
-        """Return the object at another place.
-
-        Args:
-            pose: Where it is.
-        """
+        """Return the object at another place."""
         return CollisionObject(self.name, *self.shapes, pose=pose)
 
     def is_same(self, other: CollisionObject) -> bool:
@@ -71,17 +60,11 @@ class CollisionObject:
 
 @dataclass(frozen=True, slots=True)
 class AttachedBody:
-    """An object that moves with a link.
+    """An object that moves with a link."""
 
-    Attributes:
-        object: The object; its pose is in the link.
-        link: The link.
-        touch_links: Links that it may touch; the link itself always.
-    """
-
-    object: CollisionObject
-    link: str
-    touch_links: frozenset[str] = frozenset()
+    object: CollisionObject  # the object; its pose is in the link
+    link: str  # the link
+    touch_links: frozenset[str] = frozenset()  # links that it may touch; the link itself always
 
     def is_same(self, other: AttachedBody) -> bool:
         """Whether another body is the same object on the same link, and may touch the same."""

@@ -26,30 +26,21 @@ from numpy.typing import NDArray
 from ..exceptions import SceneError
 from .shapes import Cells, PlacedShape
 
-OCTOMAP_NAME = '<octomap>'
-"""Name of the octomap among the objects of a scene, as in MoveIt."""
+OCTOMAP_NAME = '<octomap>'  # name of the octomap among the objects of a scene, as in MoveIt
 
 VALUES = {'OcTree': struct.Struct('<f'), 'ColorOcTree': struct.Struct('<f3x')}
 """What each node has in the full stream, by class of the tree."""
 
-ROOT_SIZE = 1 << 16
-"""Edge of the whole tree, in its smallest cells."""
-
-MAX_CELLS = 100_000
-"""How many occupied cells a map may have."""
+ROOT_SIZE = 1 << 16  # edge of the whole tree, in its smallest cells
+MAX_CELLS = 100_000  # how many occupied cells a map may have
 
 BLOCK = 256
 """Cells of one shape, which lie together: a distance to it takes about 30 us, so that no control
 cycle waits long for the interpreter."""
 
-MAX_DATA = 2_000_000
-"""Bytes of a stream at most; a million nodes take about a second."""
-
-OCCUPIED, INNER = 2, 3
-"""States of a child in the binary stream."""
-
-Cubes = NDArray[np.int64]
-"""Least corner x, y, z and edge of cubes, in smallest cells (n, 4)."""
+MAX_DATA = 2_000_000  # bytes of a stream at most; a million nodes take about a second
+OCCUPIED, INNER = 2, 3  # states of a child in the binary stream
+Cubes = NDArray[np.int64]  # least corner x, y, z and edge of cubes, in smallest cells (n, 4)
 
 
 @lru_cache(maxsize=4)
@@ -60,7 +51,6 @@ def octomap_shapes(
 
     Args:
         kind: Class of the tree.
-        data: The stream.
         resolution: Edge of its smallest cells in [m].
         binary: Whether it is the binary stream, else the full one.
 

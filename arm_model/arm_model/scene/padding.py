@@ -17,7 +17,6 @@ def padded(shape: Shape, padding: float, scale: float = 1.0) -> Native:
     """Return a shape of coal that is scaled about its middle, then padded in every direction.
 
     Args:
-        shape: The shape.
         padding: How far it reaches beyond its surface in [m].
         scale: Factor of its lengths; a plane has none.
 

@@ -27,21 +27,14 @@ from .shapes import native, PlacedShape
 
 @dataclass(frozen=True, slots=True)
 class _Body:
-    """A shape that may collide.
+    """A shape that may collide."""
 
-    Attributes:
-        name: Its link or object.
-        link: The link that carries it; empty for an object of the world.
-        joint: Number of the joint that moves it; 0 for what stands still.
-        attached: The attached body that it is part of.
-        padded: Whether it counts against the world only, with its padding, or without that against
-            the robot only; None for both.
-    """
-
-    name: str
-    link: str
-    joint: int
-    attached: AttachedBody | None = None
+    name: str  # its link or object
+    link: str  # the link that carries it; empty for an object of the world
+    joint: int  # number of the joint that moves it; 0 for what stands still
+    attached: AttachedBody | None = None  # the attached body that it is part of
+    # whether it counts against the world only, with its padding, or without that against the robot
+    # only; None for both
     padded: bool | None = None
 
     def counts_against(self, other: _Body) -> bool:
@@ -96,13 +89,8 @@ class PlanningScene:
         """Put a scene together; :attr:`RobotModel.scene` is the first one.
 
         Args:
-            kinematics: The joints that move the links.
-            link_shapes: Shapes of each link.
             allowed: Pairs that may touch.
             objects: Objects of the world.
-            attached_bodies: Objects that move with a link.
-            padding: By link in [m].
-            scale: By link.
 
         Raises:
             SceneError: Two things have one name, a link is unknown, or a padding is not usable.
@@ -173,9 +161,6 @@ class PlanningScene:
     def without(self, name: str) -> PlanningScene:
         """Return the scene without an object or an attached body.
 
-        Args:
-            name: Its name.
-
         Raises:
             SceneError: There is none of this name.
         """
@@ -197,9 +182,6 @@ class PlanningScene:
         """Return the scene with an object of the world taken up by a link, where both are.
 
         Args:
-            name: The object.
-            link: The link.
-            positions: Joint positions in [rad].
             touch_links: Links that it may touch besides.
 
         Raises:
@@ -230,10 +212,6 @@ class PlanningScene:
     def detached(self, name: str, positions: Array) -> PlanningScene:
         """Return the scene with an attached body laid down in the world, where it is.
 
-        Args:
-            name: The body.
-            positions: Joint positions in [rad].
-
         Raises:
             SceneError: No such body is attached.
         """
@@ -247,10 +225,6 @@ class PlanningScene:
 
     def pose(self, name: str, positions: Array) -> Pose:
         """Return where an object or an attached body is, in the root link.
-
-        Args:
-            name: Its name.
-            positions: Joint positions in [rad].
 
         Raises:
             SceneError: There is none of this name.
@@ -277,10 +251,7 @@ class PlanningScene:
 
         Args:
             objects: Objects of the world by name.
-            attached_bodies: Attached bodies by name.
             allowed: Pairs that may touch.
-            padding: By link in [m].
-            scale: By link.
 
         Raises:
             SceneError: Two things have one name, a link is unknown, or a padding is not usable.

@@ -59,15 +59,11 @@ class Cone:
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """A half-space: what lies below the plane is solid, as below a table or behind a wall.
+    """A half-space: what lies below the plane is solid, as below a table or behind a wall."""
 
-    Attributes:
-        normal: Direction that leads out of the solid; of any length.
-        offset: Distance of the plane from the origin along the normal in [m].
-    """
-
+    # direction that leads out of the solid; of any length
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    offset: float = 0.0
+    offset: float = 0.0  # distance of the plane from the origin along the normal in [m]
 
 
 class Mesh:
@@ -121,7 +117,6 @@ class Cells:
     __slots__ = ('edge', 'middles', 'tree')
 
     def __init__(self, middles: Array, edge: float) -> None:
-        """Make the tree."""
         self.middles, self.edge = frozen(middles), edge
         self.tree = coal.makeOctree(np.asarray(middles, dtype=np.float64), edge)
         self.tree.computeLocalAABB()

@@ -15,15 +15,10 @@ from ..validity import ValidityCheck, Violation
 
 @dataclass(frozen=True, slots=True)
 class ConstrainedCheck:
-    """Checks paths; belongs to one thread.
+    """Checks paths; belongs to one thread."""
 
-    Attributes:
-        validity: Limits and contact.
-        constraints: What holds everywhere; None for nothing.
-    """
-
-    validity: ValidityCheck
-    constraints: ConstraintCheck | None = None
+    validity: ValidityCheck  # limits and contact
+    constraints: ConstraintCheck | None = None  # what holds everywhere; None for nothing
 
     def waypoints(self, places: Array) -> Violation | None:
         """Return what is wrong with the straight lines between places; None for nothing.
@@ -37,11 +32,7 @@ class ConstrainedCheck:
         return violation
 
     def path(self, path: Path) -> Violation | None:
-        """Return what is wrong with a path; None for nothing.
-
-        Args:
-            path: The path.
-        """
+        """Return what is wrong with a path; None for nothing."""
         violation = self.validity.path(path)
         if violation is None and self.constraints is not None:
             return self.constraints.path(path)

@@ -46,10 +46,8 @@ class FreeMotion:
         """Prepare.
 
         Args:
-            limits: Limits of the joints, scaled by the request.
             check: Has the last word on states and paths, in the scene of the motion.
             draw: Source of the random numbers.
-            constraints: What holds everywhere on the path; None for nothing.
         """
         self._limits, self._check, self._draw = limits, check, draw
         self._constraints = constraints
@@ -66,7 +64,6 @@ class FreeMotion:
         Args:
             start: Joint positions in [rad] (n), valid; constraints hold there.
             goals: Alternatives in [rad] (k, n), valid; constraints hold there.
-            expired: Whether the time is over.
             further: Goals that are looked for while the search runs; None where a try found none.
 
         Raises:

@@ -23,14 +23,9 @@ from ..validity import ValidityCheck
 PROBE = 0.25
 """Greatest motion of a shape against another between two looks of the broad phase in [m]."""
 
-STRIDE = 0.15
-"""Length of a motion between two states that heed constraints in [rad]."""
-
-MIN_PROGRESS = 0.01
-"""By how much such a motion comes nearer to its target at least in [rad]."""
-
-LOOK = 0.03
-"""Turn of all joints together between two looks at constraints in [rad]."""
+STRIDE = 0.15  # length of a motion between two states that heed constraints in [rad]
+MIN_PROGRESS = 0.01  # by how much such a motion comes nearer to its target at least in [rad]
+LOOK = 0.03  # turn of all joints together between two looks at constraints in [rad]
 
 
 class MotionCheck:
@@ -79,9 +74,6 @@ class MotionCheck:
         """Whether no pair touches, as far as the broad phase sees.
 
         It passes over pairs which are nearer than they may be while their boxes do not touch.
-
-        Args:
-            positions: Joint positions in [rad] (n).
         """
         expanded = self._kinematics.expanded(positions)
         return not pin.computeCollisions(

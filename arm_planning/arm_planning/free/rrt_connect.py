@@ -21,17 +21,13 @@ from arm_model import Array
 
 from .motion_check import MotionCheck
 
-MAX_EXTENSION = 1.2
-"""Greatest length of an edge in [rad]."""
-
-FIRST_NODES = 256
-"""Nodes that a tree has room for at first."""
+MAX_EXTENSION = 1.2  # greatest length of an edge in [rad]
+FIRST_NODES = 256  # nodes that a tree has room for at first
 
 FURTHER_PERIOD = 25
 """Edges between two looks for a further goal, each of which takes as long as several of them."""
 
-SAME = 1e-9
-"""Distance of states that are one in [rad]."""
+SAME = 1e-9  # distance of states that are one in [rad]
 
 
 class _Tree:
@@ -84,11 +80,8 @@ def rrt_connect(
     """Return the places of a path that looks free (m, n); None where the time is over.
 
     Args:
-        start: Joint positions in [rad] (n), free.
         goals: Joint positions in [rad] (n), free; one of them is reached.
         sample: Draws joint positions.
-        check: Checks states and motions.
-        expired: Whether the time is over.
         further: Goals that are looked for meanwhile: each is one, or a try that found none.
     """
     for goal in goals:

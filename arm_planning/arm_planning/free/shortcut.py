@@ -12,14 +12,9 @@ from arm_model import Array
 
 from .motion_check import MotionCheck
 
-MAX_TRIALS = 30
-"""Shortcuts that are tried at most."""
-
-MAX_FAILURES = 8
-"""Shortcuts that fail in a row before the path counts as short."""
-
-MIN_GAIN = 0.05
-"""Length that a shortcut saves at least in [rad]."""
+MAX_TRIALS = 30  # shortcuts that are tried at most
+MAX_FAILURES = 8  # shortcuts that fail in a row before the path counts as short
+MIN_GAIN = 0.05  # length that a shortcut saves at least in [rad]
 
 
 def shortened(
@@ -33,8 +28,6 @@ def shortened(
     Args:
         places: Joint positions in [rad] (m, n) with straight motions between them.
         draw: Source of the random numbers.
-        check: Checks motions.
-        expired: Whether the time is over.
     """
     places = _without_needless(places, check, expired)
     failures = 0

@@ -19,30 +19,18 @@ from arm_trajectory import build_path, GoalError, GoalPoint, GoalRules, Path, Tr
 
 from .constrained_check import ConstrainedCheck
 
-ROUNDING_ROOM = 1.02
-"""Factor of the least times, so that rounding errors break no limit."""
-
-RULES = GoalRules()
-"""Of the trajectories that are made here."""
-
-MAX_ITERATIONS = 30
-"""How often the times of the motions are improved."""
-
-STEP_UP = 1.01
-"""Factor of a time that is improved, so that the search for it ends."""
-
-MIN_SEGMENT = 1e-3
-"""Least time of a part of a path in [s]."""
-
-MIN_DURATION = 0.01
-"""Time for a motion between two places at least in [s]."""
+ROUNDING_ROOM = 1.02  # factor of the least times, so that rounding errors break no limit
+RULES = GoalRules()  # of the trajectories that are made here
+MAX_ITERATIONS = 30  # how often the times of the motions are improved
+STEP_UP = 1.01  # factor of a time that is improved, so that the search for it ends
+MIN_SEGMENT = 1e-3  # least time of a part of a path in [s]
+MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
 
 
 def scaled_limits(limits: JointLimits, velocity: float, acceleration: float) -> JointLimits:
     """Return limits with the factors of a request; jerk goes with the acceleration.
 
     Args:
-        limits: Limits of the joints.
         velocity: Factor of the velocities.
         acceleration: Factor of the accelerations and jerks.
     """
@@ -59,7 +47,6 @@ def timed_path(places: Array, limits: JointLimits, check: ConstrainedCheck) -> P
 
     Args:
         places: Joint positions in [rad] (m, n), with straight motions between them.
-        limits: Limits of the joints, scaled.
         check: Checks the path as it is after timing.
     """
     stops: set[int] = set()
@@ -131,10 +118,6 @@ def _half_times(velocities: Array, limits: JointLimits) -> Array:
     A rounding is the quintic that meets the straight motions with the acceleration 0 as long
     before a corner as behind it. Its acceleration is 0.75 of the change of velocity over that
     time at most, its jerk 1.5 of it over the time squared.
-
-    Args:
-        velocities: Velocities of the straight motions in [rad/s] (m - 1, n).
-        limits: Limits of the joints.
     """
     still = np.zeros((1, velocities.shape[1]))
     jumps = np.abs(np.diff(np.concatenate((still, velocities, still)), axis=0))

@@ -41,23 +41,17 @@ DOUBLE_TOLERANCE = 1e-13
 Rounding parts a double solution by the root of it, which would hide that the wrist is straight.
 """
 
-JOINTS = 6
-"""Joints of such an arm."""
+JOINTS = 6  # joints of such an arm
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class WristMiss:
-    """Why no solution exists.
+    """Why no solution exists."""
 
-    Attributes:
-        distance: How far the wrist is from where the arm can bring it in [m].
-        too_near: Whether it is too near to the shoulder, and not too far.
-    """
-
-    distance: float
-    too_near: bool
+    distance: float  # how far the wrist is from where the arm can bring it in [m]
+    too_near: bool  # whether it is too near to the shoulder, and not too far
 
 
 class ClosedForm:
@@ -218,13 +212,7 @@ class ClosedForm:
     def _wrist_turns(
         self, rows: tuple[Vector, Vector, Vector], pitch: float, seed: float
     ) -> list[tuple[float, float, float]]:
-        """Return the turns of the wrist.
-
-        Args:
-            rows: Rotation that is wanted behind the wrist, turned back by the first joint.
-            pitch: Turn of the forearm about the axes of the elbow in [rad].
-            seed: Position of the fourth joint where it is free in [rad].
-        """
+        """Return the turns of the wrist."""
         cos, sin = math.cos(pitch), math.sin(pitch)
         (x0, y0, z0), (x1, y1, z1), (x2, y2, z2) = rows
         (kx, lx, ux), (ky, ly, uy), (kz, lz, uz) = self._wrist_axes

@@ -24,7 +24,6 @@ class LinkKinematics:
         """Prepare.
 
         Args:
-            model: The arm.
             link: The link; empty for the tip.
 
         Raises:
@@ -49,21 +48,13 @@ class LinkKinematics:
         self._frame = self.kinematics.frames[self.link]
 
     def pose(self, positions: Array) -> Pose:
-        """Return the pose of the link in the root link.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return the pose of the link in the root link."""
         pin.forwardKinematics(self._native, self._data, self.kinematics.expanded(positions))
         placement = pin.updateFramePlacement(self._native, self._data, self._frame)
         return Pose(placement.rotation.copy(), placement.translation.copy())
 
     def pose_and_jacobian(self, positions: Array) -> tuple[Pose, Array]:
-        """Return the pose, and the Jacobian (6, n) of the link's origin along the root's axes.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return the pose, and the Jacobian (6, n) of the link's origin along the root's axes."""
         pin.computeJointJacobians(self._native, self._data, self.kinematics.expanded(positions))
         placement = pin.updateFramePlacement(self._native, self._data, self._frame)
         columns = pin.getFrameJacobian(
@@ -73,11 +64,7 @@ class LinkKinematics:
         return pose, self.kinematics.projected(columns)
 
     def axes(self, positions: Array) -> Array:
-        """Return the screws of the columns (6, columns) in the root link, linear before angular.
-
-        Args:
-            positions: Joint positions in [rad].
-        """
+        """Return the screws of the columns (6, columns) in the root, linear before angular."""
         screws = pin.computeJointJacobians(
             self._native, self._data, self.kinematics.expanded(positions)
         )

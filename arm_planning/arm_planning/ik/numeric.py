@@ -18,39 +18,24 @@ from arm_model import Array, JointLimits, Pose
 
 from .link_kinematics import LinkKinematics, pose_error
 
-CONVERGED = 1e-10
-"""Greatest part of the pose error that counts as none in [m] and [rad]."""
-
-MAX_ITERATIONS = 60
-"""Steps from one start at most."""
-
-MAX_STEP = 0.5
-"""Greatest motion of a joint in a step in [rad] or [m]."""
-
-DAMPING = 1e-2
-"""Damping over the square of the pose error."""
-
-MIN_DAMPING = 1e-13
-"""Least damping, so that a singular arm has a step as well."""
+CONVERGED = 1e-10  # greatest part of the pose error that counts as none in [m] and [rad]
+MAX_ITERATIONS = 60  # steps from one start at most
+MAX_STEP = 0.5  # greatest motion of a joint in a step in [rad] or [m]
+DAMPING = 1e-2  # damping over the square of the pose error
+MIN_DAMPING = 1e-13  # least damping, so that a singular arm has a step as well
 
 MIN_PROGRESS = 0.999
 """A start is given up when so many parts of the error are left after :data:`STALL` steps."""
 
-STALL = 8
-"""Steps without progress after which a start is given up."""
+STALL = 8  # steps without progress after which a start is given up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Descent:
-    """Where steps led.
+    """Where steps led."""
 
-    Attributes:
-        positions: Joint positions in [rad] (n).
-        error: Way in [m] and rotation vector in [rad] that are left (6).
-    """
-
-    positions: Array
-    error: Array
+    positions: Array  # joint positions in [rad] (n)
+    error: Array  # way in [m] and rotation vector in [rad] that are left (6)
 
     @property
     def converged(self) -> bool:
@@ -62,9 +47,7 @@ def descend(link: LinkKinematics, pose: Pose, start: Array, lower: Array, upper:
     """Go to a pose from a start.
 
     Args:
-        link: The link to place.
         pose: Where it is wanted, in the root link.
-        start: Joint positions to start at in [rad].
         lower: Least positions in [rad].
         upper: Greatest positions in [rad].
     """
@@ -108,9 +91,7 @@ def random_start(limits: JointLimits, seed: Array, draw: np.random.Generator) ->
     """Return a start anywhere in the ranges; a joint without end is half a turn off at most.
 
     Args:
-        limits: Limits of the joints.
         seed: Where joints without end are turned from in [rad].
-        draw: The generator.
     """
     lower = np.where(np.isfinite(limits.lower), limits.lower, seed - np.pi)
     upper = np.where(np.isfinite(limits.upper), limits.upper, seed + np.pi)

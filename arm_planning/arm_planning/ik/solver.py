@@ -30,11 +30,8 @@ from .numeric import descend, Descent, random_start
 DEFAULT_TIMEOUT = 0.1
 """Time for numeric inverse kinematics in [s]; several starts of a seven-joint arm."""
 
-MAX_STARTS = 200
-"""Starts of numeric inverse kinematics at most, however much time there is."""
-
-SAME_TOLERANCE = 1e-3
-"""Solutions of which no joint differs by more count as one in [rad]."""
+MAX_STARTS = 200  # starts of numeric inverse kinematics at most, however much time there is
+SAME_TOLERANCE = 1e-3  # solutions of which no joint differs by more count as one in [rad]
 
 RANGE_TOLERANCE = 1e-9
 """How far a solution may be beyond a limit for rounding in [rad]; it is put on the limit."""
@@ -45,14 +42,12 @@ POLISH_TOLERANCE = 1e-10
 Descriptions whose axes are not quite parallel need them, and solutions that are almost singular.
 """
 
-ORTHOGONAL_TOLERANCE = 1e-6
-"""How far a rotation matrix may be from one."""
+ORTHOGONAL_TOLERANCE = 1e-6  # how far a rotation matrix may be from one
 
 AT_PLACE = 1e-3
 """A link that comes as near in [m] is not out of reach: what is missed is its orientation."""
 
-TURN = 2.0 * math.pi
-"""A whole turn in [rad]."""
+TURN = 2.0 * math.pi  # a whole turn in [rad]
 
 
 class IkSolver:
@@ -73,10 +68,8 @@ class IkSolver:
         """Prepare.
 
         Args:
-            model: The arm.
             link: The link to place; empty for the tip.
             clock: Steady time in [s], for time-outs.
-            draw: Source of the random starts; None for one that begins alike in each solver.
 
         Raises:
             PlanningError: There is no such link, or no joint moves it.

@@ -21,11 +21,8 @@ from .ptp import standstill
 from .timing import FullSpeedPath
 from .tracing import trace
 
-NEGLIGIBLE_SLOWDOWN = 1.01
-"""How many times slower joints may make a curve without a note."""
-
-MIN_LENGTH = 1e-9
-"""Way in [m] below which a curve is none."""
+NEGLIGIBLE_SLOWDOWN = 1.01  # how many times slower joints may make a curve without a note
+MIN_LENGTH = 1e-9  # way in [m] below which a curve is none
 
 
 def curve_path(
@@ -41,12 +38,8 @@ def curve_path(
     """Return the path of the joints at full speed along a curve.
 
     Args:
-        link: The link that follows the curve.
         curve: The curve; it begins where the link is.
-        start: Joint positions in [rad].
-        joints: Limits of the joints, with the factors of the request.
         limits: Limits of the link, without them.
-        factors: Of the velocities and of the accelerations.
         name: What the motion is called in messages.
 
     Raises:

@@ -26,8 +26,7 @@ from arm_model import frozen, JointLimits
 
 from ..exceptions import PlanningCode, PlanningError
 
-MIN_SCALING = 1e-4
-"""Least factor of velocity and acceleration, as in Pilz' planner."""
+MIN_SCALING = 1e-4  # least factor of velocity and acceleration, as in Pilz' planner
 
 JERK_RATIO = 10.0
 """Jerk over acceleration along a path in [1/s]: Pilz' planner has no limit of jerk."""
@@ -35,19 +34,12 @@ JERK_RATIO = 10.0
 
 @dataclass(frozen=True, slots=True)
 class CartesianLimits:
-    """Limits of a link's motion; the defaults are those of the Panda and the PRBT in MoveIt.
+    """Limits of a link's motion; the defaults are those of the Panda and the PRBT in MoveIt."""
 
-    Attributes:
-        max_trans_vel: Greatest speed in [m/s].
-        max_trans_acc: Greatest acceleration in [m/s2].
-        max_trans_dec: Greatest deceleration in [m/s2], negative.
-        max_rot_vel: Greatest speed of rotation in [rad/s].
-    """
-
-    max_trans_vel: float = 1.0
-    max_trans_acc: float = 2.25
-    max_trans_dec: float = -5.0
-    max_rot_vel: float = 1.57
+    max_trans_vel: float = 1.0  # greatest speed in [m/s]
+    max_trans_acc: float = 2.25  # greatest acceleration in [m/s2]
+    max_trans_dec: float = -5.0  # greatest deceleration in [m/s2], negative
+    max_rot_vel: float = 1.57  # greatest speed of rotation in [rad/s]
 
     def __post_init__(self) -> None:
         """Refuse limits that are none."""
@@ -63,9 +55,6 @@ class CartesianLimits:
     @classmethod
     def of_table(cls, table: Mapping[str, Any]) -> CartesianLimits:
         """Return the limits of a table ``cartesian_limits``; other keys are left to others.
-
-        Args:
-            table: The table; what it lacks has its default.
 
         Raises:
             PlanningError: A value is no number of the right sign.
@@ -88,7 +77,6 @@ def scaled(limits: JointLimits, velocity: float, acceleration: float) -> JointLi
     """Return limits of joints with the factors of a request; jerk goes with the acceleration.
 
     Args:
-        limits: Limits of the joints.
         velocity: Factor of the velocities.
         acceleration: Factor of the accelerations.
     """

@@ -36,17 +36,13 @@ from .timing import FullSpeedPath, timed
 
 PTP, LIN, CIRC = 'PTP', 'LIN', 'CIRC'
 
-PLANNER_IDS = (PTP, LIN, CIRC)
-"""Names of the planners, as Pilz' planner has them."""
-
-RANGE_TOLERANCE = 1e-6
-"""How far a start or a goal may be beyond a limit for rounding in [rad]."""
+PLANNER_IDS = (PTP, LIN, CIRC)  # names of the planners, as Pilz' planner has them
+RANGE_TOLERANCE = 1e-6  # how far a start or a goal may be beyond a limit for rounding in [rad]
 
 GOAL_TOLERANCE = 1e-3
 """How far from the goal's joint positions a line may end in [rad], as in Pilz' planner."""
 
-POSE = 6
-"""Joints that a pose needs: with more of them it does not say where each is."""
+POSE = 6  # joints that a pose needs: with more of them it does not say where each is
 
 
 class IndustrialPlanner:
@@ -61,7 +57,6 @@ class IndustrialPlanner:
         """Prepare.
 
         Args:
-            model: The arm.
             limits: Limits of a link's motion; None has the defaults.
             clock: Steady time in [s], for time-outs of inverse kinematics.
         """

@@ -16,23 +16,16 @@ from arm_trajectory import brakeable, Path, Segment
 
 from .timing import FullSpeedPath
 
-STANDSTILL = 1e-3
-"""How long a motion takes that has no way in [s]."""
-
-NEGLIGIBLE = 1e-12
-"""Share of the longest way that a joint counts to have at least."""
-
-NO_WAY = 1e-9
-"""Greatest way of a joint that counts as none in [rad]."""
+STANDSTILL = 1e-3  # how long a motion takes that has no way in [s]
+NEGLIGIBLE = 1e-12  # share of the longest way that a joint counts to have at least
+NO_WAY = 1e-9  # greatest way of a joint that counts as none in [rad]
 
 
 def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
     """Return the path at full speed.
 
     Args:
-        start: Joint positions at its begin in [rad].
         goal: Joint positions at its end in [rad].
-        limits: Limits of the joints, with the factors of the request.
     """
     way = goal - start
     size = np.abs(way)
@@ -53,11 +46,7 @@ def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
 
 
 def standstill(positions: Array) -> FullSpeedPath:
-    """Return a path that stays where it is.
-
-    Args:
-        positions: Joint positions in [rad].
-    """
+    """Return a path that stays where it is."""
     coefficients = np.zeros((6, len(positions)))
     coefficients[0] = positions
     return FullSpeedPath(

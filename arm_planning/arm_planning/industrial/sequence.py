@@ -24,17 +24,10 @@ from ..ik.link_kinematics import LinkKinematics
 from ..requests import MotionRequest
 from .timing import FullSpeedPath
 
-SAMPLES = 65
-"""Places at which a motion, or a blend, is looked at."""
-
-MAX_BISECTIONS = 40
-"""Steps to the place at which a motion crosses a sphere."""
-
-SHRINK = 0.8
-"""Factor of the sphere when a blend has left it."""
-
-MAX_SHRINKS = 10
-"""How often it is tried smaller."""
+SAMPLES = 65  # places at which a motion, or a blend, is looked at
+MAX_BISECTIONS = 40  # steps to the place at which a motion crosses a sphere
+SHRINK = 0.8  # factor of the sphere when a blend has left it
+MAX_SHRINKS = 10  # how often it is tried smaller
 
 BLEND_MARGIN = 0.95
 """Share of acceleration and jerk of the profile in a blended group: joints bend besides."""
@@ -42,15 +35,12 @@ BLEND_MARGIN = 0.95
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequenceItem:
-    """A motion of a sequence.
+    """A motion of a sequence."""
 
-    Attributes:
-        request: The motion, whose start counts for the first one alone; or what makes it of the
-            joint positions in [rad] (n) at which it begins, for the first one of None.
-        blend_radius: Radius about its goal in which the next motion may begin, in [m]; 0 stops.
-    """
-
+    # the motion, whose start counts for the first one alone; or what makes it of the joint
+    # positions in [rad] (n) at which it begins, for the first one of None
     request: MotionRequest | Callable[[Array | None], MotionRequest]
+    # radius about its goal in which the next motion may begin, in [m]; 0 stops
     blend_radius: float = 0.0
 
     def at(self, start: Array | None) -> MotionRequest:
@@ -89,7 +79,6 @@ def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) 
 
     Args:
         radii: Blend radius of each motion of a group in [m].
-        corners: Where the link is at the end of each, in the root link in [m].
         first: Number of the first motion.
 
     Raises:
@@ -112,7 +101,6 @@ def joined(
 
     Args:
         parts: The motions, two or more; each begins where the one before ends.
-        radii: Blend radius at the end of each but the last in [m].
         link: The link whose way the radii limit.
         first: Number of the first motion.
 
@@ -155,17 +143,11 @@ def joined(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Blend:
-    """How a motion leads into the next.
+    """How a motion leads into the next."""
 
-    Attributes:
-        leave: When the first is left, in its time in [s].
-        join: When the second is joined, in its time in [s].
-        segment: What leads from one to the other.
-    """
-
-    leave: float
-    join: float
-    segment: Segment
+    leave: float  # when the first is left, in its time in [s]
+    join: float  # when the second is joined, in its time in [s]
+    segment: Segment  # what leads from one to the other
 
     @classmethod
     def between(

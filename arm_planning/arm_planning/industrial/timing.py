@@ -13,14 +13,12 @@ from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Se
 
 from ..link_speed import slower
 
-MAX_SPACING = 0.05
-"""Greatest length of a segment of a path that is not straight in [s]."""
+MAX_SPACING = 0.05  # greatest length of a segment of a path that is not straight in [s]
 
 MAX_SEGMENTS = 400
 """Segments of that length at most: a slow path bends as little from one to the next."""
 
-MIN_SPACING = 1e-4
-"""Places that are nearer than this in time count as one in [s]."""
+MIN_SPACING = 1e-4  # places that are nearer than this in time count as one in [s]
 
 SPEEDS = (0.75, 0.55, 0.4, 0.3, 0.2)
 """Shares of the full speed that are tried one after the other, while they make a path quicker.
@@ -28,36 +26,21 @@ SPEEDS = (0.75, 0.55, 0.4, 0.3, 0.2)
 A path that slows down at many places is quicker at an even speed.
 """
 
-SLOW = 1.5
-"""How much longer a path may take for its joints before an even speed is tried."""
-
-QUANTITIES = ('speed', 'acceleration', 'jerk')
-"""Names of what is limited."""
-
-SLOWER_MARGIN = 1.001
-"""Factor for rounding where a whole path is followed slower."""
-
-NEGLIGIBLE_SLOWDOWN = 1.01
-"""Factor by which a path may take longer without a note."""
+SLOW = 1.5  # how much longer a path may take for its joints before an even speed is tried
+QUANTITIES = ('speed', 'acceleration', 'jerk')  # names of what is limited
+SLOWER_MARGIN = 1.001  # factor for rounding where a whole path is followed slower
+NEGLIGIBLE_SLOWDOWN = 1.01  # factor by which a path may take longer without a note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FullSpeedPath:
-    """A path by the time that it takes at full speed, and how it begins and ends.
+    """A path by the time that it takes at full speed, and how it begins and ends."""
 
-    Attributes:
-        path: The joints by time at full speed; its velocity and acceleration do not jump.
-        acceleration: Greatest change of the speed, as a share of the full one, in [1/s].
-        jerk: Greatest change of that in [1/s2].
-        straight: Whether joints keep the limits by these two alone, all in phase.
-        notes: What a person should know of it.
-    """
-
-    path: Path
-    acceleration: float
-    jerk: float
-    straight: bool = False
-    notes: tuple[str, ...] = ()
+    path: Path  # the joints by time at full speed; its velocity and acceleration do not jump
+    acceleration: float  # greatest change of the speed, as a share of the full one, in [1/s]
+    jerk: float  # greatest change of that in [1/s2]
+    straight: bool = False  # whether joints keep the limits by these two alone, all in phase
+    notes: tuple[str, ...] = ()  # what a person should know of it
 
 
 def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ...]]:
@@ -65,7 +48,6 @@ def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ..
 
     Args:
         full: The path at full speed.
-        limits: Limits of the joints, with the factors of the request.
     """
     if not full.path.coefficients[:, 1:].any():  # it stands still
         return full.path, full.notes

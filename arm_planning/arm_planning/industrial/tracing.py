@@ -30,38 +30,26 @@ from ..ik.link_kinematics import LinkKinematics, pose_error
 POSITION_TOLERANCE = 2e-5
 """Greatest way off the curve between two places in [m]; a fifth of what is promised."""
 
-ROTATION_TOLERANCE = 1e-4
-"""Greatest angle off the curve in [rad]."""
+ROTATION_TOLERANCE = 1e-4  # greatest angle off the curve in [rad]
 
 FIRST_STEP, MIN_STEP, MAX_STEP = 1 / 16, 1e-5, 1 / 6
 """Shares of a curve from one place to the next."""
 
-EASY = 1 / 60
-"""Share of the tolerance below which the next step is twice as long."""
-
-ON_CURVE = 1e-11
-"""Pose error that counts as none in [m] and [rad]."""
-
-MAX_NEWTON = 6
-"""Newton steps to a place at most; from a good guess two suffice."""
+EASY = 1 / 60  # share of the tolerance below which the next step is twice as long
+ON_CURVE = 1e-11  # pose error that counts as none in [m] and [rad]
+MAX_NEWTON = 6  # newton steps to a place at most; from a good guess two suffice
 
 MAX_CORRECTION = 0.3
 """Greatest motion of a joint in a Newton step in [rad]: more leads to another configuration."""
 
-DIFFERENCE = 1e-6
-"""Share of a curve between the places of a difference quotient."""
-
-SHARPNESS = 16
-"""Exponent of the smooth maximum."""
+DIFFERENCE = 1e-6  # share of a curve between the places of a difference quotient
+SHARPNESS = 16  # exponent of the smooth maximum
 
 MAX_SLOWDOWN = 200.0
 """How many times slower than the full speed a curve is followed before it counts as singular."""
 
-RANGE_TOLERANCE = 1e-9
-"""Rounding beyond a limit that is let pass in [rad]."""
-
-POSE = 6
-"""Numbers that a pose has: with more joints, an arm is redundant."""
+RANGE_TOLERANCE = 1e-9  # rounding beyond a limit that is let pass in [rad]
+POSE = 6  # numbers that a pose has: with more joints, an arm is redundant
 
 _FIELDS = ('positions', 'first', 'second')
 
@@ -75,17 +63,11 @@ its sign changes in the middle.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """Joint positions along a curve.
+    """Joint positions along a curve."""
 
-    Attributes:
-        path: The joints by time at the full speed.
-        slowdown: How many times slower the joints make it at the worst place.
-        joint: Number of the joint that does.
-    """
-
-    path: Path
-    slowdown: float
-    joint: int
+    path: Path  # the joints by time at the full speed
+    slowdown: float  # how many times slower the joints make it at the worst place
+    joint: int  # number of the joint that does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,10 +92,7 @@ def trace(
     """Follow a curve from a start.
 
     Args:
-        link: The link that follows it.
         curve: The curve; it begins where the link is.
-        start: Joint positions in [rad].
-        limits: Limits of the joints.
         duration: How long the curve takes at the full speed in [s].
         name: What the motion is called in messages.
 

@@ -33,19 +33,12 @@ NO_MOVEIT_CPP = 'these are of MoveItCpp'
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A parameter, or several alike.
+    """A parameter, or several alike."""
 
-    Attributes:
-        pattern: Its name; ``*`` is one key, ``**`` one or more.
-        needed: What its value must be, in words; empty for anything.
-        fits: Whether a value is that.
-        reason: Why it has no effect; empty where it has one.
-    """
-
-    pattern: str
-    needed: str = ''
-    fits: Callable[[object], bool] = lambda _: True
-    reason: str = ''
+    pattern: str  # its name; ``*`` is one key, ``**`` one or more
+    needed: str = ''  # what its value must be, in words; empty for anything
+    fits: Callable[[object], bool] = lambda _: True  # whether a value is that
+    reason: str = ''  # why it has no effect; empty where it has one
 
     def matches(self, name: str) -> bool:
         """Return whether a name is one of these."""
@@ -180,8 +173,7 @@ KNOWN: Sequence[Known] = (
 )
 """All of them; the first that matches counts."""
 
-ALIKE = 0.8
-"""How much a key that is misspelt resembles the right one, of 1."""
+ALIKE = 0.8  # how much a key that is misspelt resembles the right one, of 1
 
 CLOSED = (f'{LIMITS}.', f'{CARTESIAN}.')
 """Tables whose keys are all known: another one is misspelt."""
@@ -230,7 +222,6 @@ def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
     """Return a line for each parameter without effect that resembles one that has some.
 
     Args:
-        names: Parameters that were given.
         places: Where they come from, of those that come from a file.
     """
     lines = []
@@ -248,7 +239,6 @@ def without_effect(names: Sequence[str], sensors: Sequence[str] = ()) -> list[st
     """Return a line for each reason why parameters have no effect, with their names.
 
     Args:
-        names: Parameters that were given.
         sensors: Names of updaters of octomaps, which have tables of their own.
     """
     reasons: dict[str, dict[str, None]] = {}

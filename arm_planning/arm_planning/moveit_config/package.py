@@ -45,17 +45,12 @@ ASSISTANT = 'moveit_setup_assistant_config'
 
 @dataclass(frozen=True, slots=True)
 class MoveItPackage:
-    """What a package says.
+    """What a package says."""
 
-    Attributes:
-        folder: Its folder.
-        parameters: Parameters of move_group by name, the descriptions of the robot too.
-        places: Where they are.
-    """
-
-    folder: Path
+    folder: Path  # its folder
+    # parameters of move_group by name, the descriptions of the robot too
     parameters: Mapping[str, object]
-    places: Mapping[str, Place] = field(default_factory=dict)
+    places: Mapping[str, Place] = field(default_factory=dict)  # where they are
 
 
 def read_package(folder: Path, xacro_args: Mapping[str, str] | None = None) -> MoveItPackage:

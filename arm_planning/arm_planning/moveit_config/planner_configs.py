@@ -7,22 +7,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-TYPE = 'type'
-"""Key of what searches, in a configuration."""
+TYPE = 'type'  # key of what searches, in a configuration
 
 
 @dataclass(frozen=True, slots=True)
 class PlannerConfigs:
-    """Names under which clients ask for planners.
+    """Names under which clients ask for planners."""
 
-    Attributes:
-        configs: Entries of each configuration, by its name.
-        groups: Names of the configurations of each group.
-        defaults: That of a group whose requests name none.
-    """
-
+    # entries of each configuration, by its name
     configs: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    # names of the configurations of each group
     groups: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    # that of a group whose requests name none
     defaults: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -45,11 +41,7 @@ class PlannerConfigs:
         return self.defaults.get(group, '') if name in {'', group} else name
 
     def search(self, name: str) -> str:
-        """Return what searches by a configuration, by OMPL's name; empty where it is unknown.
-
-        Args:
-            name: Of the configuration.
-        """
+        """Return what searches by a configuration, by OMPL's name; empty where it is unknown."""
         listed = {each for names in self.groups.values() for each in names}
         if not self.configs and name in listed:  # by the names of MoveIt's own configurations
             return f'geometric::{name.removesuffix("ConfigDefault").removesuffix("k")}'

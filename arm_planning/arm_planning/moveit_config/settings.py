@@ -14,37 +14,25 @@ from .yaml_file import Place
 
 PLANNING = 'robot_description_planning'
 TIMEOUT = 'kinematics_solver_timeout'
-PIPELINES = ('ompl', 'pilz_industrial_motion_planner')
-"""Planning pipelines that are here."""
+PIPELINES = ('ompl', 'pilz_industrial_motion_planner')  # planning pipelines that are here
 
 
 @dataclass(frozen=True, slots=True)
 class MoveItSettings:
-    """What was set; the defaults are what holds without.
+    """What was set; the defaults are what holds without."""
 
-    Attributes:
-        joint_limits: Tables of limits by joint; None where no parameter has any.
-        cartesian_limits: Limits of LIN and CIRC.
-        velocity_scaling: Factor of requests that have none.
-        acceleration_scaling: Factor of requests that have none.
-        ik_timeouts: Time for inverse kinematics in [s], by group.
-        planners: Planner configurations.
-        default_pipeline: Of requests that name none; empty for ours.
-        default_industrial: Planner of requests to Pilz' pipeline that name none.
-        sensors: Names of updaters of octomaps, whose tables have no effect.
-        notes: What has no effect, for the log.
-    """
-
+    # tables of limits by joint; None where no parameter has any
     joint_limits: Mapping[str, Mapping[str, object]] | None = None
-    cartesian_limits: Mapping[str, object] = field(default_factory=dict)
-    velocity_scaling: float = 1.0
-    acceleration_scaling: float = 1.0
+    cartesian_limits: Mapping[str, object] = field(default_factory=dict)  # limits of LIN and CIRC
+    velocity_scaling: float = 1.0  # factor of requests that have none
+    acceleration_scaling: float = 1.0  # factor of requests that have none
+    # time for inverse kinematics in [s], by group
     ik_timeouts: Mapping[str, float] = field(default_factory=dict)
-    planners: PlannerConfigs = field(default_factory=PlannerConfigs)
-    default_pipeline: str = ''
-    default_industrial: str = 'PTP'
-    sensors: Sequence[str] = ()
-    notes: Sequence[str] = ()
+    planners: PlannerConfigs = field(default_factory=PlannerConfigs)  # planner configurations
+    default_pipeline: str = ''  # of requests that name none; empty for ours
+    default_industrial: str = 'PTP'  # planner of requests to Pilz' pipeline that name none
+    sensors: Sequence[str] = ()  # names of updaters of octomaps, whose tables have no effect
+    notes: Sequence[str] = ()  # what has no effect, for the log
 
 
 def read_settings(
@@ -95,10 +83,8 @@ def of_nothing(
     MoveIt reads none of them, and does not say so.
 
     Args:
-        names: Parameters that were given.
         places: Where they come from, of those that come from a file.
         groups: Names of the groups of the robot.
-        joints: Names of its joints.
         controllers: Names of the controllers that follow trajectories.
     """
     lines = []

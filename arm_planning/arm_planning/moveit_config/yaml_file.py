@@ -19,15 +19,10 @@ EXPONENT = re.compile(r'[-+]?\d+(\.\d*)?[eE][-+]?\d+')
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a parameter comes from.
+    """Where a parameter comes from."""
 
-    Attributes:
-        file: The file.
-        line: Its line, from 1 on.
-    """
-
-    file: Path
-    line: int
+    file: Path  # the file
+    line: int  # its line, from 1 on
 
     def __str__(self) -> str:
         """Return it as compilers write it."""
@@ -36,22 +31,16 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class FlatYaml:
-    """A file.
+    """A file."""
 
-    Attributes:
-        values: Its scalars and lists by name, with dots between the keys.
-        places: Where each of them is, and each table.
-    """
-
-    values: Mapping[str, object]
-    places: Mapping[str, Place]
+    values: Mapping[str, object]  # its scalars and lists by name, with dots between the keys
+    places: Mapping[str, Place]  # where each of them is, and each table
 
 
 def read_flat(path: Path, prefix: str = '') -> FlatYaml:
     """Read a file.
 
     Args:
-        path: The file.
         prefix: Before each name, with its dot.
 
     Raises:

@@ -16,17 +16,11 @@ from node_runner import create_deferred_service
 
 from ..exceptions import PlanningCode, PlanningError
 
-SOURCE = 'move_group'
-"""Who reports an error code."""
+SOURCE = 'move_group'  # who reports an error code
 
 
 def error_code(code: PlanningCode = PlanningCode.SUCCESS, reason: str = '') -> MoveItErrorCodes:
-    """Return a moveit_msgs/MoveItErrorCodes.
-
-    Args:
-        code: The code.
-        reason: What is wrong, in words.
-    """
+    """Return a moveit_msgs/MoveItErrorCodes."""
     return MoveItErrorCodes(val=int(code), message=reason, source=SOURCE)
 
 
@@ -49,12 +43,6 @@ class Background:
     """
 
     def __init__(self, node: Node, name: str) -> None:
-        """Start no thread before there is work.
-
-        Args:
-            node: The node.
-            name: Name of the threads.
-        """
         self._node, self._name = node, name
         self._pools: dict[str, ThreadPoolExecutor] = {}
         self.is_closing = False
@@ -70,7 +58,6 @@ class Background:
         """Have work done, and what follows from it in the executor of the node.
 
         Args:
-            work: What is done in the thread.
             then: Gets the future of the work when that is done or cancelled.
             lane: Work of other lanes is not waited for.
         """
@@ -95,10 +82,7 @@ class Background:
         """Offer a service whose answers are made in the thread.
 
         Args:
-            kind: Type of the service.
-            name: Its name.
             begin: Called in the executor with the request; returns what makes the response.
-            refuse: Fills the response of a request that is refused.
             lane: Returns the lane of a request that was begun.
         """
 

@@ -14,38 +14,24 @@ from trajectory_msgs.msg import JointTrajectory
 
 @dataclass(frozen=True, slots=True)
 class ControllerKind:
-    """What a controller takes.
+    """What a controller takes."""
 
-    Attributes:
-        name: MoveIt's name of it.
-        action: Class of its action.
-        namespace: Name of its action below that of the controller, by default.
-        goal: Makes a goal of the part of a trajectory that is for its joints.
-        single: Whether it moves one joint only.
-    """
-
-    name: str
-    action: Any
-    namespace: str
+    name: str  # MoveIt's name of it
+    action: Any  # class of its action
+    namespace: str  # name of its action below that of the controller, by default
+    # makes a goal of the part of a trajectory that is for its joints
     goal: Callable[[JointTrajectory], Any]
-    single: bool = False
+    single: bool = False  # whether it moves one joint only
 
 
 @dataclass(frozen=True, slots=True)
 class Controller:
-    """A controller.
+    """A controller."""
 
-    Attributes:
-        joints: Joints that it moves.
-        kind: What it takes.
-        namespace: Name of its action below that of the controller.
-        max_effort: Greatest effort of a GripperCommand in [N]; 0 for its own.
-    """
-
-    joints: Sequence[str]
-    kind: ControllerKind
-    namespace: str
-    max_effort: float = 0.0
+    joints: Sequence[str]  # joints that it moves
+    kind: ControllerKind  # what it takes
+    namespace: str  # name of its action below that of the controller
+    max_effort: float = 0.0  # greatest effort of a GripperCommand in [N]; 0 for its own
 
     def goal(self, part: JointTrajectory) -> Any:  # noqa: ANN401  # messages have no type
         """Return the goal of its action for the part of a trajectory that is for its joints."""

@@ -17,20 +17,13 @@ from ..exceptions import PlanningCode, PlanningError
 from .background import error_code
 from .execution import Execution, TrajectoryExecution
 
-STOP = 'stop'
-"""The event that stops everything."""
+STOP = 'stop'  # the event that stops everything
 
 
 class ExecuteAction:
     """Executes trajectories that clients have planned."""
 
     def __init__(self, node: Node, execution: TrajectoryExecution) -> None:
-        """Offer them.
-
-        Args:
-            node: The node.
-            execution: What executes.
-        """
         self._node, self._execution = node, execution
         self._running: dict[bytes, Execution] = {}
         self._outcomes: dict[bytes, tuple[PlanningCode, str]] = {}
@@ -89,7 +82,6 @@ def conclude(handle: Any, code: PlanningCode) -> None:  # noqa: ANN401
     """Give a goal the status of an outcome, as MoveIt does.
 
     Args:
-        handle: The goal.
         code: How it ended.
     """
     if code is PlanningCode.SUCCESS:

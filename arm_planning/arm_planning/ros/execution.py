@@ -31,17 +31,13 @@ from ..exceptions import PlanningCode, PlanningError
 from .controllers import Controller, FOLLOW
 from .joint_trajectory import check_trajectory, from_start, part_of
 
-WATCH_PERIOD = 0.05
-"""How often executions are looked at in [s]."""
-
-STOP_TIMEOUT = 5.0
-"""Time in which controllers must have stopped in [s]; then they are asked again."""
+WATCH_PERIOD = 0.05  # how often executions are looked at in [s]
+STOP_TIMEOUT = 5.0  # time in which controllers must have stopped in [s]; then they are asked again
 
 FINDING_TIMEOUT = 5.0
 """Time in [s] in which actions of controllers must be found: who has just started knows none."""
 
-STATE_TIMEOUT = 1.0
-"""Age at which the speed override of a controller counts no more in [s]."""
+STATE_TIMEOUT = 1.0  # age at which the speed override of a controller counts no more in [s]
 
 FORGOTTEN = (CancelGoal.Response.ERROR_UNKNOWN_GOAL_ID, CancelGoal.Response.ERROR_GOAL_TERMINATED)
 """Answers to a cancel of controllers that do not follow the goal any more."""
@@ -53,52 +49,36 @@ Done = Callable[[PlanningCode, str], None]
 
 @dataclass(frozen=True, slots=True)
 class ExecutionLimits:
-    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``.
+    """When an execution is refused or ended; MoveIt's parameters ``trajectory_execution.*``."""
 
-    Attributes:
-        start_tolerance: How far the robot may be from the start in [rad]; 0 for anywhere.
-        duration_scaling: How many times as long as planned it may take.
-        duration_margin: How much longer than that in [s].
-        is_monitored: Whether one that takes longer is stopped.
-        is_allowed: Whether anything is executed.
-    """
-
+    # how far the robot may be from the start in [rad]; 0 for anywhere
     start_tolerance: float = 0.01
-    duration_scaling: float = 1.1
-    duration_margin: float = 0.5
-    is_monitored: bool = True
-    is_allowed: bool = True
+    duration_scaling: float = 1.1  # how many times as long as planned it may take
+    duration_margin: float = 0.5  # how much longer than that in [s]
+    is_monitored: bool = True  # whether one that takes longer is stopped
+    is_allowed: bool = True  # whether anything is executed
 
 
 @dataclass(slots=True, eq=False)
 class Execution:
-    """A trajectory on its way.
+    """A trajectory on its way."""
 
-    Attributes:
-        trajectory: The trajectory_msgs/JointTrajectory.
-        done: Called once, with how it ended.
-        begin: Steady time in [s] at which its controllers were asked.
-        is_over: Whether ``done`` was called; a controller may still be on its way then.
-        is_complete: Whether all controllers that have ended reached the end of the trajectory.
-        in_doubt: Whether it is still to be found out why a controller gave up.
-        held: Goals of its controllers that wait until the actions of all are found, by controller.
-        is_sent: Whether they were sent.
-        way: The trajectory with the way to its first point.
-    """
-
-    trajectory: Any
-    done: Done
+    trajectory: Any  # the trajectory_msgs/JointTrajectory
+    done: Done  # called once, with how it ended
+    # steady time in [s] at which its controllers were asked
     begin: float = field(default_factory=time.monotonic)
     deadline: float = 0.0
     handles: dict[str, Any] = field(default_factory=dict)
     waits_for: set[str] = field(default_factory=set)
     ending: tuple[PlanningCode, str] | None = None
-    is_over: bool = False
+    is_over: bool = False  # whether ``done`` was called; a controller may still be on its way then
+    # whether all controllers that have ended reached the end of the trajectory
     is_complete: bool = True
-    in_doubt: bool = False
+    in_doubt: bool = False  # whether it is still to be found out why a controller gave up
+    # goals of its controllers that wait until the actions of all are found, by controller
     held: dict[str, Any] = field(default_factory=dict)
-    is_sent: bool = False
-    way: Any = None
+    is_sent: bool = False  # whether they were sent
+    way: Any = None  # the trajectory with the way to its first point
 
     @property
     def joints(self) -> set[str]:
@@ -120,8 +100,6 @@ class TrajectoryExecution:
         """Know the controllers; their actions may come later.
 
         Args:
-            node: The node.
-            controllers: By their names.
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
             limits: When an execution is refused or ended.
@@ -199,7 +177,6 @@ class TrajectoryExecution:
         """Have a trajectory followed, once the actions of its controllers are found.
 
         Args:
-            trajectory: A trajectory_msgs/JointTrajectory.
             done: Called once, when it has ended, or its controllers are not there.
             names: Controllers that may follow it; empty for all.
 
@@ -292,8 +269,6 @@ class TrajectoryExecution:
         """Have it stopped; ``done`` is called when the controllers have.
 
         Args:
-            execution: The execution.
-            code: Why.
             reason: The same in words.
         """
         if execution.is_over:
@@ -315,11 +290,7 @@ class TrajectoryExecution:
             handle.cancel_goal_async()
 
     def stop_all(self, reason: str) -> None:
-        """Have everything stopped that is on its way; what was to follow counts :attr:`stops`.
-
-        Args:
-            reason: Why.
-        """
+        """Have everything stopped that is on its way; what was to follow counts :attr:`stops`."""
         self.stops += 1
         for execution in list(self._running):
             self.stop(execution, PlanningCode.PREEMPTED, reason)
@@ -437,10 +408,6 @@ class TrajectoryExecution:
         """Whether an execution takes too long; what a speed override costs does not count.
 
         The duration of a gripper is not watched: it ends its goal when it stalls.
-
-        Args:
-            execution: The execution.
-            passed: Time since this was last asked in [s].
         """
         if execution.ending is None:
             timed = self._timed & execution.waits_for

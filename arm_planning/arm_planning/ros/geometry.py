@@ -39,8 +39,7 @@ from arm_model.ros import hull_of, xyz, xyzw
 
 from ..exceptions import PlanningCode, PlanningError
 
-MIN_THICKNESS = 1e-6
-"""Least extent of a mesh along its thinnest axis in [m] that is a volume."""
+MIN_THICKNESS = 1e-6  # least extent of a mesh along its thinnest axis in [m] that is a volume
 
 
 def pose_of(
@@ -51,8 +50,6 @@ def pose_of(
     """Return a geometry_msgs/Pose.
 
     Args:
-        message: The pose.
-        what: What it is the pose of, for the message of the error.
         code: Of the error.
 
     Raises:
@@ -70,9 +67,7 @@ def placement(
     """Return a pose.
 
     Args:
-        position: In [m].
         quaternion: x, y, z, w.
-        what: What it is the pose of, for the message of the error.
         code: Of the error.
 
     Raises:
@@ -134,7 +129,6 @@ def check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
     """Make sure that a shape_msgs/Mesh is a body.
 
     Args:
-        message: The mesh.
         what: What it is a part of.
 
     Raises:
@@ -146,11 +140,7 @@ def check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
 
 
 def volumes(message: Any) -> tuple[float, float]:  # noqa: ANN401
-    """Return the volumes of a shape_msgs/Mesh that is a body and of its hull; 0 for an open one.
-
-    Args:
-        message: The mesh.
-    """
+    """Return the volumes of a closed shape_msgs/Mesh and of its hull; 0 for an open one."""
     corners, triangles = _arrays(message)
     hull = hull_of(corners.tobytes()).hull
     corners, same = np.unique(corners, axis=0, return_inverse=True)

@@ -21,9 +21,6 @@ ROWS = ('positions', 'velocities', 'accelerations')
 def check_trajectory(trajectory: Any) -> None:  # noqa: ANN401  # messages have no type
     """Refuse a trajectory that no controller can follow.
 
-    Args:
-        trajectory: A trajectory_msgs/JointTrajectory.
-
     Raises:
         PlanningError: It has no points, names a joint twice, a row is too long or too short, a
             number is not finite, or its times do not increase.
@@ -47,12 +44,7 @@ def check_trajectory(trajectory: Any) -> None:  # noqa: ANN401  # messages have 
 
 
 def part_of(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa: ANN401
-    """Return the trajectory of some of the joints.
-
-    Args:
-        trajectory: A trajectory_msgs/JointTrajectory that was checked.
-        joints: Names of the joints.
-    """
+    """Return the trajectory of some of the joints."""
     names = list(trajectory.joint_names)
     columns = [names.index(joint) for joint in joints]
     part = JointTrajectory(joint_names=list(joints))
@@ -70,7 +62,6 @@ def from_start(trajectory: Any, start: Sequence[float]) -> JointTrajectory:  # n
     """Return a trajectory with the way to its first point, where that is later than its begin.
 
     Args:
-        trajectory: A trajectory_msgs/JointTrajectory that was checked.
         start: Where its joints stand at its begin in [rad] (n).
     """
     first = trajectory.points[0]

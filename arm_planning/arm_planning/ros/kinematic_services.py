@@ -51,10 +51,6 @@ class KinematicServices:
         """Offer the services.
 
         Args:
-            node: The node.
-            monitor: The scene and where the joints are.
-            background: The thread.
-            robot: The robot, for that thread alone.
             settings: What holds where a request does not say so.
         """
         self._node, self._monitor = node, monitor
@@ -101,8 +97,6 @@ class GroupKinematics:
         """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state.
 
         Args:
-            request: The request.
-            snapshot: The scene.
             positions: Positions of all joints of the robot in [rad], of which it begins.
 
         Raises:
@@ -148,8 +142,6 @@ class GroupKinematics:
         A path that ends early has the code SUCCESS, its fraction, and the reason as message.
 
         Args:
-            request: The request.
-            snapshot: The scene.
             positions: Positions of all joints of the robot in [rad], where it begins.
 
         Raises:

@@ -24,8 +24,7 @@ from .execute_action import conclude
 from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .planning import PlannedMotion, PlanningThreads, sequence_group, sequence_response
 
-REPLAN_ATTEMPTS = 5
-"""How often a goal that does not say so is planned anew at most, as in MoveIt."""
+REPLAN_ATTEMPTS = 5  # how often a goal that does not say so is planned anew at most, as in MoveIt
 STATE_WAITS, STATE_PERIOD = 10, 0.1
 """How often joint states that are unknown or too old are looked for again, and time between two
 looks in [s]; MoveIt waits for a second, too."""
@@ -37,22 +36,15 @@ Answer = Callable[[MoveItErrorCodes, PlannedMotion | None, bool], Any]
 
 @dataclass(frozen=True, slots=True)
 class MotionKind:
-    """What an action asks for, and how it is answered.
+    """What an action asks for, and how it is answered."""
 
-    Attributes:
-        action: Its class.
-        name: Its name.
-        prepare: Takes what a goal asks for, whether it is planned anew, and what says that it is
-            canceled; returns what plans it in the thread of its group; raises PlanningError.
-        group: Returns the group of what a goal asks for.
-        answer: Makes the result of how it ended, the plan, and whether that was begun.
-    """
-
-    action: Any
-    name: str
+    action: Any  # its class
+    name: str  # its name
+    # takes what a goal asks for, whether it is planned anew, and what says that it is canceled;
+    # returns what plans it in the thread of its group; raises PlanningError
     prepare: Prepare
-    group: Callable[[Any], str]
-    answer: Answer
+    group: Callable[[Any], str]  # returns the group of what a goal asks for
+    answer: Answer  # makes the result of how it ended, the plan, and whether that was begun
 
 
 def single_motion(planning: PlanningThreads) -> MotionKind:
@@ -141,11 +133,7 @@ class MotionAction:
         """Offer it.
 
         Args:
-            node: The node.
-            kind: The action.
             planning: What shows plans.
-            background: The threads of planning.
-            execution: What executes.
         """
         self._node, self._kind, self._planning = node, kind, planning
         self._background, self._execution = background, execution

@@ -49,8 +49,7 @@ START_BOUNDS_ERROR = 0.01
 """How far a joint may be beyond a limit at the start in [rad]: drives stand off by some; MoveIt's
 start_state_max_bounds_error. As much is allowed when the motion begins."""
 
-ROUNDING = 1e-9
-"""By how much joint constraints may miss each other for rounding in [rad] or [m]."""
+ROUNDING = 1e-9  # by how much joint constraints may miss each other for rounding in [rad] or [m]
 
 BAD_GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS
 
@@ -72,9 +71,6 @@ class RequestReader:
         """Read for a group.
 
         Args:
-            model: The group.
-            snapshot: The scene, for the frames of goals.
-            positions: Where all joints of the robot are in [rad].
             settings: What holds where a request does not say so.
         """
         self._settings = settings or MoveItSettings()
@@ -174,8 +170,6 @@ class RequestReader:
         """Return a geometry_msgs/Pose of a frame in the root link.
 
         Args:
-            message: The pose.
-            frame: The frame that it is in.
             what: What it is the pose of.
 
         Raises:
@@ -368,7 +362,6 @@ def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
     """Return a scaling factor; 0 is one that was not given.
 
     Args:
-        what: Velocity or acceleration.
         value: The factor of the message.
         default: The factor where none was given.
 

@@ -34,29 +34,17 @@ from .robot_groups import RobotGroups
 
 @dataclass(frozen=True, slots=True)
 class MoveGroupParameters:
-    """What move_group was given.
+    """What move_group was given."""
 
-    Attributes:
-        description: What describes the robot.
-        settings: What parameters of MoveIt's names say.
-        cartesian_limits: Limits of LIN and CIRC.
-        places: Where parameters come from, of those that come from a file.
-        names: Names of all that were given, less those of sensors.
-    """
-
-    description: Description
-    settings: MoveItSettings
-    cartesian_limits: CartesianLimits
-    places: Mapping[str, Place]
-    names: Sequence[str]
+    description: Description  # what describes the robot
+    settings: MoveItSettings  # what parameters of MoveIt's names say
+    cartesian_limits: CartesianLimits  # limits of LIN and CIRC
+    places: Mapping[str, Place]  # where parameters come from, of those that come from a file
+    names: Sequence[str]  # names of all that were given, less those of sensors
 
 
 def declare_parameters(node: Node, package: MoveItPackage | None = None) -> MoveGroupParameters:
     """Declare what describes the robot, read what is for its planners, log what has no effect.
-
-    Args:
-        node: The node.
-        package: Gives what nobody gave the node.
 
     Raises:
         ArmError: A parameter is missing or refused.
@@ -95,7 +83,6 @@ def declare_others(node: Node, names: Sequence[str]) -> None:
     """Declare what MoveIt has and nobody declared, so that tools list it; refuse what is misspelt.
 
     Args:
-        node: The node, which has declared its own parameters.
         names: Names of all that were given.
 
     Raises:
@@ -141,9 +128,6 @@ def _complete(
 def declare_execution_limits(node: Node) -> ExecutionLimits:
     """Declare ``trajectory_execution.*``.
 
-    Args:
-        node: The node.
-
     Raises:
         ParameterError: A value is refused.
     """
@@ -186,8 +170,6 @@ def declare_controllers(
     Those that are default come first: they get the joints that several move.
 
     Args:
-        node: The node.
-        robot: The robot.
         places: Where parameters come from, of those that come from a file.
 
     Raises:

@@ -19,8 +19,7 @@ from .execution import Execution, INVALIDATED, TrajectoryExecution
 from .joint_trajectory import part_of, ROWS
 from .scene_monitor import SceneMonitor
 
-LOOKS = 400
-"""Places on a trajectory at which the arm is looked for."""
+LOOKS = 400  # places on a trajectory at which the arm is looked for
 
 AMBIGUOUS = 0.02
 """Places that are this much farther away than the nearest may be where the arm is, in [rad]."""
@@ -38,11 +37,6 @@ class PathWatch:
         """Look at what is on its way after each change of the scene, and as it begins.
 
         The scene may have changed since a trajectory was planned.
-
-        Args:
-            monitor: The scene and where the joints are.
-            execution: What is on its way.
-            background: A thread that has nothing else to do.
         """
         self._monitor, self._execution, self._background = monitor, execution, background
         self._is_looking, self._looks_again = False, False
@@ -106,7 +100,6 @@ def contact_ahead(
     Args:
         trajectory: A trajectory_msgs/JointTrajectory that was checked, with the way to its
             first point.
-        here: Where all joints of the robot are in [rad].
         scene: What may collide; all joints of the robot move in it.
     """
     joints = list(scene.kinematics.joints)
@@ -130,12 +123,7 @@ def contact_ahead(
 
 
 def passed_time(path: Path, positions: Array) -> float:
-    """Return a time of a path that is not behind the arm in [s].
-
-    Args:
-        path: The path.
-        positions: Where its joints are in [rad].
-    """
+    """Return a time of a path that is not behind the arm in [s]."""
     times = np.linspace(0.0, path.duration, LOOKS)
     apart = np.abs(path.positions(times) - positions).max(axis=1)
     first = int((apart <= apart.min() + AMBIGUOUS).argmax())

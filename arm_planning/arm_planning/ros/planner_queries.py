@@ -25,7 +25,6 @@ class PlannerQueries:
         """Offer query_planner_interface, get_planner_params and set_planner_params.
 
         Args:
-            node: The node.
             planners: Configurations of planners of a package.
         """
         self._log, self._planners = node.get_logger(), planners

@@ -42,23 +42,16 @@ from .sequence_request import group_runs, GroupRun
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlannedMotion:
-    """What a client gets of a plan.
+    """What a client gets of a plan."""
 
-    Attributes:
-        start: Where it begins.
-        trajectories: The motion; a sequence has one for each change of the group.
-        planning_time: How long planning took in [s].
-        notes: What a person should know, such as where it is slower than asked.
-    """
-
-    start: StateMessage
+    start: StateMessage  # where it begins
+    # the motion; a sequence has one for each change of the group
     trajectories: Sequence[RobotTrajectory]
-    planning_time: float
-    notes: Sequence[str] = ()
+    planning_time: float  # how long planning took in [s]
+    notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
 
 
-SEEDS = count()
-"""Seeds of planners: a second attempt at a plan searches in another way."""
+SEEDS = count()  # seeds of planners: a second attempt at a plan searches in another way
 
 
 class GroupPlanners:
@@ -70,7 +63,6 @@ class GroupPlanners:
         """Make none yet.
 
         Args:
-            robot: The robot.
             cartesian_limits: Limits of LIN and CIRC; None has the defaults.
         """
         self._robot, self._cartesian_limits = robot, cartesian_limits
@@ -80,7 +72,6 @@ class GroupPlanners:
         """Return model and planner of a group, with the joints beside it where they are.
 
         Args:
-            group: Its name.
             positions: Positions of all joints of the robot in [rad].
 
         Raises:
@@ -110,10 +101,6 @@ class PlanningThreads:
         """Offer plan_kinematic_path, plan_sequence_path and what belongs to them.
 
         Args:
-            node: The node.
-            monitor: The scene and where the joints are.
-            background: The threads, which have a lane for each group.
-            robot: Makes a robot, for one thread.
             settings: What holds where a request does not say so.
             cartesian_limits: Limits of LIN and CIRC; None has the defaults.
         """
@@ -145,7 +132,6 @@ class PlanningThreads:
         """Return what plans a motion; called in the executor, what it returns in the thread.
 
         Args:
-            message: The moveit_msgs/MotionPlanRequest.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
             is_canceled: Whether the plan is canceled, which ends a search at once.
 
@@ -174,7 +160,6 @@ class PlanningThreads:
         Args:
             items: The moveit_msgs/MotionSequenceItem.
             scene_diff: A moveit_msgs/PlanningScene that counts for this plan only.
-            is_canceled: Whether the plan is canceled.
 
         Raises:
             PlanningError: The sequence is refused.
@@ -211,11 +196,7 @@ class PlanningThreads:
         )
 
     def display(self, planned: PlannedMotion) -> None:
-        """Show a motion to listeners.
-
-        Args:
-            planned: The motion.
-        """
+        """Show a motion to listeners."""
         self._displayed.publish(
             DisplayTrajectory(
                 model_id=self._monitor.robot.name,
@@ -335,7 +316,6 @@ def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> 
 
     Args:
         code: How it ended.
-        planned: What was planned; None for nothing.
     """
     response = MotionSequenceResponse(error_code=code)
     if planned is not None:

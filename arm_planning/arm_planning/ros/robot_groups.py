@@ -46,10 +46,7 @@ class RobotGroups:
         """Read the robot.
 
         Args:
-            urdf: Robot description as XML text.
-            srdf: Semantic description as XML text.
             limits: The table ``joint_limits`` of a limits file.
-            folder: Folder of the URDF, where names of mesh files are relative.
 
         Raises:
             ModelError: They do not make a robot, or the SRDF has no group.
@@ -98,9 +95,6 @@ class RobotGroups:
     def model(self, group: str) -> RobotModel:
         """Return the model of a group.
 
-        Args:
-            group: Its name.
-
         Raises:
             PlanningError: There is no such group, or it cannot be moved.
         """
@@ -126,7 +120,6 @@ class RobotGroups:
         It is the same one for as long as these stay.
 
         Args:
-            group: Its name.
             positions: Positions of all joints of the robot in [rad].
 
         Raises:

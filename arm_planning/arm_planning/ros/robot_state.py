@@ -32,7 +32,6 @@ def joints_of(message: Any, known: Sequence[str]) -> Mapping[str, float]:  # noq
     """Return the positions in [rad] that a moveit_msgs/RobotState has, by joint.
 
     Args:
-        message: The state.
         known: Joints of the robot, mimic joints too.
 
     Raises:
@@ -57,13 +56,7 @@ def _invalid(reason: str) -> PlanningError:
 
 
 def state_message(joints: Sequence[str], positions: Array, root: str) -> StateMessage:
-    """Return joints at rest as a moveit_msgs/RobotState.
-
-    Args:
-        joints: Their names.
-        positions: Their positions in [rad].
-        root: Name of the root link.
-    """
+    """Return joints at rest as a moveit_msgs/RobotState."""
     header = Header(frame_id=root)
     state = JointState(header=header, name=list(joints), position=positions.tolist())
     message = StateMessage(joint_state=state)
@@ -77,11 +70,6 @@ def trajectory_message(joints: Sequence[str], path: Path, root: str) -> RobotTra
     Its points are the ends of the path's polynomials and some in between, with velocities and
     accelerations: a quintic between two of them is the path itself, and a viewer that shows one
     point after the other shows a motion.
-
-    Args:
-        joints: Names of the joints.
-        path: The path.
-        root: Name of the root link.
     """
     # of ends in the same nanosecond the last one: points of equal time are no trajectory
     ends = {round(time * 1e9): time for time in [*path.starts.tolist(), path.duration]}

@@ -50,8 +50,6 @@ def apply_scene(
     """Return a scene after a moveit_msgs/PlanningScene: a change, or a whole scene.
 
     Args:
-        snapshot: The scene before.
-        message: The message.
         positions: Positions of all joints of the robot in [rad].
 
     Raises:
@@ -86,8 +84,6 @@ def apply_object(
     """Return a scene after a moveit_msgs/CollisionObject.
 
     Args:
-        snapshot: The scene before.
-        message: The message.
         positions: Positions of all joints of the robot in [rad].
 
     Raises:
@@ -109,8 +105,6 @@ def apply_attached(
     """Return a scene after a moveit_msgs/AttachedCollisionObject.
 
     Args:
-        snapshot: The scene before.
-        message: The message.
         positions: Positions of all joints of the robot in [rad].
 
     Raises:
@@ -128,7 +122,6 @@ def scene_for(snapshot: SceneSnapshot, robot_alone: PlanningScene) -> PlanningSc
     """Return the scene as a group of the robot moves in it.
 
     Args:
-        snapshot: The scene of the whole robot.
         robot_alone: The first scene of the group's model: pairs that it allows stay allowed where
             the matrix of the scene has neither an entry of them nor a default of a name.
     """

@@ -41,17 +41,11 @@ from arm_model import (
 from .geometry import as_primitives, mesh_message, plane_message, pose_message, primitive_message
 from .scene_snapshot import ObjectDetails, SceneSnapshot
 
-ALL_COMPONENTS = (1 << 10) - 1
-"""All bits of moveit_msgs/PlanningSceneComponents."""
+ALL_COMPONENTS = (1 << 10) - 1  # all bits of moveit_msgs/PlanningSceneComponents
 
 
 def collision_message(snapshot: SceneSnapshot, robot_name: str) -> SceneMessage:
-    """Return a scene as controllers take it: of meshes the corners of the hulls that count.
-
-    Args:
-        snapshot: The scene.
-        robot_name: Name of the robot's model.
-    """
+    """Return a scene as controllers take it: of meshes the corners of the hulls that count."""
     bare = {name: ObjectDetails() for name in snapshot.details}
     message = scene_message(replace(snapshot, details=bare), robot_name, StateMessage())
     held = message.robot_state.attached_collision_objects
@@ -70,8 +64,6 @@ def scene_message(
     """Return a scene as a moveit_msgs/PlanningScene, whole or the parts that are asked for.
 
     Args:
-        snapshot: The scene.
-        robot_name: Name of the robot's model.
         state: Where the joints are; attached bodies are added here.
         components: Bits of moveit_msgs/PlanningSceneComponents.
     """
@@ -141,13 +133,7 @@ def attached_messages(snapshot: SceneSnapshot) -> Sequence[AttachedCollisionObje
 
 
 def object_message(thing: CollisionObject, details: ObjectDetails, frame: str) -> ObjectMessage:
-    """Return an object as a moveit_msgs/CollisionObject.
-
-    Args:
-        thing: The object.
-        details: What else is known of it.
-        frame: The frame in which its pose is.
-    """
+    """Return an object as a moveit_msgs/CollisionObject."""
     message = _identified(thing.name, details, frame)
     message.pose = pose_message(thing.pose)
     meshes = iter(details.meshes)

@@ -38,14 +38,9 @@ from .scene_messages import (
 from .scene_snapshot import SceneSnapshot
 from .tf_frames import TfFrames
 
-DEPTH = 100
-"""Messages of changes that may wait: each of them counts."""
-
-NO_OCTOMAP = 'OcTree'
-"""Id of an octomap without data: it takes the place of the present one."""
-
-STATE_TIMEOUT = 1.0
-"""Age at which joint states count no more in [s]."""
+DEPTH = 100  # messages of changes that may wait: each of them counts
+NO_OCTOMAP = 'OcTree'  # id of an octomap without data: it takes the place of the present one
+STATE_TIMEOUT = 1.0  # age at which joint states count no more in [s]
 
 REST_PERIOD, REST_TOLERANCE = 0.25, 1e-3
 """A robot whose joints move by less in such a time in [s] rests, in [rad] or [m]."""
@@ -63,8 +58,6 @@ class SceneMonitor:
         """Offer topics and services.
 
         Args:
-            node: The node.
-            robot: The robot.
             frame_prefix: Before the names of its links in TF.
         """
         self.robot = robot
@@ -110,9 +103,6 @@ class SceneMonitor:
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:
         """Return where joints are in [rad], by joint.
 
-        Args:
-            joints: Their names.
-
         Raises:
             PlanningError: The robot lacks one, or it was never received, or is too old.
         """
@@ -157,11 +147,7 @@ class SceneMonitor:
         return snapshot, positions
 
     def state(self, positions: Array | None = None) -> StateMessage:
-        """Return where all joints are as a moveit_msgs/RobotState, with attached bodies.
-
-        Args:
-            positions: Positions of all joints of the robot in [rad]; None for the present ones.
-        """
+        """Return where all joints are as a moveit_msgs/RobotState, with attached bodies."""
         places = self.positions() if positions is None else positions
         message = state_message(self.robot.joints, places, self.snapshot.root)
         message.joint_state.header.stamp = self._node.get_clock().now().to_msg()
@@ -169,12 +155,7 @@ class SceneMonitor:
         return message
 
     def _check_received(self, joints: Sequence[str], given: Sequence[str] | None = None) -> None:
-        """Refuse joints that were never received or are too old, and are not given.
-
-        Args:
-            joints: Their names.
-            given: Those of a start state; None where there can be none.
-        """
+        """Refuse joints that were never received or are too old, and are not given."""
         now = time.monotonic()
         other = '' if given is None else ', or give the start state'
         for joint in joints:

@@ -12,40 +12,27 @@ from arm_model import Array, combined, ORIGIN, PlanningScene, Pose
 
 from ..exceptions import PlanningCode, PlanningError
 
-MIN_FULLNESS = 0.9
-"""Share of its hull that a mesh fills at least without a note."""
+MIN_FULLNESS = 0.9  # share of its hull that a mesh fills at least without a note
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectDetails:
-    """What collisions do not need of an object.
+    """What collisions do not need of an object."""
 
-    Attributes:
-        type_key: Key of its type in a database.
-        type_db: Which database.
-        subframes: Poses in the object, by name.
-        meshes: Its shape_msgs/Mesh, in the order of its hulls; None for that of a prism.
-        fullness: Volume of its meshes as a share of that of their hulls, which count.
-    """
-
-    type_key: str = ''
-    type_db: str = ''
-    subframes: Mapping[str, Pose] = field(default_factory=dict)
+    type_key: str = ''  # key of its type in a database
+    type_db: str = ''  # which database
+    subframes: Mapping[str, Pose] = field(default_factory=dict)  # poses in the object, by name
+    # its shape_msgs/Mesh, in the order of its hulls; None for that of a prism
     meshes: Sequence[Any] = ()
-    fullness: float = 1.0
+    fullness: float = 1.0  # volume of its meshes as a share of that of their hulls, which count
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AttachedDetails:
-    """What collisions do not need of an attached body.
+    """What collisions do not need of an attached body."""
 
-    Attributes:
-        detach_posture: The trajectory_msgs/JointTrajectory that lets it go.
-        weight: Its weight in [kg].
-    """
-
-    detach_posture: Any
-    weight: float
+    detach_posture: Any  # the trajectory_msgs/JointTrajectory that lets it go
+    weight: float  # its weight in [kg]
 
 
 OuterFrames = Callable[[str, Array], Pose]
@@ -55,31 +42,22 @@ positions of all joints; raises PlanningError."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneSnapshot:
-    """One state of the scene; immutable.
+    """One state of the scene; immutable."""
 
-    Attributes:
-        scene: What may collide: all joints of the robot move.
-        version: How many changes were made before.
-        name: Its name.
-        details: Of objects of the world and attached ones, by name.
-        attached_details: Of attached bodies, by name.
-        colors: Red, green, blue and opacity, by object.
-        fixed_frames: Frames that clients named, in the root link.
-        octomap: The octomap_msgs/OctomapWithPose in the root link; None for none.
-        world_frames: Names of the world in which the root link stands.
-        outer_frames: Frames of others, such as those of TF; None for none.
-    """
-
-    scene: PlanningScene
-    version: int = 0
-    name: str = ''
+    scene: PlanningScene  # what may collide: all joints of the robot move
+    version: int = 0  # how many changes were made before
+    name: str = ''  # its name
+    # of objects of the world and attached ones, by name
     details: Mapping[str, ObjectDetails] = field(default_factory=dict)
+    # of attached bodies, by name
     attached_details: Mapping[str, AttachedDetails] = field(default_factory=dict)
+    # red, green, blue and opacity, by object
     colors: Mapping[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    # frames that clients named, in the root link
     fixed_frames: Mapping[str, Pose] = field(default_factory=dict)
-    octomap: Any = None
-    world_frames: Sequence[str] = ()
-    outer_frames: OuterFrames | None = None
+    octomap: Any = None  # the octomap_msgs/OctomapWithPose in the root link; None for none
+    world_frames: Sequence[str] = ()  # names of the world in which the root link stands
+    outer_frames: OuterFrames | None = None  # frames of others, such as those of TF; None for none
 
     @property
     def root(self) -> str:

@@ -15,17 +15,11 @@ from ..industrial.sequence import check_radii
 
 @dataclass(frozen=True, slots=True)
 class GroupRun:
-    """Items of a sequence that follow each other and move the same group: one trajectory.
+    """Items of a sequence that follow each other and move the same group: one trajectory."""
 
-    Attributes:
-        group: Name of the group.
-        first: Number of the first item.
-        items: The moveit_msgs/MotionSequenceItem.
-    """
-
-    group: str
-    first: int
-    items: Sequence[Any]
+    group: str  # name of the group
+    first: int  # number of the first item
+    items: Sequence[Any]  # the moveit_msgs/MotionSequenceItem
 
 
 def group_runs(items: Sequence[Any]) -> list[GroupRun]:

@@ -32,14 +32,6 @@ class StateServices:
     def __init__(
         self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
     ) -> None:
-        """Offer the services.
-
-        Args:
-            node: The node.
-            monitor: The scene and where the joints are.
-            background: The thread.
-            robot: The robot, for that thread alone.
-        """
         self._node, self._monitor, self._robot = node, monitor, robot
         background.serve(GetPositionFK, 'compute_fk', self._fk, _refuse_fk)
         background.serve(GetStateValidity, 'check_state_validity', self._validity, lambda *_: None)
@@ -91,10 +83,7 @@ def fk_response(
     """Return poses of links, bodies and subframes in the frame that a request names.
 
     Args:
-        request: The request.
-        snapshot: The scene.
         positions: Positions of all joints of the robot in [rad].
-        stamp: Time of the answer.
 
     Raises:
         PlanningError: A link or the frame is unknown, or no link is named.
@@ -119,12 +108,7 @@ def fk_response(
 
 
 def contact_message(contact: Contact, snapshot: SceneSnapshot) -> ContactInformation:
-    """Return a contact as a moveit_msgs/ContactInformation.
-
-    Args:
-        contact: The contact.
-        snapshot: The scene, for the kinds of its bodies.
-    """
+    """Return a contact as a moveit_msgs/ContactInformation."""
     first, second = contact.bodies
     x, y, z = contact.normal.tolist()
     return ContactInformation(

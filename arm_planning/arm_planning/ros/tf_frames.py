@@ -19,11 +19,8 @@ from arm_model.ros import learn_static, learn_transforms, STATIC_QOS
 
 from ..exceptions import PlanningCode, PlanningError
 
-KEPT_TIME = 5.0
-"""Age at which a message that nobody needed is passed over unread in [s]."""
-
-KEPT_MESSAGES = 2000
-"""How many of them at most."""
+KEPT_TIME = 5.0  # age at which a message that nobody needed is passed over unread in [s]
+KEPT_MESSAGES = 2000  # how many of them at most
 
 
 class TfFrames:
@@ -37,7 +34,6 @@ class TfFrames:
         """Listen.
 
         Args:
-            node: The node.
             kinematics: All joints of the robot.
             prefix: Before the names of its links in TF.
         """
@@ -53,7 +49,6 @@ class TfFrames:
         A frame that TF connects with a link of the robot only is where that link is.
 
         Args:
-            frame: Its name.
             positions: Positions of all joints of the robot in [rad].
 
         Raises:

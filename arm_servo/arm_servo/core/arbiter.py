@@ -20,8 +20,7 @@ from .set_point import Source
 from .settings import CoreSettings
 from .single_target import SingleTarget
 
-Motion = Execution | SingleTarget
-"""What has a goal, and an outcome once it ended."""
+Motion = Execution | SingleTarget  # what has a goal, and an outcome once it ended
 
 
 class CommandArbiter:
@@ -38,13 +37,6 @@ class CommandArbiter:
     def __init__(
         self, model: RobotModel, generator: OnlineTrajectoryGenerator, settings: CoreSettings
     ) -> None:
-        """Let nothing move the arm yet.
-
-        Args:
-            model: The arm.
-            generator: Plans its motion.
-            settings: How the core behaves.
-        """
         self._limits = model.limits
         self._generator = generator
         self._jogging = Jogging(model, settings.servo)
@@ -65,9 +57,7 @@ class CommandArbiter:
         """Let a jog command move the arm.
 
         Args:
-            command: The command.
             fresh_until: Steady time until which it counts in [s].
-            client: Who asks.
         """
         if self.active is not Source.JOG:
             self.release('jogging took over')
@@ -90,20 +80,12 @@ class CommandArbiter:
         return self.execution.on_path
 
     def follow(self, execution: Execution) -> None:
-        """Let a trajectory move the arm.
-
-        Args:
-            execution: Its execution.
-        """
+        """Let a trajectory move the arm."""
         self.release('a new trajectory took over')
         self.active, self.execution = Source.TRAJECTORY, execution
 
     def aim(self, target: SingleTarget) -> None:
-        """Let a single target move the arm.
-
-        Args:
-            target: The target.
-        """
+        """Let a single target move the arm."""
         if self.active is Source.TARGET:  # displacements add up: what was asked before is in it
             self.end(CONTINUED)
         self.release('a single target took over')
@@ -122,21 +104,13 @@ class CommandArbiter:
         self.release(outcome.reason)
 
     def release(self, reason: str) -> None:
-        """Take the arm from what moves it; it comes to rest unless something else takes over.
-
-        Args:
-            reason: Why, for the motion that this ends.
-        """
+        """Take the arm from what moves it; it comes to rest unless something else takes over."""
         self.end(Outcome(GoalCode.INVALID_GOAL, reason))
         self._jogging.end()
         self.active, self.held = Source.NONE, False
 
     def end(self, outcome: Outcome) -> None:
-        """End the trajectory or the single target that moves the arm.
-
-        Args:
-            outcome: How.
-        """
+        """End the trajectory or the single target that moves the arm."""
         if self.motion is not None:
             self.motion.end(outcome)
 
@@ -153,10 +127,6 @@ class CommandArbiter:
         """Return the next state that is wanted, and what limits it.
 
         Args:
-            state: Commanded state now.
-            measured: Measured state now.
-            now: Steady time in [s].
-            period: Time to the next step in [s].
             speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
             paused: Whether jogging comes to rest in spite of a command.
         """
@@ -176,8 +146,6 @@ class CommandArbiter:
         """Return what moved the arm in this cycle, and let go of what has ended.
 
         Args:
-            state: Commanded state at the end of the cycle.
-            now: Steady time in [s].
             paused: Whether jogging comes to rest in spite of a command.
         """
         source, motion = self.active, self.motion

@@ -14,17 +14,14 @@ from arm_model import Array, checked, combined, CommandError, Mask, RobotModel
 from ..jog.servo_source import Command, JointCommand, PoseCommand, TwistCommand
 from .requests import JogRequest
 
-ROTATION_TOLERANCE = 1e-3
-"""How far a rotation may be from one, for rounding of quaternions."""
+ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of quaternions
 
 
 def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
     """Put numbers in the order of the joints.
 
     Args:
-        model: The arm.
         values: Numbers by joint.
-        what: What they are, for the message.
 
     Returns:
         The numbers, 0 where none is given, and the mask of those that are.
@@ -44,10 +41,6 @@ def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple
 def check_command(model: RobotModel, command: Command) -> None:
     """Check a jog.
 
-    Args:
-        model: The arm.
-        command: What the arm is to do.
-
     Raises:
         CommandError: A number is not finite, the count is wrong, the link is unknown, or the axes
             are no rotation.
@@ -65,13 +58,7 @@ def check_command(model: RobotModel, command: Command) -> None:
 
 
 def in_base(model: RobotModel, positions: Array, request: JogRequest) -> Command:
-    """Return the command of a request, about the tip and in the base.
-
-    Args:
-        model: The arm.
-        positions: Positions of the joints in [rad], for frames that move with the arm.
-        request: What is asked, in its frame.
-    """
+    """Return the command of a request, about the tip and in the base."""
     command, frame = request.command, request.frame
     if frame is None or isinstance(command, JointCommand):
         return command

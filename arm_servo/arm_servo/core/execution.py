@@ -29,14 +29,9 @@ from arm_trajectory import (
 
 from .outcome import Outcome
 
-ARRIVAL_TOLERANCE = 1e-6
-"""How near to the end the set-points must be to have arrived in [rad]."""
-
-MAX_CATCH_UP_SCALING = 0.7
-"""Speed scaling at most while the arm catches up with the path."""
-
-PATH_MET_TOLERANCE = 1e-3
-"""How near to the path the set-points must be to have met it in [rad]."""
+ARRIVAL_TOLERANCE = 1e-6  # how near to the end the set-points must be to have arrived in [rad]
+MAX_CATCH_UP_SCALING = 0.7  # speed scaling at most while the arm catches up with the path
+PATH_MET_TOLERANCE = 1e-3  # how near to the path the set-points must be to have met it in [rad]
 
 PATH_LEFT_TOLERANCE = 0.02
 """How far from the path the set-points may be once they have met it in [rad]."""
@@ -53,36 +48,25 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ExecutionSettings:
-    """How trajectories are accepted and followed.
+    """How trajectories are accepted and followed."""
 
-    Attributes:
-        rules: What is accepted.
-        path: Tolerance of each joint on the way; 0 is none.
-        goal: Tolerance of each joint at the end; 0 is none.
-        goal_time: Time to come within the goal's tolerance after the end in [s]; 0 is without end.
-    """
-
-    rules: GoalRules = field(default_factory=GoalRules)
+    rules: GoalRules = field(default_factory=GoalRules)  # what is accepted
+    # tolerance of each joint on the way; 0 is none
     path: JointTolerance = field(default_factory=JointTolerance)
+    # tolerance of each joint at the end; 0 is none
     goal: JointTolerance = field(default_factory=lambda: JointTolerance(0.0, 0.01))
+    # time to come within the goal's tolerance after the end in [s]; 0 is without end
     goal_time: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Feedback:
-    """Where the execution is.
+    """Where the execution is."""
 
-    Attributes:
-        time: Time of the trajectory in [s].
-        desired: What the trajectory says now.
-        actual: What was measured.
-        timer: How it runs through the trajectory.
-    """
-
-    time: float
-    desired: RobotState
-    actual: RobotState
-    timer: TimerState
+    time: float  # time of the trajectory in [s]
+    desired: RobotState  # what the trajectory says now
+    actual: RobotState  # what was measured
+    timer: TimerState  # how it runs through the trajectory
 
     @property
     def speed_scaling(self) -> float:
@@ -116,12 +100,8 @@ class Execution:
         """Accept a trajectory.
 
         Args:
-            goal: The trajectory.
-            limits: Limits of the joints.
             generator: Plans how to catch up.
-            state: Commanded state of the arm where it begins.
             speed_scaling: Speed scaling to start with, 0 to 1.
-            settings: How it is followed.
             wait: How long to wait at rest in [s]; the state is one of rest then.
 
         Raises:
@@ -177,12 +157,7 @@ class Execution:
         return found and replace(found, time=found.time + begin)
 
     def foreseen(self, ahead: float, timer: TimerState | None = None) -> RobotState:
-        """Return where it will be when nothing comes in between; for any thread.
-
-        Args:
-            ahead: Time from the state of the timer in [s]; less than 0 is the past.
-            timer: State of its timer; by default that of the last step.
-        """
+        """Return where it will be when nothing comes in between; for any thread."""
         timer = timer or self.feedback.timer
         return self._state(*TrajectoryTimer.foreseen(self._limits, self._path, timer, ahead)[:3])
 
@@ -195,11 +170,7 @@ class Execution:
         return self.feedback.timer._replace(wanted=self._wanted(speed_scaling))
 
     def elapse(self, time: float) -> None:
-        """Wait for less time: some has passed since it was planned.
-
-        Args:
-            time: How much in [s].
-        """
+        """Wait for less time: some has passed since it was planned."""
         if self._waiting > 0.0:
             self._waiting -= time
 
@@ -228,10 +199,7 @@ class Execution:
         """Advance.
 
         Args:
-            state: Commanded state now.
-            measured: Measured state now.
             speed_scaling: Wanted speed scaling, 0 to 1.
-            period: Time to the next step in [s].
 
         Returns:
             The state to command next; None to come to rest: it does not begin yet, or there is no

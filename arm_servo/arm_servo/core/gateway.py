@@ -29,8 +29,7 @@ from .set_point import JOGGING, MOTIONS, SetPoint, Source
 from .snapshot import Snapshot
 from .trajectory_stream import TrajectoryStream
 
-MAX_QUEUED_JOGS = 1000
-"""Jog commands that may wait for the cycle."""
+MAX_QUEUED_JOGS = 1000  # jog commands that may wait for the cycle
 
 
 def start_worker() -> Executor:
@@ -103,7 +102,6 @@ class CommandGateway:
         A stop refuses from the moment of the call what was requested before it, a pause what jogs.
 
         Args:
-            request: The request.
             get_ready: Gets back drives that others have; called for a request that is not refused.
 
         Returns:
@@ -150,19 +148,13 @@ class CommandGateway:
         """Have a motion prepared, and begun when it is found to be clear.
 
         Args:
-            request: What is asked.
             get_ready: Gets back drives that others have, where the arm does not follow; called in
                 any thread, and only for a motion that is not refused from where the arm stands.
         """
         return self._motions.request(request, get_ready)
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
-        """End a motion: before its begin it does not begin, later the arm comes to rest.
-
-        Args:
-            command: The motion.
-            reason: Why, for the outcome of a trajectory.
-        """
+        """End a motion: before its begin it does not begin, later the arm comes to rest."""
         self._motions.cancel(command, reason)
 
     def use_scene(self, scene: PlanningScene) -> Future[int]:
@@ -170,9 +162,6 @@ class CommandGateway:
 
         It is measured here, beside the cycle, which takes some milliseconds for 100 objects. A
         trajectory under way is checked again, and ends on its path where it would collide.
-
-        Args:
-            scene: The scene, of this arm.
 
         Returns:
             Its version once it counts.
@@ -184,11 +173,7 @@ class CommandGateway:
         return self._scenes.use(scene, None if reference is None else reference.position)
 
     def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms of the robot move; before the first cycle.
-
-        Args:
-            neighbours: The other arms.
-        """
+        """Heed from now on how other arms of the robot move; before the first cycle."""
         self._core.keep_apart(neighbours)
 
     def begin(self, positions: Array) -> None:
@@ -204,11 +189,7 @@ class CommandGateway:
             self._order.void((Source.JOG,), BEGINS)
 
     def reset(self, positions: Array) -> None:
-        """Go on from where others have moved the arm while it was at rest.
-
-        Args:
-            positions: Positions in [rad].
-        """
+        """Go on from where others have moved the arm while it was at rest."""
         self._core.reset(positions)
 
     def step(
@@ -222,9 +203,6 @@ class CommandGateway:
         """Carry out what was commanded, and return the set-point of this cycle.
 
         Args:
-            now: Steady time.
-            period: Time to the next cycle in [s].
-            measured: Measured state.
             blocked: Why the arm comes to rest and takes no commands; empty when it does.
             ages: How old the measured values of each joint are in [s].
         """
@@ -259,7 +237,6 @@ class CommandGateway:
 
         Args:
             reason: What has gone wrong, and where.
-            code: Code of the motion's outcome.
         """
         self._interrupt(reason)
         self._core.fail(reason, code)
@@ -270,8 +247,6 @@ class CommandGateway:
         """Pass a cycle in which the arm does not follow; commands are refused.
 
         Args:
-            now: Steady time.
-            measured: Measured state, when it is known.
             blocked: Why, with the remedy.
             ages: How old the measured values of each joint are in [s].
         """
@@ -293,12 +268,7 @@ class CommandGateway:
         )
 
     def abandon(self, now: float, reason: str) -> None:
-        """End all that was commanded, for a cycle that has failed: none may follow.
-
-        Args:
-            now: Steady time.
-            reason: What has failed, with the remedy.
-        """
+        """End all that was commanded, for a cycle that has failed: none may follow."""
         self._interrupt(reason)
         self._motions.clear(reason)
         self.idle(now, self._snapshot.measured, reason)

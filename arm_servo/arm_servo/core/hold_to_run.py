@@ -28,7 +28,6 @@ class HoldToRun:
     """
 
     def __init__(self) -> None:
-        """Begin with nobody."""
         self._lock = threading.Lock()  # held for a few instructions only
         self._held: dict[Hashable, tuple[float, float]] = {}  # first and last command in [s]
         self._barred: dict[Hashable, str] = {}
@@ -37,8 +36,6 @@ class HoldToRun:
         """Take note of a command.
 
         Args:
-            client: Who commands.
-            now: Steady time in [s].
             is_zero: Whether it commands standing still.
 
         Raises:
@@ -59,12 +56,7 @@ class HoldToRun:
             )
 
     def interrupt(self, reason: str, now: float) -> None:
-        """Have whoever holds let go first.
-
-        Args:
-            reason: What has stopped the arm.
-            now: Steady time in [s].
-        """
+        """Have whoever holds let go first."""
         with self._lock:
             for client, (_, last) in self._held.items():
                 if now - last <= GONE_AFTER:
@@ -72,9 +64,6 @@ class HoldToRun:
 
     def begin(self, now: float) -> bool:
         """The arm begins to follow: have whoever has held for longer let go first.
-
-        Args:
-            now: Steady time in [s].
 
         Returns:
             Whether somebody has to let go.

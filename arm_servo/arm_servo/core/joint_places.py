@@ -14,15 +14,11 @@ PLACE_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class JointPlaces:
-    """One look at the joints of a robot.
+    """One look at the joints of a robot."""
 
-    Attributes:
-        places: Where they are in [rad] or [m], by joint.
-        moving: Those that move.
-    """
-
+    # where they are in [rad] or [m], by joint
     places: Mapping[str, float] = field(default_factory=dict)
-    moving: Collection[str] = frozenset()
+    moving: Collection[str] = frozenset()  # those that move
 
     def next(self, places: Mapping[str, float], commanded: Collection[str]) -> JointPlaces:
         """Return the next look; a joint that was not there before counts as one that moves.

@@ -53,8 +53,7 @@ from .stop_distances import StopDistances
 PREPARED_STATE_TOLERANCE = 0.01
 """How far the arm may be from where a trajectory was prepared in [rad]."""
 
-MAX_JOINTS = 8
-"""Joints of the longest chain that is jogged."""
+MAX_JOINTS = 8  # joints of the longest chain that is jogged
 
 PAUSED = 'the arm is paused; resume first (~/resume of the trajectory controller)'
 
@@ -84,10 +83,6 @@ class MotionCore:
 
     def __init__(self, model: RobotModel, settings: CoreSettings | None = None) -> None:
         """Wait for :meth:`reset`.
-
-        Args:
-            model: The arm.
-            settings: How the core behaves.
 
         Raises:
             ModelError: The core cannot move such an arm.
@@ -182,10 +177,6 @@ class MotionCore:
     def reset(self, positions: Sequence[float] | Array, reason: str = 'the arm was reset') -> None:
         """Begin at rest where the arm is; whatever moved it ends.
 
-        Args:
-            positions: Measured positions in [rad].
-            reason: Why, for the trajectory that this ends.
-
         Raises:
             CommandError: The count is wrong, or a position is not finite.
         """
@@ -196,19 +187,11 @@ class MotionCore:
         self._filter.reset(self._state)
 
     def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms of the robot move; before the first step.
-
-        Args:
-            neighbours: The other arms.
-        """
+        """Heed from now on how other arms of the robot move; before the first step."""
         self._filter.keep_apart(neighbours)
 
     def stands(self, measured: RobotState | None) -> None:
-        """Pass a cycle in which something else has the drives; other arms heed where it is.
-
-        Args:
-            measured: Measured state; None while it is not known.
-        """
+        """Pass a cycle in which something else has the drives; other arms heed where it is."""
         self._filter.stands(measured)
 
     def prepare_scene(
@@ -217,8 +200,6 @@ class MotionCore:
         """Measure a scene beside the cycle.
 
         Args:
-            scene: The scene.
-            version: Its number.
             near: Where the arm is in [rad]; None while that is not known.
 
         Raises:
@@ -250,7 +231,6 @@ class MotionCore:
         """Go on with a trajectory whose path is clear in a scene, or end it on its path.
 
         Args:
-            execution: The trajectory.
             scene: The scene; nothing is done when it does not count any more.
             problem: What is in the way; empty when nothing is.
         """
@@ -262,11 +242,7 @@ class MotionCore:
             self._end(Outcome(GoalCode.PATH_TOLERANCE_VIOLATED, problem))
 
     def hold(self, *, is_held: bool = True) -> None:
-        """Bring a jog or a single target to rest for what is prepared, or let it go on.
-
-        Args:
-            is_held: Whether it comes to rest.
-        """
+        """Bring a jog or a single target to rest for what is prepared, or let it go on."""
         self._arbiter.held = is_held
 
     def prepare(
@@ -277,7 +253,6 @@ class MotionCore:
         Motions are for one thread at a time, whichever; other requests for any thread.
 
         Args:
-            request: The request.
             basis: The arm where a motion begins: :attr:`basis`, or foreseen from it.
 
         Raises:
@@ -291,8 +266,6 @@ class MotionCore:
         """Let a request count from now on; where a motion is off, the arm catches up smoothly.
 
         Args:
-            prepared: What :meth:`prepare` returned.
-            now: Steady time in [s].
             elapsed: Time since its basis in [s], by which a motion that begins later waits less.
             in_any_scene: A motion that was prepared in an old scene begins, too. The path of a
                 trajectory is then to be checked beside the cycle, as after :meth:`use_scene`.
@@ -317,20 +290,11 @@ class MotionCore:
             self._begin(prepared.motion, prepared.basis, elapsed, in_any_scene)
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Come to rest, a trajectory on its path, because something has gone wrong.
-
-        Args:
-            reason: What, for the motion that this ends.
-            code: Code of its outcome.
-        """
+        """Come to rest, a trajectory on its path, because something has gone wrong."""
         self._end(Outcome(code, reason))
 
     def abandon(self, reason: str) -> None:
-        """End at once what moves the arm, which does not follow any more.
-
-        Args:
-            reason: Why, for the motion that this ends.
-        """
+        """End at once what moves the arm, which does not follow any more."""
         if self.source is not Source.NONE:
             self._changed('the arm did not follow')
             self._arbiter.release(reason)
@@ -339,8 +303,6 @@ class MotionCore:
         """Return the set-point of a cycle.
 
         Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
             measured: Measured state; by default what was commanded.
 
         Raises:

@@ -26,32 +26,27 @@ from .preparation import CommandBasis, Prepared
 from .requests import MotionRequest, StopRequest
 from .set_point import Source
 
-MAX_QUEUED_MOTIONS = 50
-"""Motions that may wait to be prepared."""
+MAX_QUEUED_MOTIONS = 50  # motions that may wait to be prepared
 
 PREPARATION_TIME = 5e-3
 """Time that preparing may take for any trajectory in [s]; see Preparation for the figures."""
 
-PREPARATION_TIME_PER_POINT = 5e-4
-"""Time that preparing may take for each point in [s]."""
+PREPARATION_TIME_PER_POINT = 5e-4  # time that preparing may take for each point in [s]
 
 PREPARATION_TIME_PER_SECOND = 5e-3
 """Time that looking for collisions may take for each second of the path in [s]."""
 
-MAX_CHECKED_DURATION = 100.0
-"""Part of a trajectory for whose check a begin in motion waits in [s]."""
+MAX_CHECKED_DURATION = 100.0  # part of a trajectory for whose check a begin in motion waits in [s]
 
 MAX_FORESIGHT = 0.03
 """Time over which a jog or a single target is foreseen in [s]; later it may have turned."""
 
-MIN_CYCLES_AHEAD = 3
-"""Least cycles from the basis to the begin of a motion that is foreseen."""
+MIN_CYCLES_AHEAD = 3  # least cycles from the basis to the begin of a motion that is foreseen
 
 MAX_ATTEMPTS = 3
 """How often a motion is prepared where others move the arm, or the scene changes, meanwhile."""
 
-REST_TIMEOUT = 1.0
-"""Time in which a jogged arm must come to rest for a trajectory in [s]."""
+REST_TIMEOUT = 1.0  # time in which a jogged arm must come to rest for a trajectory in [s]
 
 CANCELED = Outcome(GoalCode.SUCCESSFUL, 'canceled before it began', canceled=True)
 NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
@@ -59,31 +54,20 @@ NOTHING = Outcome(GoalCode.SUCCESSFUL, 'a displacement by nothing')
 
 @dataclass(slots=True, eq=False)
 class MotionCommand:
-    """A motion from its request to its end.
+    """A motion from its request to its end."""
 
-    Attributes:
-        request: What is asked.
-        number: Its place among all commands and stops.
-        requested: Steady time of the request in [s].
-        get_ready: Gets the drives back.
-        future: Its execution, or None for a single target, once it began; else why it is refused.
-        ended: How it ended, whatever became of it; set once, at the latest when the cycle fails.
-        motion: What moves the arm for it, once it began.
-        attempts: How often it may still be prepared.
-        is_canceled: Whether it is to begin no more.
-        holds: Whether a jog or a target is held for it.
-    """
-
-    request: MotionRequest
-    number: int
-    requested: float
-    get_ready: Callable[[], object] = lambda: None
+    request: MotionRequest  # what is asked
+    number: int  # its place among all commands and stops
+    requested: float  # steady time of the request in [s]
+    get_ready: Callable[[], object] = lambda: None  # gets the drives back
+    # its execution, or None for a single target, once it began; else why it is refused
     future: Future[Execution | None] = field(default_factory=Future)
+    # how it ended, whatever became of it; set once, at the latest when the cycle fails
     ended: Future[Outcome] = field(default_factory=Future)
-    motion: Motion | None = None
-    attempts: int = MAX_ATTEMPTS
-    is_canceled: bool = False
-    holds: bool = False
+    motion: Motion | None = None  # what moves the arm for it, once it began
+    attempts: int = MAX_ATTEMPTS  # how often it may still be prepared
+    is_canceled: bool = False  # whether it is to begin no more
+    holds: bool = False  # whether a jog or a target is held for it
 
     @property
     def execution(self) -> Execution | None:
@@ -123,7 +107,6 @@ class MotionQueue:
         """Begin empty.
 
         Args:
-            core: The core.
             orders: What the cycle carries out.
             order: Which command counts.
             worker: Prepares motions, one after the other.
@@ -143,7 +126,6 @@ class MotionQueue:
         """Have a motion prepared, and begun when it is found to be clear.
 
         Args:
-            request: What is asked.
             get_ready: Gets the drives back.
         """
         with self._lock:
@@ -160,12 +142,7 @@ class MotionQueue:
         return command
 
     def cancel(self, command: MotionCommand, reason: str) -> None:
-        """End a motion: before its begin it does not begin, later the arm comes to rest.
-
-        Args:
-            command: The motion.
-            reason: Why, for the outcome of a trajectory.
-        """
+        """End a motion: before its begin it does not begin, later the arm comes to rest."""
 
         def stop(cycle: Cycle) -> bool:
             if command.motion is not None:
@@ -180,11 +157,7 @@ class MotionQueue:
         self._orders.append(stop)
 
     def clear(self, reason: str) -> None:
-        """Refuse all that waits, for a cycle that has failed: its turn does not come.
-
-        Args:
-            reason: What has failed, with the remedy.
-        """
+        """Refuse all that waits, for a cycle that has failed: its turn does not come."""
         with self._lock:
             waiting, self._waiting = self._waiting, deque()
         for command in waiting:

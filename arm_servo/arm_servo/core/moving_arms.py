@@ -26,14 +26,12 @@ from arm_trajectory import Plan
 MIN_LOOKS, MAX_LOOKS = 4, 12
 """Into how many parts two stops are cut at first, at least and at most."""
 
-MAX_STRIDE = 0.15
-"""Way of all joints in such a part in [rad]."""
+MAX_STRIDE = 0.15  # way of all joints in such a part in [rad]
 
 MAX_HALVINGS = 24
 """How many parts are halved at most, those first in which the arms may be nearest."""
 
-PRECISION = 5e-5
-"""How well the least distance is to be known in [m]."""
+PRECISION = 5e-5  # how well the least distance is to be known in [m]
 
 HORIZON = 0.05
 """Distance beyond that of interest up to which it is measured, and not only bounded, in [m]."""
@@ -41,17 +39,11 @@ HORIZON = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Stop:
-    """How an arm would come to rest from a moment on.
+    """How an arm would come to rest from a moment on."""
 
-    Attributes:
-        end: Where it would stand in [rad].
-        plan: The way there; None where it stands.
-        begin: Steady time of its begin in [s].
-    """
-
-    end: Array
-    plan: Plan | None = None
-    begin: float = 0.0
+    end: Array  # where it would stand in [rad]
+    plan: Plan | None = None  # the way there; None where it stands
+    begin: float = 0.0  # steady time of its begin in [s]
 
     @classmethod
     def of(cls, plan: Plan, begin: float) -> _Stop:
@@ -77,17 +69,11 @@ class _Stop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Look:
-    """One moment of the stops.
+    """One moment of the stops."""
 
-    Attributes:
-        time: Steady time in [s].
-        places: Positions of all joints in [rad].
-        distances: Distance of each pair in [m], or a lower bound of one that is far.
-    """
-
-    time: float
-    places: Array
-    distances: Array
+    time: float  # steady time in [s]
+    places: Array  # positions of all joints in [rad]
+    distances: Array  # distance of each pair in [m], or a lower bound of one that is far
 
 
 def _nearest(
@@ -96,11 +82,6 @@ def _nearest(
     """Return the look at which the arms are nearest, of more looks where that is not sure.
 
     Between two looks a pair comes no nearer than half of what its distances are more than its way.
-
-    Args:
-        looks: The first looks, by time.
-        rates: How fast each joint changes the distance of each pair at most in [m/rad].
-        look: Looks at steady times.
     """
     best = min(looks, key=lambda each: float(each.distances.min()))
     number = count()
@@ -138,11 +119,6 @@ class MovingArms:
     """
 
     def __init__(self, models: Sequence[RobotModel]) -> None:
-        """Begin with the robot alone, and with no arm whose place is known.
-
-        Args:
-            models: The arms; no joint is in two.
-        """
         self.lock = threading.Lock()
         self.version = 0
         self._groups = [model.joints for model in models]
@@ -154,11 +130,7 @@ class MovingArms:
         self._stops: list[_Stop | None] = [None for _ in models]
 
     def neighbours(self, joints: Sequence[str]) -> Neighbours:
-        """Return the other arms as one of them sees them.
-
-        Args:
-            joints: Its joints.
-        """
+        """Return the other arms as one of them sees them."""
         return Neighbours(self, self._groups.index(tuple(joints)))
 
     def use_scene(self, scene: PlanningScene) -> None:
@@ -197,9 +169,7 @@ class MovingArms:
         """Return the least distance of an arm that stops to the others, which stop too.
 
         Args:
-            number: The arm.
             plan: Its stop.
-            begin: Steady time of its begin in [s].
             within: Distance of interest in [m].
         """
         stops = [*self._stops]
@@ -263,7 +233,6 @@ class Neighbours:
     """The other arms as one of them sees them; for its loop, while it holds :attr:`lock`."""
 
     def __init__(self, arms: MovingArms, number: int) -> None:
-        """Take all arms, and which of them it is."""
         self._arms, self._number = arms, number
         self.lock = arms.lock
 
@@ -276,25 +245,14 @@ class Neighbours:
         """Return the least distance to the others on a stop, while they stop too.
 
         Args:
-            stop: The stop.
-            begin: Steady time of its begin in [s].
             within: Distance of interest in [m].
         """
         return self._arms.least(self._number, stop, begin, within)
 
     def stops(self, plan: Plan, begin: float) -> None:
-        """Let the others know the stop behind a step.
-
-        Args:
-            plan: The stop.
-            begin: Steady time of its begin in [s].
-        """
+        """Let the others know the stop behind a step."""
         self._arms.put(self._number, _Stop.of(plan, begin))
 
     def stands(self, state: RobotState | None) -> None:
-        """Let the others know where the arm is while something else may move it.
-
-        Args:
-            state: Its state; None while it is not known.
-        """
+        """Let the others know where the arm is while something else may move it."""
         self._arms.put(self._number, None if state is None else _Stop(state.position))

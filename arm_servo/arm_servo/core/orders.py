@@ -18,28 +18,20 @@ from .snapshot import MAX_CYCLE_AGE
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cycle:
-    """What an order sees of its cycle.
+    """What an order sees of its cycle."""
 
-    Attributes:
-        now: Steady time in [s].
-        period: Time to the next cycle in [s].
-        blocked: Why the arm takes no commands; empty when it does.
-    """
-
-    now: float
-    period: float
-    blocked: str
+    now: float  # steady time in [s]
+    period: float  # time to the next cycle in [s]
+    blocked: str  # why the arm takes no commands; empty when it does
 
 
-Order = Callable[[Cycle], bool]
-"""Carried out in a cycle; False for again in the next one."""
+Order = Callable[[Cycle], bool]  # carried out in a cycle; False for again in the next one
 
 
 class OrderQueue:
     """Orders from any thread, carried out by the thread of the cycle."""
 
     def __init__(self) -> None:
-        """Begin empty."""
         self._orders: deque[Order] = deque()
         self.append = self._orders.append
 
@@ -63,7 +55,6 @@ class CommandOrder:
     """
 
     def __init__(self) -> None:
-        """Begin with nothing void."""
         self.refused = -math.inf
         self._lock = threading.Lock()  # held for a few instructions only
         self._numbers = count(1)
@@ -78,8 +69,6 @@ class CommandOrder:
         """Refuse what was requested for some sources before a number.
 
         Args:
-            sources: The sources.
-            reason: Why.
             number: The number; by default all that was requested so far is refused.
         """
         with self._lock:
@@ -102,10 +91,7 @@ class CommandOrder:
         """Refuse a motion that is void before it began, or that the arm cannot follow.
 
         Args:
-            source: What would move the arm.
-            number: Number of the command.
             since: When its last step was ordered in [s].
-            cycle: The present cycle.
 
         Raises:
             NotReadyError: It is refused.

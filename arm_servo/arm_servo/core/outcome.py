@@ -12,17 +12,11 @@ from arm_trajectory import GoalCode, GoalError
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a motion ended.
+    """How a motion ended."""
 
-    Attributes:
-        code: Code of the action's result.
-        reason: Why, in words.
-        canceled: Whether it was asked to end.
-    """
-
-    code: GoalCode
-    reason: str
-    canceled: bool = False
+    code: GoalCode  # code of the action's result
+    reason: str  # why, in words
+    canceled: bool = False  # whether it was asked to end
 
 
 CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
@@ -30,11 +24,7 @@ CONTINUED = Outcome(GoalCode.SUCCESSFUL, 'a further target goes on from it')
 
 
 def refused(error: BaseException) -> Outcome:
-    """Return the outcome of a motion that does not begin.
-
-    Args:
-        error: Why.
-    """
+    """Return the outcome of a motion that does not begin."""
     code = error.code if isinstance(error, GoalError) else GoalCode.INVALID_GOAL
     if isinstance(error, ArmError):
         return Outcome(code, str(error))

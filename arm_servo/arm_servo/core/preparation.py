@@ -43,34 +43,20 @@ from .single_target import SingleTarget
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandBasis:
-    """What the cycle knows when a command is prepared.
+    """What the cycle knows when a command is prepared."""
 
-    Attributes:
-        state: Commanded state where the motion begins.
-        scene: What may collide.
-        sequence: Number of commands and stops so far.
-        source: What moves the arm.
-        speed_scaling: Share of the speed of trajectories and targets, 0 to 1.
-        target: Where a single target takes the arm in [rad]; None without one.
-        execution: The trajectory that was followed last; None before the first.
-        timer: How that runs; None for how it ran in its last step.
-    """
-
-    state: RobotState
-    scene: PreparedScene
-    sequence: int = 0
-    source: Source = Source.NONE
-    speed_scaling: float = 1.0
-    target: Array | None = None
+    state: RobotState  # commanded state where the motion begins
+    scene: PreparedScene  # what may collide
+    sequence: int = 0  # number of commands and stops so far
+    source: Source = Source.NONE  # what moves the arm
+    speed_scaling: float = 1.0  # share of the speed of trajectories and targets, 0 to 1
+    target: Array | None = None  # where a single target takes the arm in [rad]; None without one
+    # the trajectory that was followed last; None before the first
     execution: Execution | None = None
-    timer: TimerState | None = None
+    timer: TimerState | None = None  # how that runs; None for how it ran in its last step
 
     def foreseen(self, ahead: float) -> CommandBasis:
-        """Return the basis some time later, when nothing comes in between.
-
-        Args:
-            ahead: Time from now in [s].
-        """
+        """Return the basis some time later, when nothing comes in between."""
         if self.source is Source.TRAJECTORY and self.execution is not None:
             return replace(self, state=self.execution.foreseen(ahead, self.timer))
         state = self.state
@@ -80,17 +66,12 @@ class CommandBasis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prepared:
-    """A request that was checked; of a motion, one whose path is clear.
+    """A request that was checked; of a motion, one whose path is clear."""
 
-    Attributes:
-        request: The request.
-        motion: What begins; None for a displacement by nothing, and where nothing is planned.
-        basis: From what it was planned: it does not begin from anything else. None where nothing
-            is planned.
-    """
-
-    request: MotionRequest | ImmediateRequest
+    request: MotionRequest | ImmediateRequest  # the request
+    # what begins; None for a displacement by nothing, and where nothing is planned
     motion: Motion | None = None
+    # from what it was planned: it does not begin from anything else. None where nothing is planned
     basis: CommandBasis | None = None
 
 
@@ -106,9 +87,7 @@ class Preparation:
         """Prepare.
 
         Args:
-            model: The arm.
             catch_up: Plans how executions catch up; used in the cycle only.
-            settings: How the core behaves.
         """
         self._model = model
         self._limits = model.limits
@@ -124,7 +103,6 @@ class Preparation:
         """Check a request; plan a motion, and check its path.
 
         Args:
-            request: The request.
             basis: The arm where a motion begins; None where nothing is planned.
 
         Raises:

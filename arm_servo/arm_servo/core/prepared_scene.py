@@ -12,17 +12,11 @@ from arm_trajectory import PathCheck
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedScene:
-    """What measures a scene: one thing for each thread.
+    """What measures a scene: one thing for each thread."""
 
-    Attributes:
-        version: Number of the scene; 0 is the robot alone.
-        clearances: Of the cycle.
-        check: Looks for contact on paths, in the thread that prepares motions; None where nobody
-            wants that.
-    """
-
-    version: int
-    clearances: Clearances
+    version: int  # number of the scene; 0 is the robot alone
+    clearances: Clearances  # of the cycle
+    # looks for contact on paths, in the thread that prepares motions; None where nobody wants that
     check: PathCheck | None
 
     @classmethod
@@ -32,8 +26,6 @@ class PreparedScene:
         """Prepare a scene.
 
         Args:
-            scene: The scene.
-            version: Its number.
             near: Where the arm is in [rad]: every pair is measured there, so that the cycle has
                 not to. None where that is not known.
             checks_paths: Whether paths are looked at.

@@ -21,20 +21,14 @@ from .set_point import Source
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JogRequest:
-    """Move the tool or joints at a speed, or track a pose, until the request expires.
+    """Move the tool or joints at a speed, or track a pose, until the request expires."""
 
-    Attributes:
-        command: What the arm does.
-        expires: Steady time at which the request expires in [s].
-        frame: Link, or pose in the base, about whose origin a twist turns and along whose axes it
-            is given, and in which a pose is given; None for the tip, and for the base.
-        client: Who asks: standing still is a command only for whoever is jogging.
-    """
-
-    command: Command
-    expires: float
+    command: Command  # what the arm does
+    expires: float  # steady time at which the request expires in [s]
+    # link, or pose in the base, about whose origin a twist turns and along whose axes it is given,
+    # and in which a pose is given; None for the tip, and for the base
     frame: str | Pose | None = None
-    client: Hashable = None
+    client: Hashable = None  # who asks: standing still is a command only for whoever is jogging
 
     @property
     def is_zero(self) -> bool:
@@ -46,15 +40,10 @@ class JogRequest:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementRequest:
-    """Move joints on by amounts; displacements add up while they are carried out.
+    """Move joints on by amounts; displacements add up while they are carried out."""
 
-    Attributes:
-        displacements: How far in [rad] by joint.
-        max_speed: Greatest speed of a joint in [rad/s].
-    """
-
-    displacements: Mapping[str, float]
-    max_speed: float = math.inf
+    displacements: Mapping[str, float]  # how far in [rad] by joint
+    max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
 
     @property
     def is_zero(self) -> bool:
@@ -64,52 +53,34 @@ class DisplacementRequest:
 
 @dataclass(frozen=True, slots=True)
 class TargetRequest:
-    """Move joints to positions; the others come to rest.
+    """Move joints to positions; the others come to rest."""
 
-    Attributes:
-        positions: Targets in [rad] by joint.
-        max_speed: Greatest speed of a joint in [rad/s].
-    """
-
-    positions: Mapping[str, float]
-    max_speed: float = math.inf
+    positions: Mapping[str, float]  # targets in [rad] by joint
+    max_speed: float = math.inf  # greatest speed of a joint in [rad/s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StopRequest:
-    """Come to rest: a trajectory on its path, anything else in the shortest time.
+    """Come to rest: a trajectory on its path, anything else in the shortest time."""
 
-    Attributes:
-        reason: Why, for the outcome of the motion that this ends.
-        sources: What is stopped; other sources go on. None for whatever moves the arm.
-        motion: The motion that is stopped; another one goes on. None for any.
-    """
-
-    reason: str = 'stopped'
+    reason: str = 'stopped'  # why, for the outcome of the motion that this ends
+    # what is stopped; other sources go on. None for whatever moves the arm
     sources: tuple[Source, ...] | None = None
-    motion: Motion | None = None
+    motion: Motion | None = None  # the motion that is stopped; another one goes on. None for any
 
 
 @dataclass(frozen=True, slots=True)
 class PauseRequest:
-    """Come to rest, a trajectory on its path, and refuse jogging; or go on after that.
+    """Come to rest, a trajectory on its path, and refuse jogging; or go on after that."""
 
-    Attributes:
-        is_paused: Whether to come to rest; else to go on.
-    """
-
-    is_paused: bool = True
+    is_paused: bool = True  # whether to come to rest; else to go on
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedRequest:
-    """Set the speed override of trajectories and targets.
+    """Set the speed override of trajectories and targets."""
 
-    Attributes:
-        speed: 0 to 1; 0 is a pause.
-    """
-
-    speed: float
+    speed: float  # 0 to 1; 0 is a pause
 
 
 MotionRequest = DisplacementRequest | TargetRequest | TrajectoryGoal

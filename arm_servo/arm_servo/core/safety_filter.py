@@ -24,15 +24,13 @@ CONTACT_TOLERANCE = 1e-4
 MIN_SAMPLES, MAX_SAMPLES = 6, 40
 """How many places of a stop distances are looked at, at least and at most."""
 
-MAX_STRIDE = 0.1
-"""Way of all joints between two looks in [rad]."""
+MAX_STRIDE = 0.1  # way of all joints between two looks in [rad]
 
 NEAR_ARM = 0.1
 """Distance to other arms in [m] below which an arm may be stopped off its path, so that its stops
 must be clear of everything."""
 
-ROUNDING_TOLERANCE = 1e-7
-"""Rounding of ruckig's positions that is let pass in [rad]."""
+ROUNDING_TOLERANCE = 1e-7  # rounding of ruckig's positions that is let pass in [rad]
 
 
 class ClearanceFloor:
@@ -62,8 +60,6 @@ class ClearanceFloor:
         """Return which links a stop would bring too near, and how near; None for none.
 
         Args:
-            stop: The stop.
-            begin: Steady time of its begin in [s].
             state: The state that is not left yet.
             now: Steady time of that in [s].
             clearance: Least distance between links in [m]; None is any.
@@ -90,12 +86,7 @@ class ClearanceFloor:
         return None
 
     def allows(self, plan: Plan, begin: float) -> bool:
-        """Whether links stay apart on another stop than the one that was looked at last.
-
-        Args:
-            plan: The stop.
-            begin: Steady time of its begin in [s].
-        """
+        """Whether links stay apart on another stop than the one that was looked at last."""
         if self._floor is None:
             return True
         return self._distance(plan, begin) >= self._floor - CONTACT_TOLERANCE
@@ -113,12 +104,6 @@ class SafetyFilter:
     """
 
     def __init__(self, model: RobotModel, generator: OnlineTrajectoryGenerator) -> None:
-        """Prepare.
-
-        Args:
-            model: The arm.
-            generator: Plans its stops.
-        """
         self._model = model
         self._limits = model.limits
         self._generator = generator
@@ -133,30 +118,18 @@ class SafetyFilter:
         self.is_near_neighbour = False
 
     def keep_apart(self, neighbours: Neighbours) -> None:
-        """Heed from now on how other arms move.
-
-        Args:
-            neighbours: The other arms.
-        """
+        """Heed from now on how other arms move."""
         self._neighbours = neighbours
         self._apart = ClearanceFloor(neighbours.least, self._generator.brake)
 
     def stands(self, state: RobotState | None) -> None:
-        """Let other arms know where the arm is while something else has its drives.
-
-        Args:
-            state: Its state; None while it is not known.
-        """
+        """Let other arms know where the arm is while something else has its drives."""
         if self._neighbours is not None:
             with self._neighbours.lock:
                 self._neighbours.stands(state)
 
     def reset(self, state: RobotState) -> None:
-        """Begin at a state.
-
-        Args:
-            state: Where the arm is.
-        """
+        """Begin at a state."""
         stop = self._generator.brake(state)
         self._lower, self._upper = -self._anywhere, self._anywhere
         self._floor.forget()
@@ -182,12 +155,8 @@ class SafetyFilter:
         """Let a step pass, or brake instead.
 
         Args:
-            state: Commanded state now.
-            wanted: State wanted at the end of the period.
-            period: Its length in [s].
             clearance: Least distance between links on a stop in [m]; None where what moves the
                 arm keeps to a path that was checked. Near other arms it counts as 0 then.
-            now: Steady time in [s].
             apart: Least distance to other arms that move, while all stop, in [m]; None is any.
 
         Returns:

@@ -22,9 +22,7 @@ class SceneExchange:
         """Begin with the scene of the core.
 
         Args:
-            core: The core.
             orders: What the cycle carries out.
-            worker: The thread that prepares motions; it looks for collisions, too.
         """
         self._core, self._orders, self._worker = core, orders, worker
         self._versions = count(1)
@@ -33,7 +31,6 @@ class SceneExchange:
         """Have a scene count from the next cycle on; measured here, in the thread of the caller.
 
         Args:
-            scene: The scene.
             near: Where the arm is in [rad]; None while that is not known.
 
         Returns:

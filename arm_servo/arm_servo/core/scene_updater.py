@@ -24,8 +24,7 @@ from .moving_arms import MovingArms
 SceneChange = Callable[[PlanningScene, Array], PlanningScene]
 """Makes a scene of the one before and the positions of the group's joints in [rad]."""
 
-MOVING_PERIOD = 0.5
-"""Time between two scenes for a joint beside the group that moves in [s]."""
+MOVING_PERIOD = 0.5  # time between two scenes for a joint beside the group that moves in [s]
 
 
 class SceneUpdater:
@@ -46,9 +45,7 @@ class SceneUpdater:
         """Begin with the scene of the model.
 
         Args:
-            gateway: Commands to the core of the group.
             arms: Joints of the arms that move by themselves, by group.
-            moving: Those arms while they move, where this group brings them their scene.
         """
         self.gateway = gateway
         self._moving = moving
@@ -78,11 +75,7 @@ class SceneUpdater:
         return self.gateway.snapshot.reference is not None
 
     def replace(self, change: SceneChange) -> None:
-        """Have a scene count in the place of the present one, and of any that waits.
-
-        Args:
-            change: Makes it.
-        """
+        """Have a scene count in the place of the present one, and of any that waits."""
         self._newest.append(change)
 
     def update(self, joints: JointPlaces, now: float) -> None:
@@ -90,7 +83,6 @@ class SceneUpdater:
 
         Args:
             joints: Where the joints of the robot are.
-            now: Steady time in [s].
 
         Raises:
             ArmError: The scene is refused; the one before counts.

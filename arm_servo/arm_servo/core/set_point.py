@@ -21,23 +21,14 @@ class Source(Enum):
     TARGET = 'target'
 
 
-JOGGING = (Source.JOG, Source.TARGET)
-"""What the servo commands."""
-
-MOTIONS = (*JOGGING, Source.TRAJECTORY)
-"""What moves the arm."""
+JOGGING = (Source.JOG, Source.TARGET)  # what the servo commands
+MOTIONS = (*JOGGING, Source.TRAJECTORY)  # what moves the arm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SetPoint:
-    """What to command in a cycle.
+    """What to command in a cycle."""
 
-    Attributes:
-        state: Positions, velocities and accelerations.
-        source: What moves the arm.
-        report: What limits the motion.
-    """
-
-    state: RobotState
-    source: Source
-    report: MotionReport
+    state: RobotState  # positions, velocities and accelerations
+    source: Source  # what moves the arm
+    report: MotionReport  # what limits the motion

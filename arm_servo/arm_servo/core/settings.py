@@ -12,20 +12,14 @@ from .execution import ExecutionSettings
 
 @dataclass(frozen=True, slots=True)
 class CoreSettings:
-    """How the core behaves.
+    """How the core behaves."""
 
-    Attributes:
-        servo: How jogging behaves.
-        execution: How trajectories are followed.
-        timeout: Time without a fresh jog command after which the arm comes to rest in [s].
-        clearance: Least distance between links that a jog and its stop may bring about in [m];
-            None is any.
-        check_self_collision: Whether a trajectory or a single target is refused on whose way
-            links meet.
-    """
-
-    servo: ServoSettings = field(default_factory=ServoSettings)
+    servo: ServoSettings = field(default_factory=ServoSettings)  # how jogging behaves
+    # how trajectories are followed
     execution: ExecutionSettings = field(default_factory=ExecutionSettings)
+    # time without a fresh jog command after which the arm comes to rest in [s]
     timeout: float = 0.1
+    # least distance between links that a jog and its stop may bring about in [m]; None is any
     clearance: float | None = 0.005
+    # whether a trajectory or a single target is refused on whose way links meet
     check_self_collision: bool = True

@@ -11,11 +11,8 @@ from arm_trajectory import GoalCode, OnlineTrajectoryGenerator, Plan
 
 from .outcome import Outcome
 
-ARRIVAL_TOLERANCE = 1e-6
-"""How near to the target the set-points must be to have arrived in [rad]."""
-
-MIN_SPEED_FACTOR = 0.01
-"""Least share of the speed that a target is approached with."""
+ARRIVAL_TOLERANCE = 1e-6  # how near to the target the set-points must be to have arrived in [rad]
+MIN_SPEED_FACTOR = 0.01  # least share of the speed that a target is approached with
 
 
 class SingleTarget:
@@ -32,7 +29,6 @@ class SingleTarget:
         """Aim.
 
         Args:
-            target: Positions in [rad], within the limits.
             max_speed: Greatest speed of a joint on the way there in [rad/s].
             generator: Plans at full speed.
         """
@@ -45,7 +41,6 @@ class SingleTarget:
         """Return the way to the target as it is driven; None where there is none.
 
         Args:
-            state: Commanded state of the joints.
             speed_scaling: Share of the speed, 0 to 1.
         """
         speed_scaling = max(speed_scaling, MIN_SPEED_FACTOR)
@@ -58,9 +53,7 @@ class SingleTarget:
         """Return the next state; None to come to rest.
 
         Args:
-            state: Commanded state of the joints.
             speed_scaling: Share of the speed, 0 to 1.
-            period: Time to the next step in [s].
         """
         if speed_scaling == 0.0:
             return None
@@ -72,18 +65,10 @@ class SingleTarget:
         return RobotState.at_rest(self.target) if plan.duration <= period else plan.at(period)
 
     def arrive(self, state: RobotState) -> None:
-        """End where a state rests at the target.
-
-        Args:
-            state: Commanded state of the joints.
-        """
+        """End where a state rests at the target."""
         if not state.moving and np.allclose(state.position, self.target, atol=ARRIVAL_TOLERANCE):
             self.end(Outcome(GoalCode.SUCCESSFUL, 'the target is reached'))
 
     def end(self, outcome: Outcome) -> None:
-        """End, unless it has ended.
-
-        Args:
-            outcome: How.
-        """
+        """End, unless it has ended."""
         self.outcome = self.outcome or outcome

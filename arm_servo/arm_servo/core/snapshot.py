@@ -19,33 +19,21 @@ MAX_CYCLE_AGE = 0.25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """What the core did in a cycle.
+    """What the core did in a cycle."""
 
-    Attributes:
-        time: Steady time of the cycle in [s].
-        set_point: What was commanded; None while the arm does not follow.
-        measured: What was measured; None before the first feedback.
-        blocked: Why the arm does not follow, with the remedy; empty while it does.
-        source: What moves it.
-        paused: Whether it is paused.
-        speed: Speed override, 0 to 1.
-        cycles: Cycles so far in which the arm followed.
-        period: Period of the cycle in [s].
-        execution: The trajectory that was followed last; None before the first.
-        ages: How old the measured values of each joint were in the cycle in [s]; None where they
-            are as old as the cycle.
-    """
-
-    time: float
-    set_point: SetPoint | None
-    measured: RobotState | None
-    blocked: str
-    source: Source = Source.NONE
-    paused: bool = False
-    speed: float = 1.0
-    cycles: int = 0
-    period: float = 0.01
+    time: float  # steady time of the cycle in [s]
+    set_point: SetPoint | None  # what was commanded; None while the arm does not follow
+    measured: RobotState | None  # what was measured; None before the first feedback
+    blocked: str  # why the arm does not follow, with the remedy; empty while it does
+    source: Source = Source.NONE  # what moves it
+    paused: bool = False  # whether it is paused
+    speed: float = 1.0  # speed override, 0 to 1
+    cycles: int = 0  # cycles so far in which the arm followed
+    period: float = 0.01  # period of the cycle in [s]
+    # the trajectory that was followed last; None before the first
     execution: Execution | None = None
+    # how old the measured values of each joint were in the cycle in [s]; None where they are as
+    # old as the cycle
     ages: Array | None = None
 
     @property
@@ -63,11 +51,7 @@ class Snapshot:
         return RobotState.at_rest(self.measured.position)
 
     def stale(self, age: float) -> str:
-        """Return that the cycle does not run; empty when it does.
-
-        Args:
-            age: Time since the cycle of this snapshot in [s].
-        """
+        """Return that the cycle does not run; empty when it does."""
         if age <= MAX_CYCLE_AGE:
             return ''
         begun = f'{age:.1f} s ago' if self.time else 'never'

@@ -13,8 +13,7 @@ from .execution import Execution
 from .set_point import Source
 from .settings import CoreSettings
 
-ARM_DISTANCE = 0.005
-"""Least distance to another arm that moves, for what is no jog, in [m]."""
+ARM_DISTANCE = 0.005  # least distance to another arm that moves, for what is no jog, in [m]
 
 UNCHECKED_CLEARANCE = 0.001
 """Least distance between links on a path that is not checked in a new scene yet in [m]: the arm
@@ -29,12 +28,6 @@ class StopDistances:
     """
 
     def __init__(self, settings: CoreSettings, arbiter: CommandArbiter) -> None:
-        """Begin with an arm that nothing moves.
-
-        Args:
-            settings: How the core behaves.
-            arbiter: What moves the arm.
-        """
         self._settings = settings
         self._arbiter = arbiter
         self._jogged = False

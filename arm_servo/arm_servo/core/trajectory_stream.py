@@ -29,11 +29,6 @@ class TrajectoryStream:
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
-        """Begin with nothing.
-
-        Args:
-            clock: Steady time in [s].
-        """
         self._clock = clock
         self._lock = threading.Lock()  # held for a few instructions only
         self._last = -math.inf
@@ -82,9 +77,6 @@ class TrajectoryStream:
 
     def interrupt(self, reason: str) -> bool:
         """End the stream.
-
-        Args:
-            reason: What has stopped the arm.
 
         Returns:
             Whether there was one.

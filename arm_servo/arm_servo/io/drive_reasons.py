@@ -55,17 +55,11 @@ PLURAL = {
 OBJECTS = {' its ': ' their ', 'takes it': 'takes them', 'it stands': 'they stand'}
 """What reasons say of one drive, as it is said of several."""
 
-Released = Mapping[str, Refusal | str]
-"""Drives that were taken away, with what happened."""
+Released = Mapping[str, Refusal | str]  # drives that were taken away, with what happened
 
 
 def why_not(feedback: Sequence[AxisFeedback], released: Released) -> str:
-    """Return why the arm cannot follow now; empty when it can.
-
-    Args:
-        feedback: State of each drive.
-        released: Drives that were taken away.
-    """
+    """Return why the arm cannot follow now; empty when it can."""
     return _sentence(
         (axis.name, axis.refusal or released.get(axis.name)) for axis in feedback
     ) or _sentence((axis.name, UNKNOWN) for axis in feedback if not axis.followable)
@@ -75,10 +69,6 @@ def too_fast(feedback: Sequence[AxisFeedback], velocities: Array) -> str:
     """Return which joints may be faster than their drives; empty when none may.
 
     A path that is faster is refused by the drive half-way, and ends in a stop beside the path.
-
-    Args:
-        feedback: State of each drive.
-        velocities: Greatest speeds of the joints in [rad/s].
     """
     remedy = 'lower max_velocity there, or raise 0x607F in the sdo list of bus.yml'
     pairs = zip(feedback, velocities, strict=True)
@@ -97,10 +87,6 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
     """Return why an arm that followed does not go on, and the code of its trajectory.
 
     What took a drive away is the cause; the state that it is in now may be a consequence.
-
-    Args:
-        feedback: State of each drive.
-        released: Drives that were taken away.
     """
     causes: list[tuple[str, Refusal | str | None]] = [
         (axis.name, released.get(axis.name) or axis.refusal) for axis in feedback
@@ -120,12 +106,7 @@ def what_happened(feedback: Sequence[AxisFeedback], released: Released) -> tuple
 
 
 def taken_away(axis: str, refusal: Refusal) -> str:
-    """Return why a drive was taken away.
-
-    Args:
-        axis: Name of the drive.
-        refusal: What happened.
-    """
+    """Return why a drive was taken away."""
     return _sentence([(axis, refusal)])
 
 
@@ -133,9 +114,6 @@ def before_first_command(refusal: Refusal) -> Refusal | str:
     """Return why an arm that nobody has moved yet has to be commanded first.
 
     A drive that was initialized, or got its mode, before that was taken from nobody.
-
-    Args:
-        refusal: What happened to a drive.
     """
     return UNUSED if refusal.cause in PREPARATIONS else refusal
 

@@ -85,10 +85,6 @@ class DriveSource:
         """Come to rest, and leave the drives alone until attached again.
 
         What was requested before is refused, also where it would get the drive back.
-
-        Args:
-            axis: Name of the drive.
-            refusal: Why it was taken away.
         """
         reason = refusal if self._has_moved else before_first_command(refusal)
         self._released = {axis: reason, **self._released}
@@ -98,11 +94,6 @@ class DriveSource:
         self, now: float, period: float, feedback: Sequence[AxisFeedback]
     ) -> Sequence[Setpoint | None]:
         """Answer the set-points of a cycle.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-            feedback: State of each drive.
 
         Returns:
             Position in [rad] and velocity in [rad/s] of each drive that follows.
@@ -155,11 +146,7 @@ class DriveSource:
 
 
 def measured_state(feedback: Sequence[AxisFeedback]) -> RobotState | None:
-    """Return what the drives measure; None while one of them has sent nothing yet.
-
-    Args:
-        feedback: State of each drive.
-    """
+    """Return what the drives measure; None while one of them has sent nothing yet."""
     positions = frozen([axis.position for axis in feedback])
     if not np.isfinite(positions).all():
         return None

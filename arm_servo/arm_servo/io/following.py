@@ -14,8 +14,7 @@ from arm_model import Array, JointLimits
 REST_TOLERANCE = 0.002
 """How far an arm at rest may turn by itself in [rad]; more was done by others."""
 
-MEAN_GAIN = 0.1
-"""Share of a new measurement in the mean and in the noise of an arm at rest."""
+MEAN_GAIN = 0.1  # share of a new measurement in the mean and in the noise of an arm at rest
 
 NOISE_ALLOWANCE, MEAN_ALLOWANCE = 8.0, 2.0
 """How many times its noise a measurement, and the mean of many, may be off by itself."""
@@ -26,15 +25,10 @@ ARRIVAL_TOLERANCE = 0.02
 
 @dataclass(frozen=True, slots=True)
 class FollowingLimits:
-    """When an arm counts as not following.
+    """When an arm counts as not following."""
 
-    Attributes:
-        error: How far a joint may be from where it was sent in [rad]; 0 is any distance.
-        delay: How late it may be there in [s].
-    """
-
-    error: float = 0.2
-    delay: float = 0.2
+    error: float = 0.2  # how far a joint may be from where it was sent in [rad]; 0 is any distance
+    delay: float = 0.2  # how late it may be there in [s]
 
 
 class FollowingWatch:
@@ -48,9 +42,7 @@ class FollowingWatch:
         """Know no command yet.
 
         Args:
-            joints: The arm's joints.
             limits: When it does not follow.
-            period: Period of the cycle in [s].
         """
         self._joints = joints
         self._limits = limits
@@ -62,29 +54,17 @@ class FollowingWatch:
         self._noise = np.zeros(len(joints))
 
     def begin(self, positions: Array) -> None:
-        """Begin where the arm stands.
-
-        Args:
-            positions: Its positions in [rad].
-        """
+        """Begin where the arm stands."""
         self._commands[:] = positions
         self._rest = self._mean = self._last = positions
 
     def command(self, positions: Array) -> None:
-        """Note the command of a cycle.
-
-        Args:
-            positions: Positions in [rad].
-        """
+        """Note the command of a cycle."""
         self._turn = (self._turn + 1) % len(self._commands)
         self._commands[self._turn] = positions
 
     def errors(self, measured: Array) -> Array:
-        """Return how far each joint is from all of its commands in [rad].
-
-        Args:
-            measured: Measured positions in [rad]; those of continuous joints up to whole turns.
-        """
+        """Return how far each joint is from all of its commands in [rad]."""
         measured = self._unwound(measured, self._commands[self._turn])
         lower, upper = self._commands.min(axis=0), self._commands.max(axis=0)
         errors: Array = np.maximum(np.maximum(lower - measured, measured - upper), 0.0)
@@ -97,7 +77,6 @@ class FollowingWatch:
         Encoders are noisy: how much so is learned at rest.
 
         Args:
-            measured: Measured positions in [rad].
             quiet: Nothing is commanded.
         """
         self._still = self._still + 1 if quiet else 0
@@ -127,11 +106,7 @@ class FollowingWatch:
         return near - self._joints.error(near, measured)
 
     def problem(self, measured: Array) -> str:
-        """Say which joint does not follow; empty when all do.
-
-        Args:
-            measured: Measured positions in [rad].
-        """
+        """Say which joint does not follow; empty when all do."""
         errors = self.errors(measured)
         worst = int(np.argmax(errors))
         if not 0.0 < self._limits.error < errors[worst]:

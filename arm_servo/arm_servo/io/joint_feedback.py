@@ -22,7 +22,6 @@ class JointFeedback:
         """Know nothing yet.
 
         Args:
-            joints: Names of the arm's joints.
             timeout: Age at which a position counts no more in [s].
         """
         self._joints = list(joints)
@@ -40,10 +39,7 @@ class JointFeedback:
         """Take a message; numbers that are not finite are passed over.
 
         Args:
-            names: Names of joints.
-            positions: Their positions in [rad].
             velocities: Their velocities in [rad/s]; may be empty.
-            now: Steady time in [s].
         """
         speeds = velocities if len(velocities) == len(names) else [0.0] * len(names)
         for name, position, speed in zip(names, positions, speeds, strict=False):
@@ -57,11 +53,7 @@ class JointFeedback:
         return min(time for _, _, time in self._values)
 
     def state(self, now: float) -> tuple[RobotState | None, str]:
-        """Return the measured state, None before it is whole; and why it is no good.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Return the measured state, None before it is whole; and why it is no good."""
         values = list(self._values)
         silent = [
             joint

@@ -25,8 +25,7 @@ from .joint_feedback import JointFeedback
 RESYNC_SILENCE = 0.3
 """How long nobody must command an arm that did not follow, before it takes commands, in [s]."""
 
-STOP_TIMEOUT = 3.0
-"""Longest time for the arm to come to rest at the end of the program in [s]."""
+STOP_TIMEOUT = 3.0  # longest time for the arm to come to rest at the end of the program in [s]
 
 
 class MotionCycle:
@@ -46,8 +45,6 @@ class MotionCycle:
         """Wait for the arm.
 
         Args:
-            gateway: Commands to the core.
-            feedback: The arm's measured state.
             output: Takes the set-points while something moves, and the last at rest.
             watch: Compares the two.
         """
@@ -67,12 +64,7 @@ class MotionCycle:
         return not self._following or self._quiet
 
     def step(self, now: float, period: float) -> None:
-        """Run a cycle.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-        """
+        """Run a cycle."""
         try:
             self._step(now, period)
         except Exception as error:
@@ -98,11 +90,7 @@ class MotionCycle:
         self._put(self._gateway.step(now, period, measured, self._lost))
 
     def brake(self, period: float) -> None:
-        """Slow the last set-point down, without the core; for when the core has failed.
-
-        Args:
-            period: Time to the next cycle in [s].
-        """
+        """Slow the last set-point down, without the core; for when the core has failed."""
         self._state = hard_brake(self._state, self._gateway.model.limits, period)
         self._output(SetPoint(self._state, Source.NONE, MotionReport()))
         self._quiet = not self._state.moving
@@ -154,8 +142,6 @@ class MotionThread:
         """Prepare.
 
         Args:
-            cycle: The cycle.
-            period: Its period in [s].
             begin: Called once in the thread, before the first cycle.
         """
         self.error: Exception | None = None

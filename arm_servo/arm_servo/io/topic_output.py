@@ -22,28 +22,19 @@ ARRAY = 'std_msgs/Float64MultiArray'
 
 @dataclass(frozen=True, slots=True)
 class OutputParameters:
-    """What is published.
+    """What is published."""
 
-    Attributes:
-        topic: Where to.
-        kind: :data:`TRAJECTORY` or :data:`ARRAY`.
-        positions: Positions are in it.
-        velocities: Velocities are in it.
-        accelerations: Accelerations are in it; only in trajectories.
-    """
-
-    topic: str
-    kind: str
-    positions: bool
-    velocities: bool
-    accelerations: bool
+    topic: str  # where to
+    kind: str  # :data:`TRAJECTORY` or :data:`ARRAY`
+    positions: bool  # positions are in it
+    velocities: bool  # velocities are in it
+    accelerations: bool  # accelerations are in it; only in trajectories
 
 
 def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputParameters:
     """Declare moveit_servo's parameters of the output.
 
     Args:
-        node: The node.
         prefix: Before each name, with its dot.
         topic: Default of the topic.
         kind: Default of its type.
@@ -81,9 +72,6 @@ class TopicOutput:
         """Advertise.
 
         Args:
-            node: The node.
-            parameters: What is published.
-            joints: Names of the joints, in the order of set-points.
             period: Time from the message to its point in [s].
         """
         kind = Float64MultiArray if parameters.kind == ARRAY else JointTrajectory

@@ -12,32 +12,20 @@ import numpy as np
 
 from arm_model import Array
 
-OPTIMAL = 1
-"""Exit flag of daqp."""
-
-FREE = 1e30
-"""What daqp takes for no bound."""
+OPTIMAL = 1  # exit flag of daqp
+FREE = 1e30  # what daqp takes for no bound
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """Minimise x'Hx/2 + g'x with lower <= x <= upper and rows x >= least.
+    """Minimise x'Hx/2 + g'x with lower <= x <= upper and rows x >= least."""
 
-    Attributes:
-        hessian: H, positive definite (n, n).
-        gradient: g (n).
-        lower: Least values (n).
-        upper: Greatest values (n).
-        rows: Rows (m, n); m may be 0.
-        least: Least values of the rows (m).
-    """
-
-    hessian: Array
-    gradient: Array
-    lower: Array
-    upper: Array
-    rows: Array
-    least: Array
+    hessian: Array  # H, positive definite (n, n)
+    gradient: Array  # g (n)
+    lower: Array  # least values (n)
+    upper: Array  # greatest values (n)
+    rows: Array  # rows (m, n); m may be 0
+    least: Array  # least values of the rows (m)
 
     def solve(self) -> Solution | None:
         """Return the answer; None when there is none."""
@@ -52,13 +40,9 @@ class Program:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """Answer of a program.
+    """Answer of a program."""
 
-    Attributes:
-        values: The variables (n).
-        forces: How hard each bound (n), then each row (m) presses: above zero where the upper
-            bound presses, below zero where the lower one does, zero where none does.
-    """
-
-    values: Array
+    values: Array  # the variables (n)
+    # how hard each bound (n), then each row (m) presses: above zero where the upper bound presses,
+    # below zero where the lower one does, zero where none does
     forces: Array

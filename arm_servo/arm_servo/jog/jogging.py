@@ -24,12 +24,6 @@ class Jogging:
     """Joint speeds for the latest jog command; none when it is stale and its stop is over."""
 
     def __init__(self, model: RobotModel, settings: ServoSettings) -> None:
-        """Wait for a command.
-
-        Args:
-            model: The arm.
-            settings: How jogging behaves.
-        """
         self._servo = ServoSource(model, settings)
         self._limits = model.limits
         self._command: Command | None = None
@@ -48,7 +42,6 @@ class Jogging:
         """Take a command.
 
         Args:
-            command: The command.
             fresh_until: Steady time until which it counts in [s].
         """
         self._command, self._fresh_until, self._slowing_since = command, fresh_until, None
@@ -60,14 +53,7 @@ class Jogging:
     def step(
         self, state: RobotState, now: float, period: float, *, held: bool
     ) -> tuple[Array | None, MotionReport]:
-        """Return joint speeds in [rad/s] and what limits them; None to come to rest.
-
-        Args:
-            state: Commanded state of the joints.
-            now: Steady time in [s].
-            period: Time to the next step in [s].
-            held: Whether the arm is to come to rest in spite of a command.
-        """
+        """Return joint speeds in [rad/s] and what limits them; None to come to rest."""
         command = self._command
         if held or self.stale(now):
             command = self._slowing(state, now)

@@ -35,29 +35,18 @@ MIN_SIDE_DISTANCE = 1e-3
 MAX_SINGULAR_VALUE_RATE = 3.0
 """Greatest change of a scaled singular value with a joint in [1/rad], to save a closer look."""
 
-MAX_APPROACH_RATE = 4.0
-"""Greatest speed towards a fold per way that is left in [1/s]."""
-
-MIN_COMPONENT = 1e-5
-"""Part of a joint in a direction that counts for none."""
-
-JacobianAt = Callable[[Array], Array]
-"""Scaled Jacobian of joint positions."""
+MAX_APPROACH_RATE = 4.0  # greatest speed towards a fold per way that is left in [1/s]
+MIN_COMPONENT = 1e-5  # part of a joint in a direction that counts for none
+JacobianAt = Callable[[Array], Array]  # scaled Jacobian of joint positions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WayOut:
-    """Joint speeds that lead out of a singular pose.
+    """Joint speeds that lead out of a singular pose."""
 
-    Attributes:
-        direction: Unit vector of joint speeds.
-        speed: How fast to go along it in [rad/s].
-        weight: How much that weighs against the asked twist, 0 to 1.
-    """
-
-    direction: Array
-    speed: float
-    weight: float
+    direction: Array  # unit vector of joint speeds
+    speed: float  # how fast to go along it in [rad/s]
+    weight: float  # how much that weighs against the asked twist, 0 to 1
 
 
 class ReachLimit:
@@ -71,7 +60,6 @@ class ReachLimit:
         """Remember nothing yet.
 
         Args:
-            limits: Limits of the joints.
             escape: Share of a joint's speed with which it leaves a singular pose.
             braking: Share of acceleration and jerk that braking plans with.
         """
@@ -95,7 +83,6 @@ class ReachLimit:
 
         Args:
             jacobian_at: Scaled Jacobian of joint positions.
-            position: Joint positions in [rad].
             found: The directions there.
             command: Scaled twist that is asked (6).
         """
@@ -135,7 +122,6 @@ class ReachLimit:
 
         Args:
             jacobian_at: Scaled Jacobian of joint positions.
-            position: Joint positions in [rad].
             found: The directions there.
             command: Scaled twist that is asked (6).
         """

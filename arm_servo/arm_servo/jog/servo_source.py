@@ -14,17 +14,13 @@ from arm_model import Array, Mask, Pose, RobotModel, RobotState, turned_twists
 from ..report import Cause, Limiter, MotionReport
 from .velocity_ik import IkAnswer, IkSettings, TwistTask, VelocityIk
 
-NO_AXES: Mask = np.zeros(6, dtype=np.bool_)
-"""Mask of no axis of a twist."""
-
-BASE = np.eye(3)
-"""The axes of the base."""
+NO_AXES: Mask = np.zeros(6, dtype=np.bool_)  # mask of no axis of a twist
+BASE = np.eye(3)  # the axes of the base
 
 RELEASED_SPEED = np.array([2e-3] * 3 + [5e-3] * 3)
 """Speed below which a released axis is held again in [m/s] and [rad/s]."""
 
-MIN_COMMAND_FACTOR = 0.1
-"""Least share of a command that is carried out while held axes are off."""
+MIN_COMMAND_FACTOR = 0.1  # least share of a command that is carried out while held axes are off
 
 SLOWED, HASTENED = 0.1, 0.4
 """Least times in which the share of a command falls to nothing and comes back in [s]."""
@@ -32,45 +28,29 @@ SLOWED, HASTENED = 0.1, 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistCommand:
-    """An asked speed of the tool.
+    """An asked speed of the tool."""
 
-    Attributes:
-        twist: Linear [m/s], then angular [rad/s] (6), turning about the tip.
-        link: Link along whose axes the twist is given, and follows it; the base when None.
-        axes: Rotation (3, 3) from other axes to the base, in place of a link.
-    """
-
-    twist: Array
+    twist: Array  # linear [m/s], then angular [rad/s] (6), turning about the tip
+    # link along whose axes the twist is given, and follows it; the base when None
     link: str | None = None
-    axes: Array | None = None
+    axes: Array | None = None  # rotation (3, 3) from other axes to the base, in place of a link
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointCommand:
-    """Asked speeds of joints.
+    """Asked speeds of joints."""
 
-    Attributes:
-        velocity: Speeds in [rad/s], in the order of the joints.
-        commanded: Mask of the joints that are commanded; the others are held.
-    """
-
-    velocity: Array
-    commanded: Mask
+    velocity: Array  # speeds in [rad/s], in the order of the joints
+    commanded: Mask  # mask of the joints that are commanded; the others are held
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseCommand:
-    """A pose of the tip to go to, and to track when it moves.
+    """A pose of the tip to go to, and to track when it moves."""
 
-    Attributes:
-        pose: Pose of the tip in the base.
-        linear_speed: Greatest speed of the tip on the way there in [m/s].
-        angular_speed: Greatest angular speed of the tip on the way there in [rad/s].
-    """
-
-    pose: Pose
-    linear_speed: float = 0.4
-    angular_speed: float = 0.8
+    pose: Pose  # pose of the tip in the base
+    linear_speed: float = 0.4  # greatest speed of the tip on the way there in [m/s]
+    angular_speed: float = 0.8  # greatest angular speed of the tip on the way there in [rad/s]
 
 
 Command = TwistCommand | JointCommand | PoseCommand
@@ -78,26 +58,17 @@ Command = TwistCommand | JointCommand | PoseCommand
 
 @dataclass(frozen=True, slots=True)
 class ServoSettings:
-    """How jogging behaves.
+    """How jogging behaves."""
 
-    Attributes:
-        hold: How fast held axes come back, per error, in [1/s].
-        approach: How fast a pose is approached at the end, per distance, in [1/s].
-        linear_deceleration: Deceleration towards a pose in [m/s2].
-        angular_deceleration: Angular deceleration towards a pose in [rad/s2].
-        path_error: Error of held axes at which the command is slowed down in [m].
-        drift: Mask of the axes that are never held; by default rotations of arms that have fewer
-            than six joints.
-        ik: Weights of the inverse kinematics.
-    """
-
-    hold: float = 8.0
-    approach: float = 4.0
-    linear_deceleration: float = 0.5
-    angular_deceleration: float = 1.5
-    path_error: float = 5e-4
+    hold: float = 8.0  # how fast held axes come back, per error, in [1/s]
+    approach: float = 4.0  # how fast a pose is approached at the end, per distance, in [1/s]
+    linear_deceleration: float = 0.5  # deceleration towards a pose in [m/s2]
+    angular_deceleration: float = 1.5  # angular deceleration towards a pose in [rad/s2]
+    path_error: float = 5e-4  # error of held axes at which the command is slowed down in [m]
+    # mask of the axes that are never held; by default rotations of arms that have fewer than six
+    # joints
     drift: tuple[bool, bool, bool, bool, bool, bool] | None = None
-    ik: IkSettings = field(default_factory=IkSettings)
+    ik: IkSettings = field(default_factory=IkSettings)  # weights of the inverse kinematics
 
 
 class ServoSource:
@@ -108,12 +79,6 @@ class ServoSource:
     """
 
     def __init__(self, model: RobotModel, settings: ServoSettings | None = None) -> None:
-        """Prepare.
-
-        Args:
-            model: The arm.
-            settings: How jogging behaves.
-        """
         self._model = model
         self._settings = settings or ServoSettings()
         self._ik = VelocityIk(model, self._settings.ik)
@@ -133,13 +98,7 @@ class ServoSource:
         self._share = 1.0
 
     def step(self, state: RobotState, command: Command, period: float) -> IkAnswer:
-        """Find the joint speeds for a command.
-
-        Args:
-            state: Commanded state of the joints.
-            command: What is asked.
-            period: Time to the next step in [s].
-        """
+        """Find the joint speeds for a command."""
         if isinstance(command, JointCommand):
             self.reset()
             return self._ik.joints(state, command.velocity, command.commanded, period)

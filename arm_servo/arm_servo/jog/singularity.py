@@ -28,36 +28,21 @@ MIN_SINGULAR_VALUE = 0.004
 REGULAR_SINGULAR_VALUE = 0.4
 """Singular value of the scaled Jacobian above which a direction is never damped."""
 
-LOST_SPEED_FACTOR = 0.5
-"""Share of the asked speed below which a direction counts as lost."""
-
-DIFFERENCE_STEP = 1e-3
-"""Step of the differences that look for a way out in [rad]."""
-
-MIN_SPEED = 1e-6
-"""Speed that stands for none in [rad/s]."""
-
-MIN_CURVATURE = 0.02
-"""Least curvature of a way out, in scaled tool speed per squared joint speed."""
+LOST_SPEED_FACTOR = 0.5  # share of the asked speed below which a direction counts as lost
+DIFFERENCE_STEP = 1e-3  # step of the differences that look for a way out in [rad]
+MIN_SPEED = 1e-6  # speed that stands for none in [rad/s]
+MIN_CURVATURE = 0.02  # least curvature of a way out, in scaled tool speed per squared joint speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Directions:
-    """Singular directions of a scaled Jacobian, for a command.
+    """Singular directions of a scaled Jacobian, for a command."""
 
-    Attributes:
-        tool: Directions of the tool u_i, as columns (6, r).
-        joints: Directions of the joints v_i, as rows (r, n).
-        values: Singular values s_i (r).
-        damping: Squares of the damping of each direction (r).
-        speed_factors: What is left of the speed along each direction (r), 0 to 1.
-    """
-
-    tool: Array
-    joints: Array
-    values: Array
-    damping: Array
-    speed_factors: Array
+    tool: Array  # directions of the tool u_i, as columns (6, r)
+    joints: Array  # directions of the joints v_i, as rows (r, n)
+    values: Array  # singular values s_i (r)
+    damping: Array  # squares of the damping of each direction (r)
+    speed_factors: Array  # what is left of the speed along each direction (r), 0 to 1
 
     @property
     def damped(self) -> bool:
@@ -127,7 +112,6 @@ def distance_to_singularity(
 
     Args:
         jacobian_at: Scaled Jacobian of joint positions.
-        position: Joint positions in [rad].
         found: The directions there.
 
     Returns:
@@ -152,7 +136,6 @@ def way_out(
 
     Args:
         jacobian_at: Scaled Jacobian of joint positions.
-        position: Joint positions in [rad].
         found: The directions there.
         command: Scaled twist (6).
 

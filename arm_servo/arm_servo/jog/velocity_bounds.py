@@ -14,78 +14,49 @@ from arm_trajectory import brakeable
 
 from ..report import Cause, Limiter
 
-ACTIVE_FORCE = 1e-9
-"""Force of a bound above which it counts as pressing."""
+ACTIVE_FORCE = 1e-9  # force of a bound above which it counts as pressing
 
 MIN_DECELERATION_FACTOR = 0.3
 """Least share of its deceleration that a joint plans with while others take longer to stop."""
 
-MIN_APPROACH_CYCLES = 3.0
-"""Least time for the rest of the way to a limit, in cycles."""
-
-SIGNS = np.array([[-1.0], [1.0]])
-"""Signs of the two ways of a joint."""
+MIN_APPROACH_CYCLES = 3.0  # least time for the rest of the way to a limit, in cycles
+SIGNS = np.array([[-1.0], [1.0]])  # signs of the two ways of a joint
 
 
 @dataclass(frozen=True, slots=True)
 class VelocityBoundsSettings:
-    """How motion brakes in front of limits.
+    """How motion brakes in front of limits."""
 
-    Attributes:
-        margin: Least distance between links that a command may bring about in [m].
-        horizon: Distance at which a pair of links is taken into account in [m].
-        pairs: Greatest number of pairs taken into account.
-        approach: Greatest speed of approach per distance to the margin in [1/s].
-        braking: Share of acceleration and jerk that braking in front of a limit plans with.
-        joint_margins: Distance from the position limits at which joints come to rest in [rad], one
-            for all or one each.
-    """
-
-    margin: float = 0.01
-    horizon: float = 0.15
-    pairs: int = 3
-    approach: float = 4.0
+    margin: float = 0.01  # least distance between links that a command may bring about in [m]
+    horizon: float = 0.15  # distance at which a pair of links is taken into account in [m]
+    pairs: int = 3  # greatest number of pairs taken into account
+    approach: float = 4.0  # greatest speed of approach per distance to the margin in [1/s]
+    # share of acceleration and jerk that braking in front of a limit plans with
     braking: float = 0.7
+    # distance from the position limits at which joints come to rest in [rad], one for all or one
+    # each
     joint_margins: tuple[float, ...] = (0.0,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """Bounds of the joint speeds in a state.
+    """Bounds of the joint speeds in a state."""
 
-    Attributes:
-        below: Ways left to the lower limits, less the margins, in [rad].
-        above: Ways left to the upper limits, less the margins, in [rad].
-        slowest: Least speeds that can be braked in front of the lower limits in [rad/s].
-        fastest: Greatest speeds that can be braked in front of the upper limits in [rad/s].
-        lower: Those, and what can be reached soon, in [rad/s].
-        upper: Those, and what can be reached soon, in [rad/s].
-        near: The nearest pairs of links.
-        rows: Their gradients (m, n) in [m/rad].
-        least: Their least changes of distance (m) in [m/s].
-    """
-
-    below: Array
-    above: Array
-    slowest: Array
-    fastest: Array
-    lower: Array
-    upper: Array
-    near: Sequence[Proximity]
-    rows: Array
-    least: Array
+    below: Array  # ways left to the lower limits, less the margins, in [rad]
+    above: Array  # ways left to the upper limits, less the margins, in [rad]
+    slowest: Array  # least speeds that can be braked in front of the lower limits in [rad/s]
+    fastest: Array  # greatest speeds that can be braked in front of the upper limits in [rad/s]
+    lower: Array  # those, and what can be reached soon, in [rad/s]
+    upper: Array  # those, and what can be reached soon, in [rad/s]
+    near: Sequence[Proximity]  # the nearest pairs of links
+    rows: Array  # their gradients (m, n) in [m/rad]
+    least: Array  # their least changes of distance (m) in [m/s]
 
 
 class VelocityBounds:
     """Finds the bounds of an arm's joint speeds."""
 
     def __init__(self, model: RobotModel, settings: VelocityBoundsSettings) -> None:
-        """Prepare.
-
-        Args:
-            model: The arm.
-            settings: How it brakes.
-        """
         limits, share = model.limits, settings.braking
         self._model, self._settings, self._limits = model, settings, limits
         self._share = share
@@ -97,12 +68,7 @@ class VelocityBounds:
         )
 
     def bounds(self, state: RobotState, period: float) -> Bounds:
-        """Find the bounds in a state.
-
-        Args:
-            state: Commanded state of the joints.
-            period: Time to the next step in [s].
-        """
+        """Find the bounds in a state."""
         settings, limits = self._settings, self._limits
         near = self._model.nearest(state.position, settings.horizon, settings.pairs)
         ways = np.array((state.position - self._lower, self._upper - state.position))
@@ -149,7 +115,6 @@ class VelocityBounds:
         """Name the bounds and rows that press, the strongest first.
 
         Args:
-            bounds: The bounds.
             forces: How hard they press, of :class:`Solution`.
             factor: What is left of the asked speed.
         """

@@ -30,11 +30,8 @@ from .reach_limit import ReachLimit
 from .singularity import Directions, directions
 from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
 
-AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')
-"""Names of the axes of a twist."""
-
-REGULARIZATION = 1e-5
-"""Weight of the joint speeds that keeps the program definite."""
+AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')  # names of the axes of a twist
+REGULARIZATION = 1e-5  # weight of the joint speeds that keeps the program definite
 
 SELF_MOTION_WEIGHT = 2e-3
 """Weight of joint speeds that do not move the tool.
@@ -46,51 +43,33 @@ worth that. In front of a lasting limit the swing is small against what it gains
 
 @dataclass(frozen=True, slots=True)
 class IkSettings:
-    """How the velocity inverse kinematics weighs.
+    """How the velocity inverse kinematics weighs."""
 
-    Attributes:
-        hold_weight: Weight of held axes against commanded ones.
-        drift_weight: Weight of axes that may drift.
-        escape: Share of a joint's speed with which it leaves a singular pose.
-        brakes: How it brakes in front of limits.
-    """
-
-    hold_weight: float = 30.0
-    drift_weight: float = 0.01
-    escape: float = 0.3
+    hold_weight: float = 30.0  # weight of held axes against commanded ones
+    drift_weight: float = 0.01  # weight of axes that may drift
+    escape: float = 0.3  # share of a joint's speed with which it leaves a singular pose
+    # how it brakes in front of limits
     brakes: VelocityBoundsSettings = field(default_factory=VelocityBoundsSettings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistTask:
-    """An asked speed of the tool.
+    """An asked speed of the tool."""
 
-    Attributes:
-        twist: Linear [m/s], then angular [rad/s], along the task's axes (6).
-        axes: Rotation from the task's axes to the base link (3, 3).
-        commanded: Mask of the axes that the command moves (6).
-        drifting: Mask of the other axes that need not be held (6).
-        correction: Speed that brings the held axes back where they belong (6).
-    """
-
-    twist: Array
-    axes: Array
-    commanded: Mask
-    drifting: Mask
+    twist: Array  # linear [m/s], then angular [rad/s], along the task's axes (6)
+    axes: Array  # rotation from the task's axes to the base link (3, 3)
+    commanded: Mask  # mask of the axes that the command moves (6)
+    drifting: Mask  # mask of the other axes that need not be held (6)
+    # speed that brings the held axes back where they belong (6)
     correction: Array = field(default_factory=lambda: np.zeros(6))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IkAnswer:
-    """Joint speeds, and what limits them.
+    """Joint speeds, and what limits them."""
 
-    Attributes:
-        velocity: Joint speeds in [rad/s].
-        report: What limits them.
-    """
-
-    velocity: Array
-    report: MotionReport
+    velocity: Array  # joint speeds in [rad/s]
+    report: MotionReport  # what limits them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +91,6 @@ class VelocityIk:
         """Prepare.
 
         Args:
-            model: The arm.
             settings: Weights and margins.
         """
         self._model = model
@@ -129,13 +107,7 @@ class VelocityIk:
         self._reach_limit = ReachLimit(model.limits, settings.escape, settings.brakes.braking)
 
     def cartesian(self, state: RobotState, task: TwistTask, period: float) -> IkAnswer:
-        """Find joint speeds for a speed of the tool.
-
-        Args:
-            state: Commanded state of the joints.
-            task: What is asked.
-            period: Time to the next step in [s].
-        """
+        """Find joint speeds for a speed of the tool."""
         weights = self._weights(task)
         bounds = self._velocity_bounds.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
@@ -170,10 +142,8 @@ class VelocityIk:
         """Find joint speeds near asked ones; joints that are not commanded are held.
 
         Args:
-            state: Commanded state of the joints.
             velocity: Asked speeds in [rad/s].
             commanded: Mask of the joints that the command moves.
-            period: Time to the next step in [s].
         """
         self._reach_limit.forget()
         weight = np.where(commanded, 1.0, self._settings.hold_weight)

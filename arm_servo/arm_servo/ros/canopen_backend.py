@@ -31,8 +31,7 @@ from .upstream_parameters import check_names
 if TYPE_CHECKING:
     from arm_canopen import MasterProcess
 
-ATTACH_PERIOD = 0.2
-"""Time between two tries to attach when the bus starts in [s]."""
+ATTACH_PERIOD = 0.2  # time between two tries to attach when the bus starts in [s]
 
 
 def serve_canopen(stop: threading.Event, offers: Offers) -> None:
@@ -40,7 +39,6 @@ def serve_canopen(stop: threading.Event, offers: Offers) -> None:
 
     Args:
         stop: Set by Ctrl-C and SIGTERM.
-        offers: What is offered to clients.
 
     Raises:
         BackendError: The bus cannot be configured or opened, or has a master.
@@ -60,11 +58,6 @@ class BusDrives:
 
     def __init__(self, master: MasterProcess, model: RobotModel, settings: CoreSettings) -> None:
         """Build the core; nothing moves yet.
-
-        Args:
-            master: The process that runs the bus.
-            model: The group.
-            settings: How the core behaves.
 
         Raises:
             ModelError: A joint has no drive, or the core cannot move such a group.
@@ -106,10 +99,6 @@ class CanopenMotion:
 
     def __init__(self, master: MasterProcess, offers: Offers) -> None:
         """Build cores and nodes; nothing moves yet.
-
-        Args:
-            master: The process that runs the bus.
-            offers: What is offered to clients.
 
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.

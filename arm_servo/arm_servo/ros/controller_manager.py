@@ -16,12 +16,7 @@ from node_runner import ParameterReader
 
 
 def declare_manager(node: Node, model: RobotModel) -> tuple[str, bool]:
-    """Declare the trajectory controller's name, and whether joint states are published.
-
-    Args:
-        node: The node ``controller_manager``.
-        model: The arm.
-    """
+    """Declare the trajectory controller's name, and whether joint states are published."""
     read = ParameterReader(node)
     return (
         read.text(
@@ -37,23 +32,15 @@ def declare_manager(node: Node, model: RobotModel) -> tuple[str, bool]:
 
 @dataclass(slots=True)
 class Controller:
-    """A controller as the manager shows it.
+    """A controller as the manager shows it."""
 
-    Attributes:
-        name: Its name.
-        kind: Its type.
-        update_rate: Its rate in [Hz].
-        set_active: Called when it is switched.
-        interfaces: Command interfaces that it claims while active.
-        active: Whether it is.
-    """
-
-    name: str
-    kind: str
-    update_rate: int
-    set_active: Callable[[bool], None]
+    name: str  # its name
+    kind: str  # its type
+    update_rate: int  # its rate in [Hz]
+    set_active: Callable[[bool], None]  # called when it is switched
+    # command interfaces that it claims while active
     interfaces: Sequence[str] = field(default_factory=tuple)
-    active: bool = True
+    active: bool = True  # whether it is
 
     def state(self) -> ControllerState:
         """Return it as a message."""
@@ -71,12 +58,6 @@ class ControllerManager:
     """``~/list_controllers`` and ``~/switch_controller``."""
 
     def __init__(self, node: Node, controllers: Sequence[Controller]) -> None:
-        """Offer them.
-
-        Args:
-            node: The node ``controller_manager``.
-            controllers: What there is.
-        """
         self._node = node
         self._controllers = {controller.name: controller for controller in controllers}
         node.create_service(ListControllers, '~/list_controllers', self._list)
@@ -125,8 +106,6 @@ def trajectory_entry(
     """Return the trajectory controller as MoveIt and rqt look for it.
 
     Args:
-        name: Its name.
-        joints: Joints that it moves.
         period: Period of its cycle in [s]; 0 is unknown.
         set_active: Called when it is switched.
     """

@@ -29,15 +29,10 @@ from .trajectory.parameters import declare_check, declare_trajectory, Trajectory
 
 @dataclass(frozen=True, slots=True)
 class Offers:
-    """What is offered for an arm; one of it at least.
+    """What is offered for an arm; one of it at least."""
 
-    Attributes:
-        jogging: servo_node.
-        trajectories: The trajectory controller.
-    """
-
-    jogging: bool = True
-    trajectories: bool = True
+    jogging: bool = True  # servo_node
+    trajectories: bool = True  # the trajectory controller
 
 
 class Drives(Protocol):
@@ -59,8 +54,7 @@ class Drives(Protocol):
 AnyDrives = TypeVar('AnyDrives', bound=Drives)
 MakeDrives = Callable[[Node, RobotModel, CoreSettings], AnyDrives]
 """Builds the core of a group over its drives; its first node may say how."""
-MakeNode = Callable[[str], Node]
-"""Makes the node of a name."""
+MakeNode = Callable[[str], Node]  # makes the node of a name
 
 
 class ArmMotion(Generic[AnyDrives]):
@@ -81,10 +75,8 @@ class ArmMotion(Generic[AnyDrives]):
         """Offer what there are nodes for.
 
         Args:
-            model: The arm.
             controller: Node of the trajectory controller; None for none.
             servo: Node of the servo, with the robot declared; None for none.
-            make_drives: Builds its core.
 
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.
@@ -110,11 +102,7 @@ class ArmMotion(Generic[AnyDrives]):
             )
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the trajectory controller, if there is one, as the manager shows it.
-
-        Args:
-            period: Period of the cycle in [s].
-        """
+        """Return the trajectory controller, if there is one, as the manager shows it."""
         if self._controller is None:
             return []
         return [_entry(self.nodes[0], self.drives, period, self._controller.set_active)]
@@ -154,11 +142,6 @@ class ToolMotion(Generic[AnyDrives]):
     ) -> None:
         """Offer both.
 
-        Args:
-            model: The end effector.
-            controller: The node.
-            make_drives: Builds its core.
-
         Raises:
             ParameterError: A parameter is misspelt, of another kind or out of its range.
             ModelError: The core cannot move it.
@@ -179,11 +162,7 @@ class ToolMotion(Generic[AnyDrives]):
         )
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the controller as the manager shows it.
-
-        Args:
-            period: Period of the cycle in [s].
-        """
+        """Return the controller as the manager shows it."""
         return [_entry(self.nodes[0], self.drives, period, self._set_active)]
 
     def _set_active(self, active: bool) -> None:  # a callback of the manager
@@ -195,15 +174,10 @@ class ToolMotion(Generic[AnyDrives]):
 
 @dataclass(frozen=True, slots=True)
 class RobotMotion(Generic[AnyDrives]):
-    """The groups of a robot that are moved, each by itself.
+    """The groups of a robot that are moved, each by itself."""
 
-    Attributes:
-        arms: The arms, the main one first.
-        tools: The end effectors.
-    """
-
-    arms: Sequence[ArmMotion[AnyDrives]]
-    tools: Sequence[ToolMotion[AnyDrives]]
+    arms: Sequence[ArmMotion[AnyDrives]]  # the arms, the main one first
+    tools: Sequence[ToolMotion[AnyDrives]]  # the end effectors
 
     @classmethod
     def build(
@@ -217,11 +191,8 @@ class RobotMotion(Generic[AnyDrives]):
         """Make the nodes and cores of all groups; nothing moves yet.
 
         Args:
-            models: The groups.
             main: Name of the main arm's trajectory controller; that of another group is
                 ``<group>_controller``.
-            make_node: Makes the nodes.
-            offers: What is offered for the arms.
             make_drives: Builds the cores.
 
         Raises:
@@ -276,11 +247,7 @@ class RobotMotion(Generic[AnyDrives]):
         return [tool.drives.gateway for tool in self.tools if not tool.checks]
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the controllers as the manager shows them.
-
-        Args:
-            period: Period of the cycle in [s].
-        """
+        """Return the controllers as the manager shows them."""
         return [entry for group in self._groups for entry in group.entries(period)]
 
     @property

@@ -30,17 +30,11 @@ MAX_AGE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """What was measured of a joint.
+    """What was measured of a joint."""
 
-    Attributes:
-        position: In [rad].
-        velocity: In [rad/s].
-        time: When, as steady time in [s].
-    """
-
-    position: float
-    velocity: float
-    time: float
+    position: float  # in [rad]
+    velocity: float  # in [rad/s]
+    time: float  # when, as steady time in [s]
 
 
 class JointSamples:
@@ -55,12 +49,7 @@ class JointSamples:
         self._received[joint] = sample
 
     def fresh(self, snapshot: Snapshot, now: float) -> dict[str, JointSample]:
-        """Return what was measured lately, the arm's joints first.
-
-        Args:
-            snapshot: What the core does.
-            now: Steady time in [s].
-        """
+        """Return what was measured lately, the arm's joints first."""
         fresh = {
             name: sample
             for name, sample in (self._of_the_arm(snapshot) | self._received).items()
@@ -90,11 +79,7 @@ def _mimicked(mimic: Mimic, source: JointSample) -> JointSample:
 
 
 def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
-    """Declare frame and rate [Hz] of the messages, and whether dynamic ones are published.
-
-    Args:
-        node: The node.
-    """
+    """Declare frame and rate [Hz] of the messages, and whether dynamic ones are published."""
     read = ParameterReader(node)
     return (
         read.text('frame_id', 'base_link', 'frame of the messages'),
@@ -125,8 +110,6 @@ class JointStateBroadcaster:
         """Advertise.
 
         Args:
-            node: The node ``joint_state_broadcaster``.
-            gateway: Commands to the core.
             others: Drives that are no joints of the arm; they publish ``<drive>/joint_states``.
             mimics: Joints that follow one that has a drive.
             active: Whether it publishes from the start.

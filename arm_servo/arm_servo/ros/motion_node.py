@@ -24,8 +24,7 @@ from .topics_backend import serve_topics
 
 NAME = 'motion_node'
 
-SWITCH_INTERVAL = 0.0005
-"""How long a busy callback may keep the interpreter from the cycle in [s]."""
+SWITCH_INTERVAL = 0.0005  # how long a busy callback may keep the interpreter from the cycle in [s]
 
 HELP = """\
 Jog an arm and send it trajectories: moveit_servo's and joint_trajectory_controller's interfaces.
@@ -57,15 +56,10 @@ class Backend(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What is run.
+    """What is run."""
 
-    Attributes:
-        backend: Where the drives are.
-        offers: What is offered to clients.
-    """
-
-    backend: Backend
-    offers: Offers = field(default_factory=Offers)
+    backend: Backend  # where the drives are
+    offers: Offers = field(default_factory=Offers)  # what is offered to clients
 
 
 def _declared() -> Program:
@@ -103,7 +97,6 @@ def run_motion(name: str, program: Program | None, args: Sequence[str] | None = 
     """Run until Ctrl-C or SIGTERM.
 
     Args:
-        name: Name for the log.
         program: What is run; None for what parameters say.
         args: ROS arguments; None takes those of the process.
 

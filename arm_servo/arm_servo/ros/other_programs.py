@@ -8,18 +8,14 @@ from collections.abc import Sequence
 
 from rclpy.node import Node
 
-WATCH_PERIOD = 1.0
-"""Time between two looks at the graph in [s]."""
-
-OWN_SERVICE = 'pause'
-"""Service that the trajectory controller of this package has, and no other."""
+WATCH_PERIOD = 1.0  # time between two looks at the graph in [s]
+OWN_SERVICE = 'pause'  # service that the trajectory controller of this package has, and no other
 
 
 def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> None:
     """Log an error for each program that moves the arm, too, when it appears.
 
     Args:
-        nodes: The nodes of this program.
         outputs: Topics on which set-points leave.
     """
     known: set[str] = set()
@@ -37,11 +33,7 @@ def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> 
 
 
 def same_names(nodes: Sequence[Node]) -> list[str]:
-    """Return what is wrong where another node has the name of one of these.
-
-    Args:
-        nodes: The nodes of this program.
-    """
+    """Return what is wrong where another node has the name of one of these."""
     graph = [
         f'{namespace.rstrip("/")}/{name}'
         for name, namespace in nodes[0].get_node_names_and_namespaces()

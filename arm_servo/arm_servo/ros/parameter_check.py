@@ -15,11 +15,8 @@ if TYPE_CHECKING:
 
     from arm_model.ros import GroupModels
 
-Declare = Callable[['Node'], object]
-"""Declares the parameters of a node."""
-
-EVERY_NODE = '/**'
-"""Name in a parameter file that stands for all nodes."""
+Declare = Callable[['Node'], object]  # declares the parameters of a node
+EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -29,7 +26,6 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
     are not there. This needs rclpy, and starts nothing.
 
     Args:
-        models: The groups that are moved.
         document: A parameter file: nodes, ``ros__parameters``, parameters.
 
     Returns:

@@ -22,7 +22,6 @@ class ParameterSheet:
         """Take what the file has for a node.
 
         Args:
-            name: Name of the node.
             table: Parameters by name; tables in it are names with dots.
         """
         self._name = name

@@ -7,8 +7,7 @@ from __future__ import annotations
 import math
 import re
 
-STATUS_PERIOD = 0.5
-"""How long a refusal stands in the status in [s]."""
+STATUS_PERIOD = 0.5  # how long a refusal stands in the status in [s]
 
 REPEAT_PERIOD = 5.0
 """Time without a refusal after which one that was logged is logged again in [s]."""
@@ -21,7 +20,6 @@ class LoggedReasons:
     """Which reasons of one stream are in the log already."""
 
     def __init__(self) -> None:
-        """None is."""
         self._logged = ('', -math.inf)
 
     def is_new(self, reason: str, now: float) -> bool:
@@ -29,7 +27,6 @@ class LoggedReasons:
 
         Args:
             reason: Why something was refused.
-            now: Steady time in [s].
         """
         kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
         self._logged = (kind, now)
@@ -40,17 +37,11 @@ class Refusals:
     """Remembers the last refusal; any thread may note one, a single thread reports."""
 
     def __init__(self) -> None:
-        """Nothing was refused yet."""
         self._last = ('', -math.inf)
         self._logged = LoggedReasons()
 
     def note(self, reason: str, now: float) -> None:
-        """Note why a command was refused.
-
-        Args:
-            reason: Why, with the remedy.
-            now: Steady time in [s].
-        """
+        """Note why a command was refused."""
         self._last = (reason, now)
 
     def clear(self) -> None:
@@ -58,19 +49,11 @@ class Refusals:
         self._last = ('', -math.inf)
 
     def fresh(self, now: float) -> str:
-        """Return the refusal for the status; empty when there is none.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Return the refusal for the status; empty when there is none."""
         reason, since = self._last
         return reason if now - since <= STATUS_PERIOD else ''
 
     def to_log(self, now: float) -> str:
-        """Return the refusal if it is not in the log; one that differs in numbers only is.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Return the refusal if it is not in the log; one that differs in numbers only is."""
         reason = self.fresh(now)
         return reason if reason and self._logged.is_new(reason, now) else ''

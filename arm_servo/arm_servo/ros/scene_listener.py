@@ -33,21 +33,13 @@ as the hulls that it has made, for programs that have a control cycle to keep.""
 FOREIGN_TOPIC = 'monitored_planning_scene'
 """Where any move_group publishes its scene; it counts where nothing publishes the other topic."""
 
-LOOK_PERIOD = 0.1
-"""Time between two looks where the joints are in [s]."""
-
-PLACE_TIMEOUT = 1.0
-"""Time for which a scene waits for a group's position without a warning in [s]."""
-
-OTHERS_TIMEOUT = 5.0
-"""Time for which joints beside a group are awaited without a warning in [s]."""
+LOOK_PERIOD = 0.1  # time between two looks where the joints are in [s]
+PLACE_TIMEOUT = 1.0  # time for which a scene waits for a group's position without a warning in [s]
+OTHERS_TIMEOUT = 5.0  # time for which joints beside a group are awaited without a warning in [s]
 
 
 def keep_apart(gateways: Sequence[CommandGateway]) -> MovingArms | None:
     """Have arms that move by themselves heed each other; before their first cycles.
-
-    Args:
-        gateways: Commands to the core of each group.
 
     Returns:
         What they know of each other; None where there is one arm.
@@ -81,12 +73,9 @@ class SceneListener:
         """Subscribe; to joint states only where there are joints besides those of the groups.
 
         Args:
-            node: The node.
             gateways: Commands to the core of each group that is checked for collision.
             unchecked: The same of the other groups, which the checked ones may meet.
-            joint_topic: Joint states of the robot.
             worker: Builds the scenes, one after the other; by default a thread.
-            clock: Steady time in [s].
         """
         self._node, self._clock = node, clock
         self._worker = worker or ThreadPoolExecutor(1, thread_name_prefix='scenes')

@@ -49,28 +49,19 @@ beside the main one begins with the group's name."""
 
 @dataclass(frozen=True, slots=True)
 class LoopParameters:
-    """How the loop runs.
+    """How the loop runs."""
 
-    Attributes:
-        period: Its period in [s].
-        joint_topic: Topic of the joint states.
-        joint_timeout: Age at which a joint state counts no more in [s].
-        priority: SCHED_FIFO priority of its thread; 0 is none.
-        following: When the arm counts as not following.
-    """
-
-    period: float
-    joint_topic: str
-    joint_timeout: float
-    priority: int
-    following: FollowingLimits
+    period: float  # its period in [s]
+    joint_topic: str  # topic of the joint states
+    joint_timeout: float  # age at which a joint state counts no more in [s]
+    priority: int  # SCHED_FIFO priority of its thread; 0 is none
+    following: FollowingLimits  # when the arm counts as not following
 
 
 def declare_loop(node: Node, prefix: str) -> LoopParameters:
     """Declare how the loop runs.
 
     Args:
-        node: The node.
         prefix: Before each name, with its dot.
     """
     read = ParameterReader(node, prefix)
@@ -104,7 +95,6 @@ def serve_topics(stop: threading.Event, offers: Offers) -> None:
 
     Args:
         stop: Set by Ctrl-C and SIGTERM.
-        offers: What is offered to clients.
     """
     nodes: list[Node] = []
     with ExitStack() as stack:
@@ -139,7 +129,6 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
 
     Args:
         make_node: Makes the nodes; they live until the program ends.
-        offers: What is offered to clients.
 
     Returns:
         The loop of each group.
@@ -204,10 +193,6 @@ class TopicDrives:
         """Declare how the loop runs, subscribe and advertise.
 
         Args:
-            node: The node for that.
-            model: The group.
-            settings: How the core behaves.
-            prefix: Before the names of its parameters, with its dot.
             output: Default of topic and type of the set-points.
         """
         loop, wanted = declare_loop(node, prefix), declare_output(node, prefix, *output)

@@ -131,9 +131,6 @@ def is_upstream(name: str) -> bool:
 def check_names(node: Node) -> None:
     """Refuse misspelt parameters of a node, and log those that change nothing here.
 
-    Args:
-        node: A node that has declared all its parameters.
-
     Raises:
         ParameterError: A name looks like one that there is.
     """

@@ -12,17 +12,13 @@ from arm_model import JointLimits, RobotState
 
 from ..otg import OnlineTrajectoryGenerator, Plan
 
-INTERCEPTION_CYCLES = (4, 10, 25, 60, 150)
-"""Cycles after which an interception is tried."""
-
-MAX_ITERATIONS = 3
-"""How often the time of a later interception is improved."""
+INTERCEPTION_CYCLES = (4, 10, 25, 60, 150)  # cycles after which an interception is tried
+MAX_ITERATIONS = 3  # how often the time of a later interception is improved
 
 PLAN_TOLERANCE = 1e-7
 """How exactly an interception must still be as planned in [rad], and 100 times in [rad/s]."""
 
-ROUNDING_FACTOR = 1.0 + 1e-6
-"""Rounding of velocities and accelerations that is let pass."""
+ROUNDING_FACTOR = 1.0 + 1e-6  # rounding of velocities and accelerations that is let pass
 
 JERK_TOLERANCE = 0.1
 """Changes of speed and place in a cycle, beyond those of an even jerk, that still count as even.
@@ -30,8 +26,7 @@ JERK_TOLERANCE = 0.1
 As shares of j T^2 and j T^3.
 """
 
-ACCELERATION_TOLERANCE = 0.01
-"""The same change of place where a path is met, as a share of a T^2."""
+ACCELERATION_TOLERANCE = 0.01  # the same change of place where a path is met, as a share of a T^2
 
 FOLLOWING_JERK_TOLERANCE = (0.25, 0.129)
 """The same where the state that is followed goes on: a limited jerk that turns makes as much."""
@@ -49,7 +44,6 @@ class CatchUpInterpolator:
         """Prepare.
 
         Args:
-            limits: Limits of the joints.
             generator: Plans the way to the interception.
         """
         self._limits = limits
@@ -69,9 +63,7 @@ class CatchUpInterpolator:
         """Take a step.
 
         Args:
-            state: Commanded state now.
             ahead: The state to follow, by the time from now in [s].
-            period: Time to the next step in [s].
 
         Returns:
             The state to command next; None when there is no way to meet it.

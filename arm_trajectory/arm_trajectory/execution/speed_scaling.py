@@ -20,45 +20,31 @@ from ..paths.path import Path
 MAX_SCALING_RATE = 10.0
 """Greatest change of the speed scaling in [1/s], for where the path asks nothing of the joints."""
 
-MAX_SCALING_ACCELERATION = 200.0
-"""Greatest change of that in [1/s2]."""
+MAX_SCALING_ACCELERATION = 200.0  # greatest change of that in [1/s2]
 
 ACCELERATION_FACTOR = 0.9
 """Share of the joints' acceleration that a change of the speed scaling may bring them to."""
 
-JERK_FACTOR = 0.4
-"""Share of the joints' jerk that a change of the speed scaling may ask."""
-
-MIN_BUILD_UP_CYCLES = 5.0
-"""Cycles at least in which a change of the speed scaling builds up."""
+JERK_FACTOR = 0.4  # share of the joints' jerk that a change of the speed scaling may ask
+MIN_BUILD_UP_CYCLES = 5.0  # cycles at least in which a change of the speed scaling builds up
 
 MIN_ROOM_FACTOR = 0.2
 """Share of its room that a change of the speed scaling has where the path leaves none."""
 
-JERK_LOOKAHEAD = 0.01
-"""How far ahead on the path its own jerk is looked for in [s]."""
+JERK_LOOKAHEAD = 0.01  # how far ahead on the path its own jerk is looked for in [s]
 
 
-FORESIGHT_STEP = 0.01
-"""Step in which a change of the speed scaling is foreseen in [s]."""
+FORESIGHT_STEP = 0.01  # step in which a change of the speed scaling is foreseen in [s]
 
 
 class TimerState(NamedTuple):
-    """Where a timer is.
+    """Where a timer is."""
 
-    Attributes:
-        time: Time of the path in [s].
-        speed_scaling: Seconds of the path per second.
-        change: Change of the speed scaling in [1/s].
-        wanted: Speed scaling that it goes to.
-        waiting: Time until it begins in [s].
-    """
-
-    time: float
-    speed_scaling: float
-    change: float
-    wanted: float
-    waiting: float = 0.0
+    time: float  # time of the path in [s]
+    speed_scaling: float  # seconds of the path per second
+    change: float  # change of the speed scaling in [1/s]
+    wanted: float  # speed scaling that it goes to
+    waiting: float = 0.0  # time until it begins in [s]
 
 
 class TrajectoryTimer:
@@ -76,7 +62,6 @@ class TrajectoryTimer:
         """Start at the begin of a path.
 
         Args:
-            limits: Limits of the joints.
             speed_scaling: Seconds of the trajectory per second to start with.
         """
         self._limits = limits
@@ -123,9 +108,7 @@ class TrajectoryTimer:
         """Advance.
 
         Args:
-            path: The path.
             wanted: Speed scaling to reach.
-            period: Time to advance by in [s].
         """
         self._wanted = wanted
         if self.speed_scaling == wanted and self.change == 0.0:
@@ -161,9 +144,6 @@ class TrajectoryTimer:
         """Return where a timer will be when nothing comes in between.
 
         Args:
-            limits: Limits of the joints.
-            path: The path that it runs through.
-            state: Where it is.
             ahead: Time from now in [s]; less than 0 is the past, at the present speed.
         """
         left = ahead - state.waiting if ahead > state.waiting else min(ahead, 0.0)

@@ -18,21 +18,15 @@ from ..goal import JointTolerance
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tolerances:
-    """Tolerances of every joint; infinite where there are none.
+    """Tolerances of every joint; infinite where there are none."""
 
-    Attributes:
-        position: In [rad].
-        velocity: In [rad/s].
-    """
-
-    position: Array
-    velocity: Array
+    position: Array  # in [rad]
+    velocity: Array  # in [rad/s]
 
     def violation(self, limits: JointLimits, position: Array, velocity: Array) -> str | None:
         """Return what is off by more than its tolerance, in words.
 
         Args:
-            limits: Limits of the joints, with their names.
             position: Errors of position in [rad].
             velocity: Errors of velocity in [rad/s].
         """
@@ -65,7 +59,6 @@ def merge_tolerances(
     """Put tolerances together: those of a goal, else the default.
 
     Args:
-        limits: Limits of the joints, with their names.
         given: The goal's tolerances by joint: above 0 counts, 0 keeps the default, below takes it
             away.
         default: The default of each joint; 0 is none.

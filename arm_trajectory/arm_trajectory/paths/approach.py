@@ -19,8 +19,7 @@ from .bounds import farthest_beyond
 from .path import Path, PathPoint, quintic, Segment
 from .time_scaling import Timing
 
-MIN_PHASE = 1e-7
-"""Least length of a segment with one jerk in [s]; shorter ones are left out."""
+MIN_PHASE = 1e-7  # least length of a segment with one jerk in [s]; shorter ones are left out
 
 
 def approach_path(
@@ -29,10 +28,8 @@ def approach_path(
     """Return the path from a motion to the begin of another path; None where there is none.
 
     Args:
-        state: Commanded state of the arm.
         begin: Where it leads, with velocity and acceleration within the limits.
         duration: How long it lasts in [s]; longer where the joints need that.
-        limits: Limits of the joints.
     """
     # an arm that is beyond a limit may come back
     lower = np.minimum(limits.lower, state.position)
@@ -60,12 +57,7 @@ def _candidates(
 
 
 def stop_path(state: RobotState, limits: JointLimits) -> Path | None:
-    """Return the shortest path from a motion to rest; None where ruckig has no answer.
-
-    Args:
-        state: Commanded state of the arm.
-        limits: Limits of the joints.
-    """
+    """Return the shortest path from a motion to rest; None where ruckig has no answer."""
     stop = OnlineTrajectoryGenerator(limits).brake(state)
     return None if stop is None else Path(_phases(stop))
 

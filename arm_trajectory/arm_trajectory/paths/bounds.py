@@ -19,30 +19,22 @@ _CONTROL = np.array(
     [[math.comb(row, power) / math.comb(5, power) for power in range(6)] for row in range(6)]
 )
 
-ROUNDING_TOLERANCE = 1e-6
-"""Rounding that is let pass in [rad]."""
+ROUNDING_TOLERANCE = 1e-6  # rounding that is let pass in [rad]
 
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A place beyond a range.
+    """A place beyond a range."""
 
-    Attributes:
-        joint: Number of the joint.
-        position: Where it is in [rad].
-        time: When on the path in [s].
-    """
-
-    joint: int
-    position: float
-    time: float
+    joint: int  # number of the joint
+    position: float  # where it is in [rad]
+    time: float  # when on the path in [s]
 
 
 def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
     """Return the place where a path is farthest beyond a range; None where it keeps within.
 
     Args:
-        path: The path.
         lower: Least positions in [rad].
         upper: Greatest positions in [rad].
     """

@@ -32,8 +32,7 @@ As much as MoveIt waits for by default: allowed_execution_duration_scaling,
 allowed_goal_duration_margin.
 """
 
-NEGLIGIBLE_DELAY = 0.01
-"""Time by which a path may take longer without a word in [s]."""
+NEGLIGIBLE_DELAY = 0.01  # time by which a path may take longer without a word in [s]
 
 STRAIGHT_TOLERANCE = 1e-3
 """Bulge of a segment that counts as straight where its ends do not fit together in [rad]."""
@@ -47,8 +46,7 @@ MIN_APPROACH_MARGIN = 0.25
 START_TOLERANCE = 1e-3
 """How far from a first point without time the arm may be before it is taken there in [rad]."""
 
-MAX_ITERATIONS = 40
-"""How often the time that suffices is improved."""
+MAX_ITERATIONS = 40  # how often the time that suffices is improved
 
 QUANTITIES = (('rad/s', 'speed'), ('rad/s2', 'acceleration'), ('rad/s3', 'jerk'))
 """Units and names of what is limited."""
@@ -56,15 +54,10 @@ QUANTITIES = (('rad/s', 'speed'), ('rad/s2', 'acceleration'), ('rad/s3', 'jerk')
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GoalPath:
-    """A path that the joints can follow.
+    """A path that the joints can follow."""
 
-    Attributes:
-        path: The path.
-        late: How much later than requested it ends, and why, in words; empty for in time.
-    """
-
-    path: Path
-    late: str
+    path: Path  # the path
+    late: str  # how much later than requested it ends, and why, in words; empty for in time
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +77,6 @@ def build_path(
 
     Where joints could not follow as quickly as asked, the path is followed slower; it stays the
     same. A trajectory that would take much longer then is refused.
-
-    Args:
-        goal: The trajectory.
-        limits: Limits of the joints.
-        state: Commanded state of the arm.
-        rules: What is accepted.
 
     Raises:
         GoalError: It is refused; the message names the joint, the point and the remedy.

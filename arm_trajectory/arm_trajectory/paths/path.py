@@ -26,32 +26,20 @@ _BINOMIAL = np.array([[math.comb(column, row) for column in range(6)] for row in
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathPoint:
-    """A place on a path.
+    """A place on a path."""
 
-    Attributes:
-        position: Positions in [rad].
-        velocity: First derivative by the path's time in [rad/s].
-        acceleration: Second derivative by the path's time in [rad/s2].
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  # positions in [rad]
+    velocity: Array  # first derivative by the path's time in [rad/s]
+    acceleration: Array  # second derivative by the path's time in [rad/s2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """A polynomial of at most fifth degree.
+    """A polynomial of at most fifth degree."""
 
-    Attributes:
-        start: When it begins in [s].
-        duration: How long it lasts in [s].
-        coefficients: Of the powers 0 to 5 of the time since its start (6, n).
-    """
-
-    start: float
-    duration: float
-    coefficients: Array
+    start: float  # when it begins in [s]
+    duration: float  # how long it lasts in [s]
+    coefficients: Array  # of the powers 0 to 5 of the time since its start (6, n)
 
     def at(self, time: float) -> PathPoint:
         """Return the place at a time of the path in [s]."""
@@ -79,8 +67,6 @@ def linear(start: float, duration: float, begin: Array, end: Array) -> Segment:
     """Return the straight segment between two positions.
 
     Args:
-        start: When it begins in [s].
-        duration: How long it lasts in [s].
         begin: Positions at its begin in [rad].
         end: Positions at its end in [rad].
     """
@@ -93,10 +79,7 @@ def cubic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Se
     """Return the cubic that meets positions and velocities at both ends.
 
     Args:
-        start: When it begins in [s].
-        duration: How long it lasts in [s].
         begin: Its begin; the acceleration is not used.
-        end: Its end; the acceleration is not used.
     """
     t, way = duration, end.position - begin.position
     coefficients = np.zeros((6, len(way)))
@@ -107,14 +90,7 @@ def cubic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Se
 
 
 def quintic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Segment:
-    """Return the quintic that meets positions, velocities and accelerations at both ends.
-
-    Args:
-        start: When it begins in [s].
-        duration: How long it lasts in [s].
-        begin: Its begin.
-        end: Its end.
-    """
+    """Return the quintic that meets positions, velocities and accelerations at both ends."""
     ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
     return Segment(start, duration, quintics(np.array([duration]), *ends)[0])
 

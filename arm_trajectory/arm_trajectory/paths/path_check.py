@@ -17,17 +17,10 @@ import numpy as np
 
 from arm_model import Array, Clearances, PlanningScene
 
-MAX_STEP = 0.005
-"""Greatest motion of a link against another from one look to the next in [m]."""
-
-COARSE_PERIOD = 0.01
-"""Time between the places from which the steps are laid out in [s]."""
-
-MAX_SAMPLES = 50_000
-"""Looks at one way at most: beyond 250 m of motion they are farther apart."""
-
-MAX_BATCH = 64
-"""Looks that are proven clear at once at most."""
+MAX_STEP = 0.005  # greatest motion of a link against another from one look to the next in [m]
+COARSE_PERIOD = 0.01  # time between the places from which the steps are laid out in [s]
+MAX_SAMPLES = 50_000  # looks at one way at most: beyond 250 m of motion they are farther apart
+MAX_BATCH = 64  # looks that are proven clear at once at most
 
 CONTACT_TOLERANCE = 1e-4
 """Overlap that is let pass in [m], for rounding; in contact already, how much more of it."""
@@ -35,15 +28,10 @@ CONTACT_TOLERANCE = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class PathContact:
-    """Two links, or a link and an object, that meet on a way.
+    """Two links, or a link and an object, that meet on a way."""
 
-    Attributes:
-        links: Their names.
-        time: When they meet in [s].
-    """
-
-    links: tuple[str, str]
-    time: float
+    links: tuple[str, str]  # their names
+    time: float  # when they meet in [s]
 
 
 class PathCheck:

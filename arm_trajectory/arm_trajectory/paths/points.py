@@ -89,12 +89,6 @@ def upcoming_points(
 ) -> Points:
     """Check a goal, and return its points from now on.
 
-    Args:
-        goal: The trajectory.
-        limits: Limits of the joints.
-        state: Commanded state of the arm.
-        rules: What is accepted.
-
     Raises:
         GoalError: It is refused.
     """
@@ -110,7 +104,6 @@ def refuse(reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> GoalError:
     """Return the refusal of a goal.
 
     Args:
-        reason: Why, and the remedy.
         code: Code of the action's result.
     """
     return GoalError(code, reason)

@@ -18,31 +18,22 @@ DURATION_FACTOR = 1.25
 MIN_HALF_TIME = 0.02
 """Least half time of a rounding in [s]: a few cycles, so that sampling does not see a corner."""
 
-OVERLAP_TOLERANCE = 0.005
-"""How far roundings that overlap may lead off the path in [rad]."""
+OVERLAP_TOLERANCE = 0.005  # how far roundings that overlap may lead off the path in [rad]
 
 DEVIATION_FACTOR = 0.007
 """Greatest way off the path of a rounded step of acceleration, as a share of E d^2."""
 
-MERGE_TOLERANCE = 1e-7
-"""Changes of the polynomial that are nearer than this count as one in [s]."""
+MERGE_TOLERANCE = 1e-7  # changes of the polynomial that are nearer than this count as one in [s]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Corners:
-    """Places where velocities or accelerations jump.
+    """Places where velocities or accelerations jump."""
 
-    Attributes:
-        times: When in [s] (k).
-        jumps: Jumps of the velocities in [rad/s] (k, n).
-        bends: Jumps of the accelerations in [rad/s2] (k, n).
-        rooms: Half of the shorter neighbour in [s] (k).
-    """
-
-    times: Array
-    jumps: Array
-    bends: Array
-    rooms: Array
+    times: Array  # when in [s] (k)
+    jumps: Array  # jumps of the velocities in [rad/s] (k, n)
+    bends: Array  # jumps of the accelerations in [rad/s2] (k, n)
+    rooms: Array  # half of the shorter neighbour in [s] (k)
 
 
 def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
@@ -57,7 +48,6 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
 
     Args:
         path: Segments, of which neighbours may meet in a corner.
-        limits: Limits of the joints.
         from_rest: Whether the arm rests at its begin; else that stays as it is.
     """
     corners = _corners(path, from_rest=from_rest)
@@ -86,8 +76,6 @@ def run_out(start: float, end: PathPoint, limits: JointLimits) -> list[Segment]:
 
     Args:
         start: When the path ends in [s].
-        end: Its last place.
-        limits: Limits of the joints.
     """
     still = np.zeros_like(end.velocity)
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])

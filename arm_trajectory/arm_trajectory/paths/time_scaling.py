@@ -29,20 +29,14 @@ from arm_model import Array, JointLimits, Places
 
 from .path import Path, quintics, Segment
 
-MAX_SPACING = 0.01
-"""Greatest distance of the places that are looked at in [s]."""
-
-MAX_SAMPLES = 4000
-"""Places in about a path: long ones are looked at less densely."""
-
-MIN_SEGMENT_SAMPLES = 4
-"""Least number of parts in which each segment is looked at."""
+MAX_SPACING = 0.01  # greatest distance of the places that are looked at in [s]
+MAX_SAMPLES = 4000  # places in about a path: long ones are looked at less densely
+MIN_SEGMENT_SAMPLES = 4  # least number of parts in which each segment is looked at
 
 KNOT_SPACINGS = (0.06, 0.15, 0.4)
 """Distances of the spline's knots that are tried in [s]: short ones lose less time."""
 
-MAX_ITERATIONS = 60
-"""How often the spline is improved at most."""
+MAX_ITERATIONS = 60  # how often the spline is improved at most
 
 LIMIT_FACTORS = (0.99, 0.96, 0.9)
 """Shares of the limits that scalings aim at, until what lies between the places is within too."""
@@ -53,27 +47,19 @@ BETWEEN_FACTORS = (1.0, 1.01, 1.03)
 INTEGRAL = np.array([1.0, 11.0, 11.0, 1.0]) / 24.0
 """Of the four parts of a uniform cubic B-spline over a cell, by its width."""
 
-MAX_SEGMENT_DURATION = 0.02
-"""Greatest length of the new segments in [s] of the given path."""
+MAX_SEGMENT_DURATION = 0.02  # greatest length of the new segments in [s] of the given path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Demand:
-    """What a path asks most.
+    """What a path asks most."""
 
-    Attributes:
-        time_factor: Factor of time that it takes to come within the limits; 1 or less is within.
-        joint: Number of the joint that asks it.
-        quantity: 0 velocity, 1 acceleration, 2 jerk.
-        time: When in [s].
-        value: How much in [rad/s], [rad/s2] or [rad/s3].
-    """
-
+    # factor of time that it takes to come within the limits; 1 or less is within
     time_factor: float
-    joint: int
-    quantity: int
-    time: float
-    value: float
+    joint: int  # number of the joint that asks it
+    quantity: int  # 0 velocity, 1 acceleration, 2 jerk
+    time: float  # when in [s]
+    value: float  # how much in [rad/s], [rad/s2] or [rad/s3]
 
 
 class Timing:
@@ -84,7 +70,6 @@ class Timing:
 
         Args:
             path: A path without corners.
-            limits: Limits of the joints.
         """
         self._path = path
         self._limits = limits

@@ -8,17 +8,11 @@ from typing import NamedTuple
 
 
 class Cycle(NamedTuple):
-    """A cycle that begins.
+    """A cycle that begins."""
 
-    Attributes:
-        time: Its time on the grid.
-        late: How long after its deadline it begins.
-        skipped: Deadlines that had passed as a whole before; their cycles are left out.
-    """
-
-    time: float
-    late: float
-    skipped: int
+    time: float  # its time on the grid
+    late: float  # how long after its deadline it begins
+    skipped: int  # deadlines that had passed as a whole before; their cycles are left out
 
 
 class CycleTimer:

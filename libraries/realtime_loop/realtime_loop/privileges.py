@@ -27,22 +27,16 @@ LIMITS = (
 
 
 class Outcome(NamedTuple):
-    """What became of a request.
+    """What became of a request."""
 
-    Attributes:
-        granted: Whether the system has granted it.
-        text: The outcome in words; empty when nothing was requested.
-    """
-
-    granted: bool
-    text: str
+    granted: bool  # whether the system has granted it
+    text: str  # the outcome in words; empty when nothing was requested
 
 
 def raise_priority(priority: int, what: str) -> Outcome:
     """Give the calling thread a real-time priority; threads that it starts do not inherit it.
 
     Args:
-        priority: SCHED_FIFO priority; 0 for none.
         what: What the thread does, for the words.
     """
     if not priority:

@@ -28,6 +28,5 @@ class XacroError(DescriptionError):
     """
 
     def __init__(self, reason: str, *, package: str = '', argument: str = '') -> None:
-        """Keep what is missing beside the reason."""
         super().__init__(reason)
         self.package, self.argument = package, argument

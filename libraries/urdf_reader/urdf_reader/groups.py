@@ -14,19 +14,12 @@ from .urdf import Joint, JointKind, KinematicTree
 
 @dataclass(frozen=True, slots=True)
 class JointGroup:
-    """A group of joints of a robot.
+    """A group of joints of a robot."""
 
-    Attributes:
-        name: Its name.
-        joints: Joints that move by themselves, from the base out.
-        base: Its base link, which none of them moves.
-        tip: Its tip link.
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    base: str
-    tip: str
+    name: str  # its name
+    joints: tuple[str, ...]  # joints that move by themselves, from the base out
+    base: str  # its base link, which none of them moves
+    tip: str  # its tip link
 
 
 def find_group(
@@ -41,8 +34,6 @@ def find_group(
     and passive joints in it do not move by themselves.
 
     Args:
-        tree: The description.
-        semantic: The SRDF.
         name: The group; by default the only one, or the only one that is no tool.
         tip: The tip link; by default the end of the last chain, or the link of the last joint.
 

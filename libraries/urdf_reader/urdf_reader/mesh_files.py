@@ -44,11 +44,7 @@ def find_mesh(name: str, folder: Path | None = None) -> Path:
 
 
 def mesh_unit(path: Path) -> float:
-    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention.
-
-    Args:
-        path: Its file.
-    """
+    """Return the unit of a mesh in [m]: COLLADA names it, the others are in [m] by convention."""
     if path.suffix.lower() != '.dae':
         return 1.0
     found = COLLADA_UNIT.search(path.read_bytes())
@@ -60,10 +56,6 @@ def mesh_unit(path: Path) -> float:
 
 def find_package(name: str, folder: Path | None = None) -> Path:
     """Find the folder of a package: beside the description, or installed.
-
-    Args:
-        name: Its name.
-        folder: Folder of the description.
 
     Raises:
         MeshFileError: There is no such package.

@@ -10,72 +10,49 @@ from xml.etree import ElementTree as ET
 
 from .exceptions import DescriptionError
 
-Pair = frozenset[str]
-"""Two links, in no order."""
+Pair = frozenset[str]  # two links, in no order
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """A group of joints.
+    """A group of joints."""
 
-    Attributes:
-        name: Its name.
-        chains: Base and tip link of each chain in it.
-        joints: Joints that it lists one by one.
-        subgroups: Groups that it contains.
-        links: Links that it lists one by one; each stands for the joint that moves it.
-    """
-
-    name: str
-    chains: tuple[tuple[str, str], ...]
-    joints: tuple[str, ...]
-    subgroups: tuple[str, ...]
+    name: str  # its name
+    chains: tuple[tuple[str, str], ...]  # base and tip link of each chain in it
+    joints: tuple[str, ...]  # joints that it lists one by one
+    subgroups: tuple[str, ...]  # groups that it contains
+    # links that it lists one by one; each stands for the joint that moves it
     links: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class EndEffector:
-    """A tool at the end of an arm.
+    """A tool at the end of an arm."""
 
-    Attributes:
-        name: Its name.
-        group: Group of its joints and links.
-        parent_link: Link of the arm to which it is fixed.
-        parent_group: Group of that arm, if it is named.
-    """
-
-    name: str
-    group: str
-    parent_link: str
-    parent_group: str = ''
+    name: str  # its name
+    group: str  # group of its joints and links
+    parent_link: str  # link of the arm to which it is fixed
+    parent_group: str = ''  # group of that arm, if it is named
 
 
 @dataclass(frozen=True, slots=True)
 class SemanticDescription:
-    """Contents of an SRDF.
+    """Contents of an SRDF."""
 
-    Attributes:
-        groups: Groups by name.
-        poses: Positions in [rad] or [m] by joint, by pose, by group.
-        disabled: Pairs of links that need no collision check.
-        unchecked: Links that need none with any other (``disable_default_collisions``).
-        enabled: Pairs of them that are checked nevertheless (``enable_collisions``).
-        end_effectors: Tools at the ends of arms.
-        passive: Joints without an actuator (``passive_joint``).
-        virtual: Types of the joints between the world and the robot (``virtual_joint``), by name:
-            fixed, planar or floating. They are not in the URDF.
-        world_frames: Frames of the world (``parent_frame``) to which fixed ones of them hold the
-            robot.
-    """
-
-    groups: Mapping[str, Group]
+    groups: Mapping[str, Group]  # groups by name
+    # positions in [rad] or [m] by joint, by pose, by group
     poses: Mapping[str, Mapping[str, Mapping[str, float]]]
-    disabled: frozenset[Pair]
+    disabled: frozenset[Pair]  # pairs of links that need no collision check
+    # links that need none with any other (``disable_default_collisions``)
     unchecked: frozenset[str] = frozenset()
+    # pairs of them that are checked nevertheless (``enable_collisions``)
     enabled: frozenset[Pair] = frozenset()
-    end_effectors: tuple[EndEffector, ...] = ()
-    passive: frozenset[str] = frozenset()
+    end_effectors: tuple[EndEffector, ...] = ()  # tools at the ends of arms
+    passive: frozenset[str] = frozenset()  # joints without an actuator (``passive_joint``)
+    # types of the joints between the world and the robot (``virtual_joint``), by name: fixed,
+    # planar or floating. They are not in the URDF
     virtual: Mapping[str, str] = field(default_factory=dict)
+    # frames of the world (``parent_frame``) to which fixed ones of them hold the robot
     world_frames: tuple[str, ...] = ()
 
     @property
@@ -97,9 +74,6 @@ class SemanticDescription:
 
     def group(self, name: str) -> Group:
         """Return a group.
-
-        Args:
-            name: Its name.
 
         Raises:
             DescriptionError: There is none of this name; lists those that there are.

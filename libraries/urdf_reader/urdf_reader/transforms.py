@@ -20,24 +20,17 @@ NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """The pose of a child frame in its parent frame.
+    """The pose of a child frame in its parent frame."""
 
-    Attributes:
-        translation: Origin of the child in [m], in the parent.
-        rotation: Unit quaternion (x, y, z, w).
-    """
-
-    translation: Vector = (0.0, 0.0, 0.0)
-    rotation: Quaternion = NO_ROTATION
+    translation: Vector = (0.0, 0.0, 0.0)  # origin of the child in [m], in the parent
+    rotation: Quaternion = NO_ROTATION  # unit quaternion (x, y, z, w)
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Make a quaternion of fixed-axis angles, as URDF's ``rpy`` means them: Rz * Ry * Rx.
 
     Args:
-        roll: About x in [rad].
         pitch: About y in [rad].
-        yaw: About z in [rad].
     """
     about_x = about((1.0, 0.0, 0.0), roll)
     about_y = about((0.0, 1.0, 0.0), pitch)
@@ -50,19 +43,13 @@ def about(axis: Vector, angle: float) -> Quaternion:
 
     Args:
         axis: Unit vector.
-        angle: Angle in [rad].
     """
     sine = math.sin(0.5 * angle)
     return (axis[0] * sine, axis[1] * sine, axis[2] * sine, math.cos(0.5 * angle))
 
 
 def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
-    """Multiply quaternions: first the rotation ``right``, then ``left``.
-
-    Args:
-        left: Second rotation.
-        right: First rotation.
-    """
+    """Multiply quaternions: first the rotation ``right``, then ``left``."""
     lx, ly, lz, lw = left
     rx, ry, rz, rw = right
     return (
@@ -74,12 +61,7 @@ def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
 
 
 def rotate(rotation: Quaternion, vector: Vector) -> Vector:
-    """Rotate a vector.
-
-    Args:
-        rotation: Unit quaternion.
-        vector: Any vector.
-    """
+    """Rotate a vector."""
     x, y, z, w = rotation
     inverse = (-x, -y, -z, w)
     turned = multiply(multiply(rotation, (*vector, 0.0)), inverse)

@@ -19,8 +19,7 @@ from xml.etree import ElementTree as ET
 from .exceptions import DescriptionError
 from .transforms import from_rpy, Transform, Vector
 
-DEFAULT_AXIS = '1 0 0'
-"""Axis of a joint without ``<axis>`` (URDF)."""
+DEFAULT_AXIS = '1 0 0'  # axis of a joint without ``<axis>`` (URDF)
 
 
 class JointKind(Enum):
@@ -40,17 +39,11 @@ MOVABLE = frozenset({JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMAT
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
-    """A joint follows another: position = multiplier * position of the source + offset.
+    """A joint follows another: position = multiplier * position of the source + offset."""
 
-    Attributes:
-        source: Name of the joint that is followed; never one that follows another.
-        multiplier: Factor; [m/rad] or [rad/m] between a rotary and a linear joint.
-        offset: Summand in [rad] or [m].
-    """
-
-    source: str
-    multiplier: float = 1.0
-    offset: float = 0.0
+    source: str  # name of the joint that is followed; never one that follows another
+    multiplier: float = 1.0  # factor; [m/rad] or [rad/m] between a rotary and a linear joint
+    offset: float = 0.0  # summand in [rad] or [m]
 
     def position(self, source: float) -> float:
         """Return the position in [rad] or [m] that belongs to one of the source."""
@@ -63,47 +56,29 @@ class Mimic:
 
 @dataclass(frozen=True, slots=True)
 class JointRange:
-    """How far and how fast a joint moves; radians or metres.
+    """How far and how fast a joint moves; radians or metres."""
 
-    Attributes:
-        name: Name of the joint.
-        lower: Least position in [rad]; minus infinity for a continuous joint.
-        upper: Greatest position in [rad]; infinity for a continuous joint.
-        velocity: Greatest speed in [rad/s]; 0 where the description gives none.
-        unit: Unit of its positions, rad or m.
-    """
-
-    name: str
-    lower: float
-    upper: float
-    velocity: float
-    unit: str = 'rad'
+    name: str  # name of the joint
+    lower: float  # least position in [rad]; minus infinity for a continuous joint
+    upper: float  # greatest position in [rad]; infinity for a continuous joint
+    velocity: float  # greatest speed in [rad/s]; 0 where the description gives none
+    unit: str = 'rad'  # unit of its positions, rad or m
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint.
+    """A joint."""
 
-    Attributes:
-        name: Its name.
-        kind: Its type.
-        parent: Name of the parent link.
-        child: Name of the child link.
-        origin: Pose of the child in the parent at position zero.
-        axis: Unit vector in the child's frame.
-        mimic: What it follows, if it does.
-        limit: Attributes of ``<limit>`` as they are written, if there is one.
-        soft: Soft limits of ``<safety_controller>`` in [rad], if it has both.
-    """
-
-    name: str
-    kind: JointKind
-    parent: str
-    child: str
-    origin: Transform
-    axis: Vector
-    mimic: Mimic | None = None
+    name: str  # its name
+    kind: JointKind  # its type
+    parent: str  # name of the parent link
+    child: str  # name of the child link
+    origin: Transform  # pose of the child in the parent at position zero
+    axis: Vector  # unit vector in the child's frame
+    mimic: Mimic | None = None  # what it follows, if it does
+    # attributes of ``<limit>`` as they are written, if there is one
     limit: Mapping[str, str] | None = None
+    # soft limits of ``<safety_controller>`` in [rad], if it has both
     soft: tuple[float, float] | None = None
 
     @property
@@ -152,23 +127,15 @@ Color: TypeAlias = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class UrdfShape:
-    """A shape of a link: what it looks like, or what may not touch anything.
+    """A shape of a link: what it looks like, or what may not touch anything."""
 
-    Attributes:
-        link: Name of the link.
-        shape: What it is: box, cylinder, sphere, mesh, or empty where there is none.
-        attributes: Its attributes as they are written.
-        origin: Where it is in the link's frame.
-        color: Red, green, blue and opacity from 0 to 1; None where the URDF gives no usable one.
-        note: Why its color is not usable; empty where it is, or where there is none.
-    """
-
-    link: str
-    shape: str
-    attributes: Mapping[str, str]
-    origin: Transform
+    link: str  # name of the link
+    shape: str  # what it is: box, cylinder, sphere, mesh, or empty where there is none
+    attributes: Mapping[str, str]  # its attributes as they are written
+    origin: Transform  # where it is in the link's frame
+    # red, green, blue and opacity from 0 to 1; None where the URDF gives no usable one
     color: Color | None = None
-    note: str = ''
+    note: str = ''  # why its color is not usable; empty where it is, or where there is none
 
     def lengths(self, *names: str) -> tuple[float, ...]:
         """Return the numbers of some of its attributes in [m].
@@ -186,34 +153,21 @@ class UrdfShape:
 
 @dataclass(frozen=True, slots=True)
 class PointMass:
-    """Where the mass of a link is.
+    """Where the mass of a link is."""
 
-    Attributes:
-        link: Name of the link.
-        mass: In [kg].
-        centre: Its centre in the link in [m].
-    """
-
-    link: str
-    mass: float
-    centre: Vector
+    link: str  # name of the link
+    mass: float  # in [kg]
+    centre: Vector  # its centre in the link in [m]
 
 
 @dataclass(frozen=True, slots=True)
 class KinematicTree:
-    """Contents of a URDF.
+    """Contents of a URDF."""
 
-    Attributes:
-        name: Name of the robot.
-        root: Name of the link without a parent.
-        links: Names of all links, in the order of the URDF.
-        joints: All joints, in the order of the URDF.
-    """
-
-    name: str
-    root: str
-    links: tuple[str, ...]
-    joints: tuple[Joint, ...]
+    name: str  # name of the robot
+    root: str  # name of the link without a parent
+    links: tuple[str, ...]  # names of all links, in the order of the URDF
+    joints: tuple[Joint, ...]  # all joints, in the order of the URDF
     _robot: ET.Element = field(repr=False, compare=False)
 
     def movable(self) -> Iterator[Joint]:

@@ -32,11 +32,6 @@ def expand_xacro(
 ) -> str:
     """Expand a xacro file.
 
-    Args:
-        path: The xacro file.
-        arguments: Values for its xacro arguments.
-        packages: Folders of packages that are not in AMENT_PREFIX_PATH, by name.
-
     Returns:
         What it makes, as XML text.
 

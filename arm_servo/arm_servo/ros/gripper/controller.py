@@ -27,10 +27,8 @@ from ...core.set_point import Source
 from .interfaces import GripperInterface, GripperState, ParallelGripper, SingleGripper
 from .parameters import GripperParameters
 
-WATCH_RATE = 20.0
-"""Rate of feedback in [Hz]."""
-START_TIMEOUT = 5.0
-"""Time in which the cycle must begin with a goal in [s]."""
+WATCH_RATE = 20.0  # rate of feedback in [Hz]
+START_TIMEOUT = 5.0  # time in which the cycle must begin with a goal in [s]
 
 NO_EFFORT_LIMIT = (
     'the effort of the goal limits nothing: drives get positions only; '
@@ -70,11 +68,7 @@ class GripperController:
         """Offer them; the first only for a gripper of one joint.
 
         Args:
-            node: The controller's node.
-            gateway: Commands to the core.
-            parameters: How it behaves.
             check_active: Raises an ArmError where no motion may begin.
-            prepare: Called before a motion that is not refused, to get the drives back.
         """
         self._node, self._gateway = node, gateway
         self._parameters = parameters

@@ -19,31 +19,19 @@ from ...core.requests import TargetRequest
 
 @dataclass(frozen=True, slots=True)
 class GripperState:
-    """Where a gripper is.
+    """Where a gripper is."""
 
-    Attributes:
-        joints: Names of its joints.
-        measured: What was measured of them.
-        stalled: It does not move although it is not at the goal.
-        reached: It is at the goal.
-    """
-
-    joints: Sequence[str]
-    measured: RobotState
-    stalled: bool = False
-    reached: bool = False
+    joints: Sequence[str]  # names of its joints
+    measured: RobotState  # what was measured of them
+    stalled: bool = False  # it does not move although it is not at the goal
+    reached: bool = False  # it is at the goal
 
 
 class GripperInterface(Protocol):
-    """One of the actions.
+    """One of the actions."""
 
-    Attributes:
-        action: Its type.
-        name: Its name.
-    """
-
-    action: Any
-    name: str
+    action: Any  # its type
+    name: str  # its name
 
     def request(self, goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
         """Return what a goal asks.

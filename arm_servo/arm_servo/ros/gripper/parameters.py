@@ -13,27 +13,17 @@ from node_runner import ParameterReader
 
 @dataclass(frozen=True, slots=True)
 class GripperParameters:
-    """How the gripper controller behaves.
+    """How the gripper controller behaves."""
 
-    Attributes:
-        goal_tolerance: How far a joint may be off at the goal in [rad] or [m].
-        stall_velocity: Speed below which a joint does not move in [rad/s] or [m/s].
-        stall_timeout: Time without motion in front of the goal after which it is stalled in [s].
-        allow_stalling: Whether a goal that ends stalled succeeds: something is held.
-    """
-
-    goal_tolerance: float
-    stall_velocity: float
+    goal_tolerance: float  # how far a joint may be off at the goal in [rad] or [m]
+    stall_velocity: float  # speed below which a joint does not move in [rad/s] or [m/s]
+    # time without motion in front of the goal after which it is stalled in [s]
     stall_timeout: float
-    allow_stalling: bool
+    allow_stalling: bool  # whether a goal that ends stalled succeeds: something is held
 
 
 def declare_gripper(node: Node) -> GripperParameters:
-    """Declare the parameters of the gripper controller.
-
-    Args:
-        node: The controller's node.
-    """
+    """Declare the parameters of the gripper controller."""
     read = ParameterReader(node)
     return GripperParameters(
         read.number(

@@ -17,8 +17,7 @@ from ...core.requests import DisplacementRequest, JogRequest
 from ...jog.servo_source import JointCommand, PoseCommand, TwistCommand
 from .parameters import DEFAULT_ANGULAR_SPEED, DEFAULT_LINEAR_SPEED, Scales, ServoParameters, Units
 
-MAX_DURATION = 60.0
-"""Longest duration of a joint jog in [s]."""
+MAX_DURATION = 60.0  # longest duration of a joint jog in [s]
 
 
 class Frames(Protocol):
@@ -48,8 +47,6 @@ class CommandConverter:
 
         Args:
             model: The arm; only its names are used.
-            frames: Frames of commands.
-            parameters: How the servo behaves.
             scales: How numbers become speeds.
         """
         self.scales = scales

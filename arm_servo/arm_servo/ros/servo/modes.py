@@ -35,7 +35,6 @@ class ServoModes:
         """Offer the services.
 
         Args:
-            node: The servo's node.
             stop: Brings jogging to rest, for a reason.
             renew: Takes what comes from now on for a new jog.
         """
@@ -51,9 +50,6 @@ class ServoModes:
 
     def admit(self, kind: CommandKind) -> None:
         """Check whether a command is taken.
-
-        Args:
-            kind: What it is.
 
         Raises:
             CommandError: The servo is paused, or another type was chosen.

@@ -36,8 +36,7 @@ from .status import status_of
 
 Convert = Callable[[Any, float], JogRequest | DisplacementRequest]
 
-MAX_STAMP_AHEAD = 0.1
-"""How far ahead of this clock a stamp may be in [s]."""
+MAX_STAMP_AHEAD = 0.1  # how far ahead of this clock a stamp may be in [s]
 
 
 class Servo:
@@ -54,14 +53,6 @@ class Servo:
         parameters: ServoParameters,
         prepare: Callable[[], object],
     ) -> None:
-        """Offer them.
-
-        Args:
-            node: The servo's node.
-            gateway: Commands to the core.
-            parameters: How it behaves.
-            prepare: Called before a motion, to get the drives back.
-        """
         self._node, self._gateway, self._prepare = node, gateway, prepare
         self._parameters = parameters
         self._modes = ServoModes(node, self._stop, gateway.holds.renew)

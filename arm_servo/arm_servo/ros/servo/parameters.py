@@ -36,60 +36,35 @@ class Units(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """How numbers of commands become speeds; may be changed while the servo runs.
+    """How numbers of commands become speeds; may be changed while the servo runs."""
 
-    Attributes:
-        units: What the numbers are.
-        linear: Factor, or cap with speed units, of the tool's speed in [m/s]; 0 is no cap.
-        rotational: The same of its angular speed in [rad/s].
-        joint: Factor of joint speeds in [rad/s].
-        override: Factor of all commands, 0 to 1.
-    """
-
-    units: Units
-    linear: float
-    rotational: float
-    joint: float
-    override: float
+    units: Units  # what the numbers are
+    linear: float  # factor, or cap with speed units, of the tool's speed in [m/s]; 0 is no cap
+    rotational: float  # the same of its angular speed in [rad/s]
+    joint: float  # factor of joint speeds in [rad/s]
+    override: float  # factor of all commands, 0 to 1
 
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters:
-    """How the servo behaves.
+    """How the servo behaves."""
 
-    Attributes:
-        timeout: Age at which a command counts no more in [s].
-        about_tip: Twists of other frames turn about the tip; else about the frame's origin.
-        default_frame: Frame of commands without one; empty is the base.
-        twist_topic: Topic of twists.
-        joint_topic: Topic of joint jogs.
-        pose_topic: Topic of poses.
-        status_topic: Topic of the status.
-        status_rate: Its rate in [Hz].
-        clearance: Least distance between links that a jog may bring about in [m]; None is any.
-        settings: How the core jogs.
-        frame_prefix: Before the names of the robot's links in TF.
-    """
-
-    timeout: float
-    about_tip: bool
-    default_frame: str
-    twist_topic: str
-    joint_topic: str
-    pose_topic: str
-    status_topic: str
-    status_rate: float
+    timeout: float  # age at which a command counts no more in [s]
+    about_tip: bool  # twists of other frames turn about the tip; else about the frame's origin
+    default_frame: str  # frame of commands without one; empty is the base
+    twist_topic: str  # topic of twists
+    joint_topic: str  # topic of joint jogs
+    pose_topic: str  # topic of poses
+    status_topic: str  # topic of the status
+    status_rate: float  # its rate in [Hz]
+    # least distance between links that a jog may bring about in [m]; None is any
     clearance: float | None
-    settings: ServoSettings
-    frame_prefix: str = ''
+    settings: ServoSettings  # how the core jogs
+    frame_prefix: str = ''  # before the names of the robot's links in TF
 
 
 def declare_servo(node: Node, model: RobotModel) -> ServoParameters:
     """Declare the parameters of the servo.
-
-    Args:
-        node: The node.
-        model: The arm that it moves.
 
     Raises:
         ModelError: move_group_name is another group, command_in_type is unknown, or a margin does

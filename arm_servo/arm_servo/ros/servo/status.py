@@ -10,8 +10,7 @@ from ...core.set_point import Source
 from ...core.snapshot import Snapshot
 from ...report import Cause, MotionReport
 
-HALTED_SPEED_FACTOR = 0.02
-"""Share of the asked speed below which a motion counts as halted."""
+HALTED_SPEED_FACTOR = 0.02  # share of the asked speed below which a motion counts as halted
 
 
 class StatusCode(IntEnum):
@@ -54,11 +53,8 @@ def status_of(
     """Return code and message.
 
     Args:
-        snapshot: What the core does.
         refusal: Why the last command was refused, with the remedy; empty when it was not.
-        paused: Why the servo is paused; empty when it is not.
         capped: What was cut off the last command.
-        age: Time since the cycle of the snapshot in [s].
     """
     if refusal:
         return int(StatusCode.INVALID), refusal

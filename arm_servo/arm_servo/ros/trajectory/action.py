@@ -24,11 +24,8 @@ from ...core.motion_queue import MotionCommand
 from ...core.outcome import Outcome, refused
 from .messages import difference, point_of
 
-START_TIMEOUT = 5.0
-"""Time in which a goal must be planned and taken by the cycle in [s]."""
-
-START_TIMEOUT_PER_POINT = 0.01
-"""The same for each of its points in [s]."""
+START_TIMEOUT = 5.0  # time in which a goal must be planned and taken by the cycle in [s]
+START_TIMEOUT_PER_POINT = 0.01  # the same for each of its points in [s]
 
 Follow = Callable[[TrajectoryGoal], MotionCommand]
 
@@ -74,8 +71,6 @@ class TrajectoryAction:
         """Offer ``~/follow_joint_trajectory``.
 
         Args:
-            node: The controller's node.
-            gateway: Commands to the core.
             rate: Rate of the feedback in [Hz].
             convert: Makes a trajectory of a goal; raises GoalError.
             follow: Has a trajectory followed.

@@ -49,15 +49,6 @@ class TrajectoryController:
         parameters: TrajectoryParameters,
         prepare: Callable[[], bool],
     ) -> None:
-        """Offer them.
-
-        Args:
-            node: The controller's node.
-            gateway: Commands to the core.
-            parameters: How it behaves.
-            prepare: Called before a trajectory that is not refused, to get the drives back;
-                returns whether they were away.
-        """
         self.active = True
         self._node = node
         self._gateway = gateway

@@ -26,7 +26,6 @@ def goal_of_trajectory(
     Args:
         message: The trajectory_msgs/JointTrajectory.
         now: ROS time in [s].
-        parameters: Tolerances of the controller.
 
     Raises:
         GoalError: It has efforts, which nothing would follow.
@@ -51,9 +50,7 @@ def goal_of_action(
     """Return the goal that a goal of FollowJointTrajectory is.
 
     Args:
-        request: The goal of the action.
         now: ROS time in [s].
-        parameters: Tolerances of the controller, which those of the goal override.
 
     Raises:
         GoalError: It has parts that nothing would follow, or tolerances of unknown joints.
@@ -77,7 +74,6 @@ def point_of(state: RobotState, time: float = 0.0) -> JointTrajectoryPoint:
     """Return a state as a point.
 
     Args:
-        state: The state.
         time: Its time_from_start in [s].
     """
     point = JointTrajectoryPoint(

@@ -15,8 +15,7 @@ from node_runner import ParameterReader
 
 from ...core.execution import ExecutionSettings
 
-RATE_RANGE = (0.1, 1000.0)
-"""Span of rates in [Hz]."""
+RATE_RANGE = (0.1, 1000.0)  # span of rates in [Hz]
 
 GOAL_TOLERANCE = 0.05
 """Default tolerance at the goal in [rad]: an arm that has not arrived is no success."""
@@ -30,25 +29,15 @@ GOAL_TIME = 5.0
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryParameters:
-    """How the trajectory controller behaves.
+    """How the trajectory controller behaves."""
 
-    Attributes:
-        execution: How trajectories are accepted and followed.
-        path: Tolerances on the way by joint; 0 is none.
-        goal: Tolerances at the end by joint; 0 is none.
-        monitor_rate: Rate of the action's feedback in [Hz].
-        state_rate: Rate of ~/controller_state in [Hz].
-        speed: Speed scaling at the start, 0 to 1.
-        check: Whether motions on whose way links meet are refused.
-    """
-
-    execution: ExecutionSettings
-    path: Mapping[str, JointTolerance]
-    goal: Mapping[str, JointTolerance]
-    monitor_rate: float
-    state_rate: float
-    speed: float
-    check: bool
+    execution: ExecutionSettings  # how trajectories are accepted and followed
+    path: Mapping[str, JointTolerance]  # tolerances on the way by joint; 0 is none
+    goal: Mapping[str, JointTolerance]  # tolerances at the end by joint; 0 is none
+    monitor_rate: float  # rate of the action's feedback in [Hz]
+    state_rate: float  # rate of ~/controller_state in [Hz]
+    speed: float  # speed scaling at the start, 0 to 1
+    check: bool  # whether motions on whose way links meet are refused
 
 
 def declare_trajectory(
@@ -57,8 +46,6 @@ def declare_trajectory(
     """Declare the parameters of the trajectory controller.
 
     Args:
-        node: The node.
-        joints: Names of the group's joints.
         limits: Their limits; None for an end effector, whose joints may end at what they hold.
         checks: Default of whether motions on whose way links meet are refused.
 
@@ -123,7 +110,6 @@ def declare_check(read: ParameterReader, *, default: bool = True) -> bool:
 
     Args:
         read: Declares for the node.
-        default: Its default.
     """
     return read.flag(
         'check_self_collision',

@@ -27,12 +27,6 @@ class TrajectoryPause:
     """Holds whatever moves the arm, and lets it go on."""
 
     def __init__(self, node: Node, gateway: CommandGateway) -> None:
-        """Offer the services.
-
-        Args:
-            node: The controller's node.
-            gateway: Commands to the core.
-        """
         self._gateway = gateway
         self._paused = False  # as it was ordered: the cycle may not have come to it yet
         node.create_service(Trigger, '~/pause', self._pause)
@@ -61,11 +55,7 @@ class TrajectoryPause:
 
 
 def words_of_pause(snapshot: Snapshot) -> str:
-    """Return what a pause does.
-
-    Args:
-        snapshot: What the core did before it.
-    """
+    """Return what a pause does."""
     if snapshot.paused:
         return 'is paused already; ~/resume goes on'
     if snapshot.source is Source.NONE:
@@ -76,11 +66,7 @@ def words_of_pause(snapshot: Snapshot) -> str:
 
 
 def words_of_resume(snapshot: Snapshot) -> str:
-    """Return what goes on.
-
-    Args:
-        snapshot: What the core did before it.
-    """
+    """Return what goes on."""
     if not snapshot.paused:
         return 'was not paused'
     if snapshot.speed == 0.0:
