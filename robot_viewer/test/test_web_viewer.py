@@ -575,9 +575,7 @@ def test_messages_that_are_not_installed_here_leave_the_rest(
     ActionServer(robot.node, moveit.MoveGroup, 'move_action', lambda _: None)
     ActionServer(robot.node, moveit.ExecuteTrajectory, 'execute_trajectory', lambda _: None)
     robot.spin_until(lambda: bool(said), 'a sentence')
-    assert said == [
-        f'{what}: {package} is not installed here; build the workspace with it, or install it'
-    ]
+    assert said == [f'{what}: {package} is not installed here: run `make build`, or install it']
     robot.spin_until(lambda: len(robot.viewer._drives) == 2, 'drives')
     robot.viewer.stop()
     assert robot.called_until_enable() == ['joint1/halt', 'joint2/halt']

@@ -21,6 +21,7 @@ from workspace.underlay import Underlay, UnderlayKind
 MANIFEST = """<package format="3">
   <name>{name}</name>
   {depends}
+  {tests}
   {group}
   <export><build_type>{build_type}</build_type></export>
 </package>
@@ -60,7 +61,13 @@ def environment(layout: Layout) -> Environment:
 def add_package(layout: Layout) -> Callable[..., Path]:
     """A function that adds a package to the checkout."""
 
-    def add(name: str, *depends: str, folder: str = '', build_type: str = 'ament_python') -> Path:
+    def add(
+        name: str,
+        *depends: str,
+        folder: str = '',
+        build_type: str = 'ament_python',
+        tests: str = '',
+    ) -> Path:
         where = layout.root / folder / name
         where.mkdir(parents=True)
         group = '<member_of_group>rosidl_interface_packages</member_of_group>'
@@ -68,6 +75,7 @@ def add_package(layout: Layout) -> Callable[..., Path]:
             MANIFEST.format(
                 name=name,
                 depends=''.join(f'<depend>{other}</depend>' for other in depends),
+                tests=f'<test_depend>{tests}</test_depend>' if tests else '',
                 group=group if build_type == 'ament_cmake' else '',
                 build_type=build_type,
             )

@@ -51,6 +51,19 @@ def test_a_target_gets_what_it_needs_in_order(
     assert set(needed_packages(packages, [], empty)) == set(packages)
 
 
+def test_what_only_tests_need_waits_for_the_tests(
+    layout: Layout, add_package: Add, empty: Underlay
+) -> None:
+    """A demo builds no messages for the tests of what it runs."""
+    add_package('plan_msgs', build_type='ament_cmake')
+    add_package('page', tests='plan_msgs')
+    add_package('bringup', 'page')
+    packages = find_packages(layout.root)
+    assert list(needed_packages(packages, ['bringup'], empty)) == ['page', 'bringup']
+    with_tests = needed_packages(packages, ['bringup'], empty, tests=True)
+    assert list(with_tests) == ['plan_msgs', 'page', 'bringup']
+
+
 def test_copies_that_the_underlay_has_are_not_built(
     layout: Layout, add_package: Add, tmp_path: Path
 ) -> None:

@@ -29,7 +29,8 @@ class Package:
         name: Its name.
         folder: Where it is.
         build_type: `ament_cmake` or `ament_python`.
-        dependencies: All packages that its manifest names.
+        dependencies: All packages that it needs to be built and to run.
+        test_dependencies: Those that only its tests need.
         is_interface: Whether it consists of messages, services and actions.
         is_copy: Whether it stands in for a public package.
     """
@@ -38,6 +39,7 @@ class Package:
     folder: Path
     build_type: str
     dependencies: frozenset[str]
+    test_dependencies: frozenset[str]
     is_interface: bool
     is_copy: bool
 
@@ -45,13 +47,15 @@ class Package:
 def read_package(manifest: Path) -> Package:
     """Read a package.xml (REP 149)."""
     root = ET.parse(manifest).getroot()  # noqa: S314  # our own file
-    needed = {(element.text or '').strip() for element in root if element.tag.endswith('depend')}
-    groups = {(element.text or '').strip() for element in root.iter('member_of_group')}
+    names = [(element.tag, (element.text or '').strip()) for element in root.iter()]
+    needed = {name for tag, name in names if tag.endswith('depend') and tag != 'test_depend'}
+    groups = {name for tag, name in names if tag == 'member_of_group'}
     return Package(
         name=root.findtext('name', '').strip(),
         folder=manifest.parent,
         build_type=root.findtext('export/build_type', 'ament_cmake').strip(),
         dependencies=frozenset(needed),
+        test_dependencies=frozenset(name for tag, name in names if tag == 'test_depend'),
         is_interface=INTERFACE_GROUP in groups,
         is_copy=manifest.parent.parent.name == COPIES_FOLDER,
     )
@@ -72,7 +76,11 @@ def find_packages(root: Path) -> dict[str, Package]:
 
 
 def needed_packages(
-    packages: Mapping[str, Package], targets: Iterable[str], underlay: Underlay
+    packages: Mapping[str, Package],
+    targets: Iterable[str],
+    underlay: Underlay,
+    *,
+    tests: bool = False,
 ) -> dict[str, Package]:
     """Take the targets and what they need, without what the underlay has.
 
@@ -80,6 +88,7 @@ def needed_packages(
         packages: All packages of the workspace.
         targets: Names to begin with; none means all.
         underlay: The ROS below; of a public package it has, our copy is not built.
+        tests: With what their tests need, too.
 
     Returns:
         The packages, each after those that it needs.
@@ -97,7 +106,8 @@ def needed_packages(
         visited.add(name)
         if package.is_copy and underlay.has_package(name):
             return
-        for dependency in sorted(package.dependencies):
+        wanted = package.dependencies | (package.test_dependencies if tests else frozenset())
+        for dependency in sorted(wanted):
             visit(dependency)
         ordered[name] = package
 

@@ -43,7 +43,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
     """
     layout = environment.layout
     found = find_packages(layout.root)
-    packages = needed_packages(found, target.packages, environment.underlay)
+    packages = needed_packages(found, target.packages, environment.underlay, tests=target.dev)
     names = [DEV, *sorted(found)] if target.dev else sorted(packages) if target.build else []
     if target.dev:
         names.append(DOCS)

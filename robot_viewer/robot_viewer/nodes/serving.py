@@ -59,7 +59,7 @@ class Border:
 def _reason(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError):
         package = (error.name or str(error)).partition('.')[0]
-        return f'{package} is not installed here; build the workspace with it, or install it'
+        return f'{package} is not installed here: run `make build`, or install it'
     return str(error) if isinstance(error, ValueError) else f'{type(error).__name__}: {error}'
 
 
