@@ -114,6 +114,29 @@ def test_modifiers_are_no_keys(code: int) -> None:
     assert decode(f'\x1b[{code};2:1u\x1b[{code};1:3u', kitty=True) == []
 
 
+@pytest.mark.parametrize(
+    'text',
+    [
+        '\x1b[9999999u',
+        '\x1b[1114112;2u',
+        '\x1b[1114112;;105u',
+        '\x1b[27;5;9999999~',
+        '\x1b[55296u',
+        '\x1b[57343;2:1u',
+    ],
+)
+@pytest.mark.parametrize('kitty', [False, True])
+def test_a_code_that_is_no_character_is_no_key(text: str, kitty: bool) -> None:
+    """Beyond Unicode, or half of a surrogate pair: passed over, and the next key is read."""
+    assert decode(f'{text}k', kitty=kitty) == [('k', TYPED)]
+
+
+def test_a_character_that_is_none_leaves_the_name_of_the_code() -> None:
+    """As shifted code, as text and as code of the Latin layout."""
+    text = '\x1b[105:9999999;2u\x1b[106;1;1114112u\x1b[1096::55296;1u'
+    assert decode(text, kitty=True) == [('I', PRESSED), ('j', PRESSED), ('ш', PRESSED)]
+
+
 def test_repeat_of_a_key_that_is_not_down_is_no_press() -> None:
     """A key that was held before we looked, or was let go of, does not start by its repeat."""
     assert decode('\x1b[105;1:2;105u', kitty=True) == []

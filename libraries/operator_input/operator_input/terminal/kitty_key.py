@@ -118,5 +118,7 @@ def _with_modifiers(name: str, modifiers: int) -> str:
 
 
 def _number(text: str) -> int | None:
-    # no code point and no flag is longer, and Python refuses to convert very long numbers
-    return int(text) if text.isascii() and text.isdigit() and len(text) <= 7 else None
+    # Python refuses to convert very long numbers
+    number = int(text) if text.isascii() and text.isdigit() and len(text) <= 7 else None
+    # a program can show every character but half of a surrogate pair, and there are no others
+    return number if number is None or number < 0xD800 or 0xDFFF < number <= 0x10FFFF else None
