@@ -284,7 +284,7 @@ def _parser() -> argparse.ArgumentParser:
         '--log',
         metavar='FILE',
         help="write all frames, shown or not, as can-utils' candump -L; FILE.asc and FILE.blf in "
-        "Vector's formats, FILE.pcap for Wireshark",
+        "Vector's formats",
     )
     add(
         '--read',

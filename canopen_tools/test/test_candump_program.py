@@ -155,7 +155,7 @@ def run_main(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, 
     return code, captured.out, captured.err
 
 
-@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', '.pcap', ''])
+@pytest.mark.parametrize('suffix', ['.log', '.asc', '.blf', ''])
 def test_a_log_is_shown_like_a_bus(
     suffix: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -6,8 +6,7 @@ Written by the suffix of the file:
 
 - ``.asc``: Vector's text format (can-utils: asc2log)
 - ``.blf``: Vector's binary format
-- ``.pcap``, ``.cap``: a capture for Wireshark, which knows CANopen
-- ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc)
+- ``.log`` and all others: as ``candump -L`` writes it (can-utils: canplayer, log2asc; Wireshark)
 
 Read, by what is in the file: these, what candump prints, PCAN's .trc, and csv of SavvyCAN and
 python-can. python-can does what is not done here.
@@ -40,7 +39,6 @@ from .candump_format import (
     SCREEN_LINE,
 )
 from .frame import checked, Frame
-from .pcap import PcapReader, PcapWriter
 
 _DAMAGE = (ValueError, LookupError, struct.error, zlib.error, BLFParseError)
 _MICROSECOND = 1e-6  # [s]
@@ -107,15 +105,13 @@ class LogWriter:
             wall_offset: Wall clock minus steady clock in [s].
         """
         suffix = path.suffix.lower()
-        self._writer: CandumpWriter | can.ASCWriter | can.BLFWriter | PcapWriter
+        self._writer: CandumpWriter | can.ASCWriter | can.BLFWriter
         if suffix == '.asc':
             self._writer = can.ASCWriter(AscFile(path.open('wb'), encoding='utf-8'))
         elif suffix == '.blf':
             self._writer = can.BLFWriter(path)
-        elif suffix == '.pcapng':
-            raise CodecError(f'{path}: pcapng is not written; name it .pcap')
-        elif suffix in {'.pcap', '.cap'}:
-            self._writer = PcapWriter(path)
+        elif suffix in {'.pcap', '.cap', '.pcapng'}:
+            raise CodecError(f'{path}: no capture is written; name it .log, Wireshark opens those')
         else:
             self._writer = CandumpWriter(path, log_channel(bus_name))
         self._offset = wall_offset
@@ -197,8 +193,6 @@ def _opened(path: Path, head: bytes) -> tuple[str, Iterator[LoggedFrame]]:
             if reader is None:
                 raise CodecError(f'{name} is not read; {_KNOWN}')
             return name, _read_binary(path, reader)
-    if path.suffix.lower() in _CAPTURES:
-        return 'pcap', _read_binary(path, PcapReader)
     encoding = 'utf-16' if head.startswith((b'\xff\xfe', b'\xfe\xff')) else 'utf-8-sig'
     lines = head.decode(encoding, 'replace').splitlines()
     for line in lines:
@@ -281,14 +275,10 @@ def _pattern(text: str) -> re.Pattern[str]:
 
 
 _CLASSIC_MAX = 8  # [byte]
-_CAPTURES = {'.pcap', '.cap', '.pcapng'}
 _BINARY: tuple[tuple[bytes, str, Callable[[Path], Iterable[can.Message]] | None], ...] = (
     (b'LOGG', 'Vector .blf', can.BLFReader),
-    (b'\xd4\xc3\xb2\xa1', 'pcap', PcapReader),
-    (b'\xa1\xb2\xc3\xd4', 'pcap', PcapReader),
-    (b'\x4d\x3c\xb2\xa1', 'pcap', PcapReader),
-    (b'\xa1\xb2\x3c\x4d', 'pcap', PcapReader),
-    (b'\x0a\x0d\x0d\x0a', 'pcapng', PcapReader),  # which says what to do
+    (b'\xd4\xc3\xb2\xa1', 'pcap', None),  # of little-endian machines
+    (b'\x0a\x0d\x0d\x0a', 'pcapng', None),
     (b'MDF ', 'ASAM MDF (.mf4)', None),
     (b'\x1f\x8b', 'a gzip file', None),
     (b'PK', 'a zip file', None),
@@ -304,5 +294,5 @@ _TEXT = (
 )
 _KNOWN = (
     'read are candump (its logs and its screen), PCAN .trc, Vector .asc and .blf, csv of SavvyCAN '
-    'and python-can, and pcap; SavvyCAN converts others to its csv'
+    'and python-can; SavvyCAN converts others to its csv'
 )
