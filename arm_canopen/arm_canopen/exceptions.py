@@ -34,21 +34,13 @@ class CanopenError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something wrong with a configuration file.
-
-    Attributes:
-        file: The file.
-        line: Line, from 1; 0 when the whole file is meant.
-        key: Path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies.
-        message: What is wrong, and with which value.
-        remedy: What to do about it.
-    """
+    """Something wrong with a configuration file."""
 
     file: Path
-    line: int
-    key: str
-    message: str
-    remedy: str
+    line: int  # line, from 1; 0 when the whole file is meant
+    key: str  # path of the key, such as ``nodes.joint1.tpdo.1.mapping``; empty when none applies
+    message: str  # what is wrong, and with which value
+    remedy: str  # what to do about it
 
     def __str__(self) -> str:
         """Write it as compilers do: file, line, key, message, remedy."""
@@ -62,13 +54,10 @@ class ConfigError(CanopenError, ValueError):
     """A bus.yml or EDS is wrong. The message lists every problem that was found, one per line.
 
     Scenarios: a file is missing, a key is unknown, a value does not fit, two devices share an id.
-
-    Attributes:
-        problems: Each with file, line, key, message and remedy.
     """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
-        self.problems = tuple(problems)
+        self.problems = tuple(problems)  # each with file, line, key, message and remedy
         super().__init__('\n'.join(str(problem) for problem in self.problems))
 
 
@@ -100,15 +89,11 @@ class SdoTimeoutError(SdoError, TimeoutError):
 
 
 class SdoAbortError(SdoError):
-    """An SDO transfer was aborted.
-
-    Attributes:
-        code: Abort code as transmitted (CiA 301, table 22).
-    """
+    """An SDO transfer was aborted."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
-        self.code = code
+        self.code = code  # abort code as transmitted (CiA 301, table 22)
 
 
 class LssError(CanopenError):

@@ -44,15 +44,10 @@ WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """An EDS for a device.
-
-    Attributes:
-        eds: The EDS.
-        reason: Why, in words.
-    """
+    """An EDS for a device."""
 
     eds: Eds
-    reason: str
+    reason: str  # why, in words
 
 
 def eds_identity(eds: Eds) -> Identity:

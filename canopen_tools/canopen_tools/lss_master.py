@@ -41,11 +41,7 @@ ERROR_TEXTS: dict[int, str] = {1: 'not supported by the device', 255: 'an error 
 
 
 class LssMaster:
-    """Speaks to the LSS slaves of a bus, one service at a time.
-
-    Attributes:
-        answers: Answers since the last request.
-    """
+    """Speaks to the LSS slaves of a bus, one service at a time."""
 
     def __init__(
         self,
@@ -63,7 +59,7 @@ class LssMaster:
             timeout: Longest time for an answer in [s].
             scan_timeout: The same for a step of fast scan, in [s], at first.
         """
-        self.answers: list[LssMessage] = []
+        self.answers: list[LssMessage] = []  # answers since the last request
         self._scheduler = scheduler
         self._send = send
         self._timeout = timeout

@@ -31,48 +31,34 @@ class NewBusError(CanopenError):
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """How far an increment is, as somebody has said.
+    """How far an increment is, as somebody has said."""
 
-    Attributes:
-        scale: Increments of the drive per rad or m of the joint; negative for the other direction.
-        said: The same in words.
-        slides: The joint slides, so that the scale is per m.
-        velocity: Velocity units of the drive per rad/s or m/s; None where nobody has said it.
-        velocity_said: The same in words.
-    """
-
+    # increments of the drive per rad or m of the joint; negative for the other direction
     scale: float
-    said: str
-    slides: bool = False
+    said: str  # the same in words
+    slides: bool = False  # the joint slides, so that the scale is per m
+    # velocity units of the drive per rad/s or m/s; None where nobody has said it
     velocity: float | None = None
-    velocity_said: str = ''
+    velocity_said: str = ''  # the same in words
 
 
 @dataclass(frozen=True, slots=True)
 class NewDevice:
-    """A device of the new bus.
+    """A device of the new bus."""
 
-    Attributes:
-        name: Its name; that of the joint, for a drive.
-        node_id: Its node id.
-        eds: Its EDS.
-        mode: Mode of operation; None takes the best one that the EDS names.
-        units: Units of the joint; None where the factor group says them.
-        rpm: Turns of what the drive counts in rpm, or in the unit of angles that it names in
-            0x60A9, for one turn or 1 m of the joint; None where nobody has said it.
-        values: What the device itself holds, by index and sub-index; it counts before the
-            defaults of its EDS.
-        found: Who it is and why it has this EDS, where it was found on a bus; else empty.
-    """
-
-    name: str
+    name: str  # its name; that of the joint, for a drive
     node_id: int
-    eds: Eds
+    eds: Eds  # its EDS
+    # mode of operation; None takes the best one that the EDS names
     mode: OperationMode | None = None
-    units: Units | None = None
+    units: Units | None = None  # units of the joint; None where the factor group says them
+    # turns of what the drive counts in rpm, or in the unit of angles that it names in 0x60A9, for
+    # one turn or 1 m of the joint; None where nobody has said it
     rpm: float | None = None
+    # what the device itself holds, by index and sub-index; it counts before the defaults of its
+    # EDS
     values: Mapping[tuple[int, int], int] = field(default_factory=dict)
-    found: str = ''
+    found: str = ''  # who it is and why it has this EDS, where it was found on a bus; else empty
 
     @property
     def is_drive(self) -> bool:

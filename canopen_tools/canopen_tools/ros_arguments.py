@@ -20,14 +20,10 @@ _WITH_VALUE = frozenset(
 
 @dataclass(slots=True)
 class Arguments:
-    """A command line, taken apart.
+    """A command line, taken apart."""
 
-    Attributes:
-        own: What is not for ROS.
-        parameters: Values of ``-p name:=value`` by name, without the node's name before it.
-    """
-
-    own: list[str] = field(default_factory=list)
+    own: list[str] = field(default_factory=list)  # what is not for ROS
+    # values of ``-p name:=value`` by name, without the node's name before it
     parameters: dict[str, str] = field(default_factory=dict)
 
 

@@ -20,34 +20,23 @@ _CLOCK_READINGS = 5
 
 @dataclass(slots=True)
 class BusCounters:
-    """What a bus object has seen; it counts up and never back.
+    """What a bus object has seen; it counts up and never back."""
 
-    Attributes:
-        sent: Frames handed to the interface.
-        received: Frames from others.
-        lost: Frames that the kernel dropped because the receive buffer was full.
-        send_errors: Frames that the interface refused.
-        malformed: Received messages that are no classic CAN frame, and were dropped.
-    """
-
-    sent: int = 0
-    received: int = 0
-    lost: int = 0
-    send_errors: int = 0
-    malformed: int = 0
+    sent: int = 0  # frames handed to the interface
+    received: int = 0  # frames from others
+    lost: int = 0  # frames that the kernel dropped because the receive buffer was full
+    send_errors: int = 0  # frames that the interface refused
+    malformed: int = 0  # received messages that are no classic CAN frame, and were dropped
 
 
 class Bus(ABC):
     """A CAN bus. Send from any thread; receive from one thread only.
 
     Frames that this object sent are never received by it.
-
-    Attributes:
-        name: Name that it was opened by, e.g. ``vcan0`` or ``udp_multicast:239.74.163.2``.
-        counters: What it has seen.
     """
 
     def __init__(self, name: str) -> None:
+        # Name that it was opened by, e.g. ``vcan0`` or ``udp_multicast:239.74.163.2``.
         self.name = name
         self.counters = BusCounters()
 

@@ -27,10 +27,6 @@ class BusThread:
     """Reads a bus, and runs what other threads hand over, between two steps of its owner.
 
     Other threads get a future for what they hand over; nothing is locked.
-
-    Attributes:
-        stopping: The end is wanted.
-        on_failure: Called in the thread, at its end, with the defect that has ended it.
     """
 
     def __init__(self, bus: Bus, name: str, serve: Callable[[], None], owner: str) -> None:
@@ -43,6 +39,7 @@ class BusThread:
             owner: Who that is, for messages.
         """
         self.stopping = False
+        # called in the thread, at its end, with the defect that has ended it
         self.on_failure: Callable[[Exception], None] = lambda error: None
         self._bus = bus
         self._serve = serve

@@ -41,15 +41,10 @@ _STAND_IN = 'vcan0'
 
 
 class LoggedFrame(NamedTuple):
-    """A frame of a log.
+    """A frame of a log."""
 
-    Attributes:
-        interface: Name of its bus, as the log has it; empty where it has none.
-        frame: The frame; its time stamp is on the wall clock, or what the log counts from.
-    """
-
-    interface: str
-    frame: Frame
+    interface: str  # name of its bus, as the log has it; empty where it has none
+    frame: Frame  # the frame; its time stamp is on the wall clock, or what the log counts from
 
 
 def log_channel(bus_name: str) -> str:

@@ -12,26 +12,17 @@ PAYLOAD_MAX = 8  # [byte]
 
 
 class Frame(NamedTuple):
-    """A classic CAN frame (ISO 11898-1). A tuple, because thousands are made each second.
+    """A classic CAN frame (ISO 11898-1). A tuple, because thousands are made each second."""
 
-    Attributes:
-        can_id: 11-bit or 29-bit identifier.
-        data: Payload of 0 to 8 bytes.
-        timestamp: Time of reception on the steady clock (``time.monotonic``) in [s]; 0 when not
-            received.
-        is_extended: The identifier has 29 bits.
-        is_remote: Remote transmission request; the payload is empty.
-        is_error: Error frame of the controller; can_id and data are the kernel's error classes.
-        remote_length: Length of the data that a remote request asks for in [byte].
-    """
-
-    can_id: int
-    data: bytes = b''
+    can_id: int  # 11-bit or 29-bit identifier
+    data: bytes = b''  # payload of 0 to 8 bytes
+    # time of reception on the steady clock (``time.monotonic``) in [s]; 0 when not received
     timestamp: float = 0.0
-    is_extended: bool = False
-    is_remote: bool = False
+    is_extended: bool = False  # the identifier has 29 bits
+    is_remote: bool = False  # remote transmission request; the payload is empty
+    # error frame of the controller; can_id and data are the kernel's error classes
     is_error: bool = False
-    remote_length: int = 0
+    remote_length: int = 0  # length of the data that a remote request asks for in [byte]
 
 
 def checked(frame: Frame) -> Frame:

@@ -63,11 +63,7 @@ def _with_milliseconds(text: str) -> str:
 
 
 class CandumpWriter:
-    """Writes lines of candump.
-
-    Attributes:
-        file: What is written.
-    """
+    """Writes lines of candump."""
 
     def __init__(self, path: Path, channel: str) -> None:
         """Open a new file.
@@ -129,16 +125,11 @@ class LogWriter:
 
 @dataclass(frozen=True, slots=True)
 class _TextFormat:
-    """A format of text.
+    """A format of text."""
 
-    Attributes:
-        name: For messages.
-        begins: What its first line that counts begins with.
-        read: Reads it; None where only its name is known.
-    """
-
-    name: str
-    begins: re.Pattern[str]
+    name: str  # for messages
+    begins: re.Pattern[str]  # what its first line that counts begins with
+    # reads it; None where only its name is known
     read: Callable[[TextIO], Iterator[LoggedFrame]] | None = None
 
 

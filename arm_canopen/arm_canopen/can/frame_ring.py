@@ -19,15 +19,10 @@ _CHUNK = 32  # records that are copied at once
 
 
 class RecordedFrame(NamedTuple):
-    """A frame of the ring.
+    """A frame of the ring."""
 
-    Attributes:
-        frame: The frame, with its steady time in [s] also when it was sent.
-        sent: This process sent it; otherwise it was received.
-    """
-
-    frame: Frame
-    sent: bool
+    frame: Frame  # the frame, with its steady time in [s] also when it was sent
+    sent: bool  # this process sent it; otherwise it was received
 
 
 class FrameRing:
@@ -36,14 +31,9 @@ class FrameRing:
     Frames are packed into one block of bytes: no object of a frame outlives it, so that the
     garbage collector has nothing to look at, however many there are. One thread records, any other
     one may read meanwhile; nothing is locked.
-
-    Attributes:
-        SENT: Direction of a frame that this process has sent.
-        capacity: How many frames it holds.
-        count: How many were recorded since the start.
     """
 
-    SENT = 0x80
+    SENT = 0x80  # direction of a frame that this process has sent
 
     def __init__(self, capacity: int) -> None:
         """Take the memory.
@@ -56,8 +46,8 @@ class FrameRing:
         """
         if capacity < 1:
             raise ValueError(f'a ring of {capacity} frames holds nothing')
-        self.capacity = capacity
-        self.count = 0
+        self.capacity = capacity  # how many frames it holds
+        self.count = 0  # how many were recorded since the start
         self._places = capacity + 1  # one is being written while others are read
         self._end = self._places * RECORD_SIZE
         self._memory = bytearray(self._end)

@@ -24,17 +24,11 @@ _OTHER_BUSES = ('udp_multicast', 'auto')
 
 @dataclass(frozen=True, slots=True)
 class CanInterface:
-    """A CAN network interface.
+    """A CAN network interface."""
 
-    Attributes:
-        name: Its name, e.g. ``can0``.
-        is_up: It is switched on.
-        queue_length: Frames that its transmit queue holds.
-    """
-
-    name: str
+    name: str  # e.g. ``can0``
     is_up: bool
-    queue_length: int
+    queue_length: int  # frames that its transmit queue holds
 
 
 def can_interfaces() -> dict[str, CanInterface]:

@@ -50,17 +50,12 @@ def _stuffed_bits(size: int, is_extended: bool) -> int:
 
 @dataclass(frozen=True, slots=True)
 class LoadFigures:
-    """What a bus carried in the last window.
+    """What a bus carried in the last window."""
 
-    Attributes:
-        frames_per_second: Frames in [1/s].
-        load: Share of the time that the bus was busy, 0 to 1, with the stuffing of random content.
-        load_worst: The same with the most stuffing that these frames can have.
-    """
-
-    frames_per_second: float = 0.0
+    frames_per_second: float = 0.0  # frames in [1/s]
+    # share of the time that the bus was busy, 0 to 1, with the stuffing of random content
     load: float = 0.0
-    load_worst: float = 0.0
+    load_worst: float = 0.0  # the same with the most stuffing that these frames can have
 
 
 @dataclass(frozen=True, slots=True)

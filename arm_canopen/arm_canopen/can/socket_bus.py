@@ -62,13 +62,10 @@ class TimestampReader:
     """Turns ancillary data of received datagrams into steady time and a count of losses.
 
     The kernel stamps with the wall clock. Stamps never go back, also when somebody sets it.
-
-    Attributes:
-        lost: Datagrams that the kernel has dropped since the socket was opened.
     """
 
     def __init__(self) -> None:
-        self.lost = 0
+        self.lost = 0  # datagrams that the kernel has dropped since the socket was opened
         self._drops = 0
         self._last = 0.0
         self._limit = 0.0

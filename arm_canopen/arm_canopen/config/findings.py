@@ -13,33 +13,21 @@ from ..exceptions import ConfigError, Problem
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where something is written.
-
-    Attributes:
-        file: The file.
-        line: Line, from 1; 0 for the whole file.
-        column: Column, from 1; 0 for the whole line.
-        key: Path of the key, such as ``nodes.joint1.tpdo.1.mapping[0]``.
-    """
+    """Where something is written."""
 
     file: Path
-    line: int = 0
-    column: int = 0
-    key: str = ''
+    line: int = 0  # line, from 1; 0 for the whole file
+    column: int = 0  # column, from 1; 0 for the whole line
+    key: str = ''  # path of the key, such as ``nodes.joint1.tpdo.1.mapping[0]``
 
 
 class RefusedError(Exception):
-    """A value cannot be taken. Never leaves this layer: readers turn it into a finding.
-
-    Attributes:
-        message: What is wrong, and with which value.
-        remedy: What to do about it.
-    """
+    """A value cannot be taken. Never leaves this layer: readers turn it into a finding."""
 
     def __init__(self, message: str, remedy: str) -> None:
         super().__init__(message)
-        self.message = message
-        self.remedy = remedy
+        self.message = message  # what is wrong, and with which value
+        self.remedy = remedy  # what to do about it
 
 
 class Findings:

@@ -60,39 +60,23 @@ class ObjectCode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ObjectEntry:
-    """One sub-index of the object dictionary.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index, 0 for a VAR.
-        name: ParameterName of the EDS.
-        configured: A DCF gives it this value, which is not the one after a reset.
-        literal: COB-ID of the file, where that leaves out ``$NODEID`` and the default has it; None
-            otherwise.
-        record: ParameterName of the array or record that it belongs to, empty for a VAR.
-        data_type: Type of the value.
-        access: Who may read or write.
-        default: Value after a reset, of a configured device in a DCF; None when there is none.
-        node_relative: The default is to be added to the node id (``$NODEID+...``).
-        low_limit: Smallest allowed value, None for the type's own.
-        high_limit: Largest allowed value, None for the type's own.
-        pdo_mappable: May be mapped into a PDO.
-        line: Line of the EDS that defines it, 0 when it comes from elsewhere.
-    """
+    """One sub-index of the object dictionary."""
 
     index: int
-    subindex: int
-    name: str
+    subindex: int  # sub-index, 0 for a VAR
+    name: str  # ParameterName of the EDS
     data_type: DataType
     access: AccessType = AccessType.READ_WRITE
+    # value after a reset, of a configured device in a DCF; None when there is none
     default: Value | None = None
-    node_relative: bool = False
-    low_limit: int | float | None = None
-    high_limit: int | float | None = None
-    pdo_mappable: bool = False
-    line: int = 0
-    record: str = ''
-    configured: bool = False
+    node_relative: bool = False  # the default is to be added to the node id (``$NODEID+...``)
+    low_limit: int | float | None = None  # smallest allowed value, None for the type's own
+    high_limit: int | float | None = None  # largest allowed value, None for the type's own
+    pdo_mappable: bool = False  # may be mapped into a PDO
+    line: int = 0  # line of the EDS that defines it, 0 when it comes from elsewhere
+    record: str = ''  # ParameterName of the array or record that it belongs to, empty for a VAR
+    configured: bool = False  # a DCF gives it this value, which is not the one after a reset
+    # COB-ID of the file, where that leaves out ``$NODEID`` and the default has it; None otherwise
     literal: int | None = None
 
     @property
@@ -123,12 +107,7 @@ class ObjectEntry:
 
 
 class ObjectDictionary:
-    """All entries of a device by index and sub-index, in ascending order.
-
-    Attributes:
-        source: Where it was read from, for messages.
-        node_id: Node id for which its COB-IDs are, None where no file says that.
-    """
+    """All entries of a device by index and sub-index, in ascending order."""
 
     def __init__(
         self,
@@ -138,8 +117,8 @@ class ObjectDictionary:
         node_id: int | None = None,
     ) -> None:
         """Collect the entries; of two with one address the later counts."""
-        self.source = source
-        self.node_id = node_id
+        self.source = source  # where it was read from, for messages
+        self.node_id = node_id  # node id for which its COB-IDs are, None where no file says that
         ordered = sorted(entries, key=lambda entry: entry.address)
         self._entries = {entry.address: entry for entry in ordered}
         self._indices = frozenset(index for index, _ in self._entries)

@@ -164,17 +164,11 @@ def error_register_text(register: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Emergency:
-    """An EMCY message.
+    """An EMCY message."""
 
-    Attributes:
-        code: Emergency error code; 0x00xx reports the end of an error.
-        register: Error register 0x1001.
-        vendor: Five manufacturer-specific bytes.
-    """
-
-    code: int
-    register: int
-    vendor: bytes = bytes(5)
+    code: int  # emergency error code; 0x00xx reports the end of an error
+    register: int  # error register 0x1001
+    vendor: bytes = bytes(5)  # five manufacturer-specific bytes
 
     @property
     def is_reset(self) -> bool:

@@ -119,15 +119,10 @@ class LssAddress(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LssMessage:
-    """A message of either direction.
+    """A message of either direction."""
 
-    Attributes:
-        command: Command specifier; others than those of :class:`LssCommand` are reserved.
-        parameters: The 7 bytes behind it.
-    """
-
-    command: int
-    parameters: bytes = bytes(MESSAGE_BYTES - 1)
+    command: int  # command specifier; others than those of :class:`LssCommand` are reserved
+    parameters: bytes = bytes(MESSAGE_BYTES - 1)  # the 7 bytes behind it
 
     @property
     def byte(self) -> int:
@@ -166,18 +161,12 @@ def lss_number(command: int, number: int) -> LssMessage:
 
 @dataclass(frozen=True, slots=True)
 class FastScan:
-    """A step of fast scan: devices answer whose number agrees down to a bit (CiA 305, 6.6).
+    """A step of fast scan: devices answer whose number agrees down to a bit (CiA 305, 6.6)."""
 
-    Attributes:
-        number: What is compared.
-        bit: Lowest bit that is compared, or WHOLE_NUMBER for all devices.
-        part: Which number of the address: 0 vendor to 3 serial.
-        following: Part that devices take next when all bits agree; below ``part`` they are found.
-    """
-
-    number: int = 0
-    bit: int = WHOLE_NUMBER
-    part: int = 0
+    number: int = 0  # what is compared
+    bit: int = WHOLE_NUMBER  # lowest bit that is compared, or WHOLE_NUMBER for all devices
+    part: int = 0  # which number of the address: 0 vendor to 3 serial
+    # part that devices take next when all bits agree; below ``part`` they are found
     following: int = 0
 
     def message(self) -> LssMessage:

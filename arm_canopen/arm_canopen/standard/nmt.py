@@ -30,15 +30,10 @@ class NmtState(IntEnum):
 
 
 class ConsumerHeartbeatTime(NamedTuple):
-    """An entry of 0x1016: whose heartbeat is awaited, and how long (CiA 301, 7.5.2.17).
+    """An entry of 0x1016: whose heartbeat is awaited, and how long (CiA 301, 7.5.2.17)."""
 
-    Attributes:
-        node_id: Node id of the producer, bits 16 to 23.
-        time_ms: Time after which it counts as lost in [ms], bits 0 to 15.
-    """
-
-    node_id: int
-    time_ms: int
+    node_id: int  # node id of the producer, bits 16 to 23
+    time_ms: int  # time after which it counts as lost in [ms], bits 0 to 15
 
     @classmethod
     def parse(cls, word: int) -> ConsumerHeartbeatTime:

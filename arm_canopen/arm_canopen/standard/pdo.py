@@ -39,17 +39,11 @@ STRUCT_CODES: dict[DataType, str] = {
 
 @dataclass(frozen=True, slots=True)
 class MappedObject:
-    """One object in a PDO.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        data_type: How the bits are read; its length is the length in the PDO.
-    """
+    """One object in a PDO."""
 
     index: int
     subindex: int
-    data_type: DataType
+    data_type: DataType  # how the bits are read; its length is the length in the PDO
 
     @property
     def bits(self) -> int:
@@ -68,12 +62,7 @@ def mapped_place(word: int) -> tuple[int, int, int]:
 
 
 class PdoCodec:
-    """Packs and unpacks the payload of one PDO.
-
-    Attributes:
-        objects: The mapped objects in their order.
-        size: Length of the payload in [byte].
-    """
+    """Packs and unpacks the payload of one PDO."""
 
     def __init__(self, objects: Sequence[MappedObject]) -> None:
         """Compile the mapping.
@@ -81,14 +70,14 @@ class PdoCodec:
         Raises:
             CodecError: The objects are longer than 64 bits together, or one has no fixed length.
         """
-        self.objects = tuple(objects)
+        self.objects = tuple(objects)  # the mapped objects in their order
         for entry in self.objects:
             if entry.data_type not in FIXED_BITS:
                 raise CodecError(f'{entry.data_type.name} has no fixed length, no PDO carries it')
         bits = sum(entry.bits for entry in self.objects)
         if bits > PDO_BITS_MAX:
             raise CodecError(f'a PDO carries at most {PDO_BITS_MAX} bits, this mapping has {bits}')
-        self.size = (bits + 7) // 8
+        self.size = (bits + 7) // 8  # length of the payload in [byte]
         codes = [STRUCT_CODES.get(entry.data_type) for entry in self.objects]
         self._struct = (
             struct.Struct('<' + ''.join(code for code in codes if code)) if all(codes) else None

@@ -24,19 +24,13 @@ SEGMENT_MAX = 7  # [byte]
 
 @dataclass(frozen=True, slots=True)
 class DownloadRequest:
-    """Initiate a write: expedited when ``data`` is given, else segmented.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        data: The whole value of an expedited transfer, else None.
-        size: Length of the value in [byte] if the frame has it; without it the server takes
-            from expedited data as many bytes as its object has.
-    """
+    """Initiate a write: expedited when ``data`` is given, else segmented."""
 
     index: int
     subindex: int
-    data: bytes | None
+    data: bytes | None  # the whole value of an expedited transfer, else None
+    # length of the value in [byte] if the frame has it; without it the server takes from expedited
+    # data as many bytes as its object has
     size: int | None = None
 
     def encode(self) -> bytes:
@@ -50,19 +44,12 @@ class DownloadRequest:
 
 @dataclass(frozen=True, slots=True)
 class UploadResponse:
-    """Answer to a read: expedited when ``data`` is given, else segmented.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        data: The whole value of an expedited transfer, else None.
-        size: Length of the value in [byte] if the frame has it.
-    """
+    """Answer to a read: expedited when ``data`` is given, else segmented."""
 
     index: int
     subindex: int
-    data: bytes | None
-    size: int | None = None
+    data: bytes | None  # the whole value of an expedited transfer, else None
+    size: int | None = None  # length of the value in [byte] if the frame has it
 
     def encode(self) -> bytes:
         """Return the 8 bytes of the frame.

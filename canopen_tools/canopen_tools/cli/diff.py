@@ -25,17 +25,11 @@ from .target import find_target, Target, warn_of_master
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """An object that was compared.
+    """An object that was compared."""
 
-    Attributes:
-        expected: What it should hold.
-        device: What it holds, in words.
-        is_equal: It is what it should be.
-    """
-
-    expected: BootWrite
-    device: str
-    is_equal: bool
+    expected: BootWrite  # what it should hold
+    device: str  # what it holds, in words
+    is_equal: bool  # it is what it should be
 
 
 def add_parser(parsers: SubParsers) -> None:

@@ -46,15 +46,10 @@ FACTS: tuple[tuple[int, int], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class _Choice:
-    """What the command line says of a device.
-
-    Attributes:
-        name: Its name.
-        eds: Its EDS; None where the scan shall find it.
-    """
+    """What the command line says of a device."""
 
     name: str
-    eds: Eds | None = None
+    eds: Eds | None = None  # its EDS; None where the scan shall find it
 
 
 def given_devices(options: argparse.Namespace) -> list[NewDevice]:

@@ -56,22 +56,15 @@ PROFILES: dict[int, str] = {
 
 @dataclass(slots=True)
 class Found:
-    """A device that has sent a frame or answered.
-
-    Attributes:
-        node_id: Its node id.
-        state: NMT state of its heartbeat, None when it sends no heartbeat.
-        numbers: Its identity, by attribute of Identity; None where it refuses.
-        config: Its entry in bus.yml.
-        answers: It has answered an SDO.
-        twice: More answers came than it was asked for, so another device has its node id.
-    """
+    """A device that has sent a frame or answered."""
 
     node_id: int
-    state: NmtState | None = None
+    state: NmtState | None = None  # NMT state of its heartbeat, None when it sends no heartbeat
+    # its identity, by attribute of Identity; None where it refuses
     numbers: dict[str, int | None] = field(default_factory=dict)
-    config: NodeConfig | None = None
-    answers: bool = False
+    config: NodeConfig | None = None  # its entry in bus.yml
+    answers: bool = False  # it has answered an SDO
+    # more answers came than it was asked for, so another device has its node id
     twice: bool = False
 
     @property

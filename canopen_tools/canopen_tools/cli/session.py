@@ -29,15 +29,7 @@ QUIET_WAIT = 2.0  # [s]
 
 
 class Session:
-    """Listens to a bus and runs coroutines on it.
-
-    Attributes:
-        bus: The bus.
-        scheduler: Time.
-        states: NMT states by node id, from their heartbeats.
-        masters: Frames on the bus that only a master sends.
-        listeners: Called with every frame.
-    """
+    """Listens to a bus and runs coroutines on it."""
 
     def __init__(self, bus: Bus, config: BusConfig | None = None) -> None:
         """Begin to listen.
@@ -48,9 +40,9 @@ class Session:
         """
         self.bus = bus
         self.scheduler = Scheduler(monotonic())
-        self.states: dict[int, NmtState] = {}
-        self.masters: set[str] = set()
-        self.listeners: list[Callable[[Frame], None]] = []
+        self.states: dict[int, NmtState] = {}  # NMT states by node id, from their heartbeats
+        self.masters: set[str] = set()  # frames on the bus that only a master sends
+        self.listeners: list[Callable[[Frame], None]] = []  # called with every frame
         self._clients: dict[int, SdoClient] = {}
         self._sdo_times: dict[int, float] = {}
         self._master_id = config.master.node_id if config is not None else None

@@ -29,27 +29,16 @@ LISTEN = 0.15  # [s] before the first request; a master sends SYNC more often
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A device.
-
-    Attributes:
-        node_id: Its node id.
-        name: Its name in bus.yml, else ``the device``.
-        dictionary: Its objects; without a file what the standards describe.
-        described: A file describes them.
-        timeout: Longest time for an answer in [s].
-        given_timeout: It was given on the command line, and counts for every object.
-        bus: The bus, None without bus.yml.
-        config: The device in bus.yml, None when it is not there.
-    """
+    """A device."""
 
     node_id: int
-    name: str
-    dictionary: ObjectDictionary
-    described: bool
-    timeout: float
-    bus: BusConfig | None = None
-    config: NodeConfig | None = None
-    given_timeout: bool = False
+    name: str  # its name in bus.yml, else ``the device``
+    dictionary: ObjectDictionary  # its objects; without a file what the standards describe
+    described: bool  # a file describes them
+    timeout: float  # longest time for an answer in [s]
+    bus: BusConfig | None = None  # the bus, None without bus.yml
+    config: NodeConfig | None = None  # the device in bus.yml, None when it is not there
+    given_timeout: bool = False  # it was given on the command line, and counts for every object
 
     def write_timeout(self, entry: ObjectEntry) -> float:
         """Return the longest time for the answer to a write in [s]."""

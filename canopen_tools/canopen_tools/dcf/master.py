@@ -37,20 +37,12 @@ DUMMY_TYPES = (*range(0x01, 0x08), 0x10, *range(0x12, 0x17), *range(0x18, 0x1C))
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """What one direction of PDOs is called in the master's dictionary.
+    """What one direction of PDOs is called in the master's dictionary."""
 
-    Attributes:
-        own: The direction as the master sees it.
-        values: First object with the values.
-        remote_number: First object that holds whose PDO it is.
-        remote_mapping: First object with the mapping of the device.
-        access: Access of the values.
-    """
-
-    own: Direction
-    values: int
-    remote_number: int
-    remote_mapping: int
+    own: Direction  # the direction as the master sees it
+    values: int  # first object with the values
+    remote_number: int  # first object that holds whose PDO it is
+    remote_mapping: int  # first object with the mapping of the device
     access: AccessType
 
 

@@ -15,23 +15,14 @@ from ..eds_lint.lists import LISTS, proper_list
 
 @dataclass(frozen=True, slots=True)
 class DcfEntry:
-    """A VAR, or a sub-index.
-
-    Attributes:
-        name: ParameterName.
-        data_type: Type of the value.
-        access: Who may read or write.
-        default: DefaultValue as it is written, empty for none.
-        mappable: May be mapped into a PDO.
-        upload_file: File whose content the object has, empty for none.
-    """
+    """A VAR, or a sub-index."""
 
     name: str
     data_type: DataType
     access: AccessType
-    default: str = ''
-    mappable: bool = False
-    upload_file: str = ''
+    default: str = ''  # DefaultValue as it is written, empty for none
+    mappable: bool = False  # may be mapped into a PDO
+    upload_file: str = ''  # file whose content the object has, empty for none
 
     def lines(self) -> list[str]:
         """Return its keys."""
@@ -48,38 +39,24 @@ class DcfEntry:
 
 @dataclass(frozen=True, slots=True)
 class DcfRecord:
-    """A record or array with each sub-index written out; sub-index 0 is added.
-
-    Attributes:
-        name: ParameterName.
-        parts: Its sub-indices from 1.
-        code: RECORD or ARRAY.
-    """
+    """A record or array with each sub-index written out; sub-index 0 is added."""
 
     name: str
-    parts: Sequence[DcfEntry]
-    code: ObjectCode = ObjectCode.RECORD
+    parts: Sequence[DcfEntry]  # its sub-indices from 1
+    code: ObjectCode = ObjectCode.RECORD  # RECORD or ARRAY
 
 
 @dataclass(frozen=True, slots=True)
 class DcfArray:
-    """An array of equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2).
-
-    Attributes:
-        name: ParameterName.
-        data_type: Type of each value.
-        access: Who may read or write.
-        size: Highest sub-index.
-        values: Values by sub-index where they are not the default.
-        default: DefaultValue of all others, empty for none.
-    """
+    """An array of equal sub-indices, abbreviated with CompactSubObj (CiA 306-1, 4.6.3.2)."""
 
     name: str
     data_type: DataType
     access: AccessType
     size: int
+    # values by sub-index where they are not the default
     values: Mapping[int, str] = field(default_factory=dict)
-    default: str = ''
+    default: str = ''  # DefaultValue of all others, empty for none
 
 
 DcfObject = DcfEntry | DcfRecord | DcfArray

@@ -43,16 +43,12 @@ DIRECTED = (AccessType.READ_WRITE_TPDO, AccessType.READ_WRITE_RPDO)
 
 @dataclass(frozen=True, slots=True)
 class EdsReport:
-    """What was found in an EDS or DCF.
+    """What was found in an EDS or DCF."""
 
-    Attributes:
-        eds: Its content, None when the file could not be read.
-        errors: What contradicts the standard, and may make other tools refuse the file.
-        warnings: What is odd; beginning with what the tolerant reading passed over.
-    """
-
-    eds: Eds | None
+    eds: Eds | None  # its content, None when the file could not be read
+    # what contradicts the standard, and may make other tools refuse the file
     errors: tuple[Problem, ...]
+    # what is odd; beginning with what the tolerant reading passed over
     warnings: tuple[Problem, ...]
 
 

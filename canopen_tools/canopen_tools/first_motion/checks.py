@@ -22,21 +22,15 @@ LENGTH_MAX = 10.0  # [m] likewise
 
 @dataclass(frozen=True, slots=True)
 class AxisFacts:
-    """What a drive says about an axis.
+    """What a drive says about an axis."""
 
-    Attributes:
-        axis: Its configuration, with the scales that the master uses.
-        factors: Its factor group.
-        limits: Software limits 0x607D in [rad] or [m], the lower one first; None without.
-        speed_dev: 0x6081 for the motion, in velocity units of the drive; None in the modes 7, 8.
-        speed: What that is in [rad/s] or [m/s].
-    """
-
-    axis: DriveConfig
-    factors: FactorGroup
+    axis: DriveConfig  # its configuration, with the scales that the master uses
+    factors: FactorGroup  # its factor group
+    # software limits 0x607D in [rad] or [m], the lower one first; None without
     limits: tuple[float, float] | None
+    # 0x6081 for the motion, in velocity units of the drive; None in the modes 7, 8
     speed_dev: int | None
-    speed: float
+    speed: float  # what that is in [rad/s] or [m/s]
 
 
 def motion_mode(axis: DriveConfig) -> OperationMode:

@@ -26,14 +26,10 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupted(BaseException):  # as KeyboardInterrupt: no handler of errors may swallow it
-    """The program shall end.
-
-    Attributes:
-        number: The signal.
-    """
+    """The program shall end."""
 
     def __init__(self, number: int) -> None:
-        self.number = number
+        self.number = number  # the signal
         super().__init__(signal.Signals(number).name)
 
 

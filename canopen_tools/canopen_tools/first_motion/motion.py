@@ -48,42 +48,25 @@ RELEASES = {
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the command line says.
+    """What the command line says."""
 
-    Attributes:
-        path: The bus.yml.
-        joint: Name of the joint.
-        can: Name of the bus.
-        distance: How far it shall go.
-        speed: How fast, per second.
-        write: Change bus.yml without a question, where the cause is beyond doubt.
-    """
-
-    path: Path
-    joint: str
-    can: str
-    distance: Quantity
-    speed: Quantity
-    write: bool
+    path: Path  # the bus.yml
+    joint: str  # name of the joint
+    can: str  # name of the bus
+    distance: Quantity  # how far it shall go
+    speed: Quantity  # how fast, per second
+    write: bool  # change bus.yml without a question, where the cause is beyond doubt
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A motion that was made.
+    """A motion that was made."""
 
-    Attributes:
-        outcome: How it ended.
-        detail: The same in words.
-        before: Position before it, in [rad] or [m].
-        after: Position after it.
-        facts: What the drive says about itself.
-    """
-
-    outcome: Outcome
-    detail: str
-    before: float
-    after: float
-    facts: AxisFacts
+    outcome: Outcome  # how it ended
+    detail: str  # the same in words
+    before: float  # position before it, in [rad] or [m]
+    after: float  # position after it
+    facts: AxisFacts  # what the drive says about itself
 
 
 def move(request: Request, axis: DriveConfig, interruptions: Interruptions) -> Record | None:

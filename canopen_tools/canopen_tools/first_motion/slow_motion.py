@@ -20,10 +20,6 @@ class SlowMotion:
 
     Who permits is another thread. Should that stall, the joint stands within :data:`PERMIT` and
     :data:`RAMP_TIME`.
-
-    Attributes:
-        axes: Name of the drive.
-        problem: Why the drive was taken away; empty while it follows.
     """
 
     def __init__(self, axis: str, target: float, speed: float) -> None:
@@ -34,8 +30,8 @@ class SlowMotion:
             target: Where it ends, in [rad] or [m].
             speed: Largest speed per second.
         """
-        self.axes: Sequence[str] = (axis,)
-        self.problem = ''
+        self.axes: Sequence[str] = (axis,)  # name of the drive
+        self.problem = ''  # why the drive was taken away; empty while it follows
         self._target = target
         self._speed = speed
         self._position: float | None = None

@@ -25,24 +25,16 @@ class FrameKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """What a frame means.
+    """What a frame means."""
 
-    Attributes:
-        kind: Its service.
-        label: The service as a person writes it, e.g. ``TPDO1``; ``SDO >`` goes to the device and
-            ``SDO <`` comes from it.
-        node: Name of the device it comes from or goes to, empty when it is for all.
-        text: The content in words, empty when there is nothing to add.
-        is_alert: It reports something wrong: an emergency, an abort, an error.
-        node_id: Id of the device, 0 when it is for all.
-    """
-
-    kind: FrameKind
+    kind: FrameKind  # its service
+    # The service as a person writes it, e.g. ``TPDO1``; ``SDO >`` goes to the device and ``SDO <``
+    # comes from it.
     label: str
-    node: str = ''
-    text: str = ''
-    is_alert: bool = False
-    node_id: int = 0
+    node: str = ''  # name of the device it comes from or goes to, empty when it is for all
+    text: str = ''  # the content in words, empty when there is nothing to add
+    is_alert: bool = False  # it reports something wrong: an emergency, an abort, an error
+    node_id: int = 0  # id of the device, 0 when it is for all
 
     def __str__(self) -> str:
         """Write it in one line."""

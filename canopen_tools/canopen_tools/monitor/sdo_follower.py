@@ -33,15 +33,10 @@ from .value_text import data_text
 
 @dataclass(frozen=True, slots=True)
 class SdoText:
-    """A frame of a transfer in words.
+    """A frame of a transfer in words."""
 
-    Attributes:
-        text: The words.
-        is_abort: Somebody ended the transfer.
-    """
-
-    text: str
-    is_abort: bool = False
+    text: str  # the words
+    is_abort: bool = False  # somebody ended the transfer
 
 
 class _Transfer:

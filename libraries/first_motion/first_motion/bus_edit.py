@@ -20,17 +20,11 @@ NOT_DEVICES = frozenset({'options', 'master', 'defaults', 'nodes'})
 
 @dataclass(frozen=True, slots=True)
 class _Splice:
-    """A piece of text in the place of another one.
+    """A piece of text in the place of another one."""
 
-    Attributes:
-        start: Where the old one begins.
-        end: Where it ends.
-        text: The new one.
-    """
-
-    start: int
-    end: int
-    text: str
+    start: int  # where the old one begins
+    end: int  # where it ends
+    text: str  # the new one
 
 
 def edited(

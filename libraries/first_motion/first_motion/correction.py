@@ -18,19 +18,12 @@ VELOCITIES = 'scale_vel_to_dev is in other units than increments per second: che
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """Keys of a device to change.
+    """Keys of a device to change."""
 
-    Attributes:
-        values: New values by key.
-        before: The values that count now, by key.
-        reason: Why, in a line.
-        notes: What else to look at.
-    """
-
-    values: Mapping[str, float | bool]
-    before: Mapping[str, float | bool]
-    reason: str
-    notes: tuple[str, ...]
+    values: Mapping[str, float | bool]  # new values by key
+    before: Mapping[str, float | bool]  # the values that count now, by key
+    reason: str  # why, in a line
+    notes: tuple[str, ...]  # what else to look at
 
 
 def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Correction:

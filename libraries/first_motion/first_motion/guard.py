@@ -65,24 +65,16 @@ class Outcome(Enum):
 
 @dataclass(frozen=True, slots=True)
 class MotionPlan:
-    """A small motion of a joint.
+    """A small motion of a joint."""
 
-    Attributes:
-        start: Where it stands.
-        distance: How far it shall go; negative for the other way.
-        speed: How fast at most, per second.
-        increment: Size of an increment of the drive.
-        following_limit: Following error that ends it; infinite where the drive alone makes the
-            path, and its set-point is the target.
-        others: Where the other joints stand.
-    """
-
-    start: float
-    distance: float
-    speed: float
-    increment: float
+    start: float  # where it stands
+    distance: float  # how far it shall go; negative for the other way
+    speed: float  # how fast at most, per second
+    increment: float  # size of an increment of the drive
+    # following error that ends it; infinite where the drive alone makes the path, and its
+    # set-point is the target
     following_limit: float = math.inf
-    others: Mapping[str, float] = field(default_factory=dict)
+    others: Mapping[str, float] = field(default_factory=dict)  # where the other joints stand
 
     def __post_init__(self) -> None:
         """Refuse what cannot be guarded: nothing is beyond a limit that is not a number.
@@ -111,31 +103,17 @@ class MotionPlan:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What the drives report.
+    """What the drives report."""
 
-    Attributes:
-        position: Of the joint.
-        following_error: Of the joint.
-        problem: Why it cannot be moved on, in words; else empty.
-        others: Positions of the other joints, as far as they are known.
-    """
-
-    position: float
-    following_error: float = 0.0
-    problem: str = ''
+    position: float  # of the joint
+    following_error: float = 0.0  # of the joint
+    problem: str = ''  # why it cannot be moved on, in words; else empty
+    # positions of the other joints, as far as they are known
     others: Mapping[str, float] = field(default_factory=dict)
 
 
 class MotionGuard:
-    """Decides, sample by sample, whether the joint may move on.
-
-    Attributes:
-        plan: The motion.
-        outcome: How it ended.
-        detail: The same with figures, for a person; empty while it runs.
-        travelled: Way of the joint so far, positive in the direction commanded.
-        needs_release: The key has to be released before it counts again.
-    """
+    """Decides, sample by sample, whether the joint may move on."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
         """Begin at rest, and without a key.
@@ -144,11 +122,12 @@ class MotionGuard:
             plan: The motion.
             now: Time.
         """
-        self.plan = plan
-        self.outcome = Outcome.RUNNING
-        self.detail = ''
-        self.travelled = 0.0
+        self.plan = plan  # the motion
+        self.outcome = Outcome.RUNNING  # how it ended
+        self.detail = ''  # the same with figures, for a person; empty while it runs
+        self.travelled = 0.0  # way of the joint so far, positive in the direction commanded
         self._moving = self._has_begun = False
+        # the key has to be released before it counts again
         self.needs_release = True  # a key that is held already was pressed for something else
         self._last = now
         self._idle_since = now

@@ -44,15 +44,10 @@ UNITS: dict[str, tuple[JointKind, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A distance or speed that a person has written.
+    """A distance or speed that a person has written."""
 
-    Attributes:
-        kind: What the joint does.
-        value: In [rad] or [m], or those per second.
-    """
-
-    kind: JointKind
-    value: float
+    kind: JointKind  # what the joint does
+    value: float  # in [rad] or [m], or those per second
 
 
 def read_quantity(text: str, kind: JointKind = JointKind.TURNS) -> Quantity:

@@ -45,17 +45,11 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Why a scale is wrong by a factor.
+    """Why a scale is wrong by a factor."""
 
-    Attributes:
-        factor: Seen over reported.
-        text: The cause in words.
-        kinds: Joints that it can have.
-    """
-
-    factor: float
-    text: str
-    kinds: frozenset[JointKind] = frozenset(JointKind)
+    factor: float  # seen over reported
+    text: str  # the cause in words
+    kinds: frozenset[JointKind] = frozenset(JointKind)  # joints that it can have
 
 
 _TURNS, _SLIDES = frozenset({JointKind.TURNS}), frozenset({JointKind.SLIDES})
@@ -78,51 +72,33 @@ CAUSES: tuple[Cause, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class DriveFacts:
-    """What the drive says about its increments; None where it does not.
+    """What the drive says about its increments; None where it does not."""
 
-    Attributes:
-        scale: Increments per unit that the master uses; negative for the other direction.
-        gear: Turns of the motor per turn of the shaft (0x6091).
-        factor_scale: Increments per rad by its factor group (0x608F, 0x6091, 0x6092).
-    """
-
-    scale: float
-    gear: float | None = None
+    scale: float  # increments per unit that the master uses; negative for the other direction
+    gear: float | None = None  # turns of the motor per turn of the shaft (0x6091)
+    # increments per rad by its factor group (0x608F, 0x6091, 0x6092)
     factor_scale: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a person saw.
+    """What a person saw."""
 
-    Attributes:
-        direction: 1, -1, or 0 for no motion.
-        distance: How far about, in [rad] or [m]; None for what was expected.
-        other_joint: Another joint has moved.
-    """
-
-    direction: int
-    distance: float | None = None
-    other_joint: bool = False
+    direction: int  # 1, -1, or 0 for no motion
+    distance: float | None = None  # how far about, in [rad] or [m]; None for what was expected
+    other_joint: bool = False  # another joint has moved
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What is concluded.
+    """What is concluded."""
 
-    Attributes:
-        verdict: The conclusion.
-        sign: -1 where the scale has the wrong sign, else 1.
-        measured: Seen over reported, without the sign; 1 where no distance was said.
-        causes: Likely causes of a wrong scale, the nearest first; empty when no usual one fits.
-        remedy: What else to look at, in words; empty where a change of bus.yml corrects it.
-    """
-
-    verdict: Verdict
-    sign: int = 1
-    measured: float = 1.0
+    verdict: Verdict  # the conclusion
+    sign: int = 1  # -1 where the scale has the wrong sign, else 1
+    measured: float = 1.0  # seen over reported, without the sign; 1 where no distance was said
+    # likely causes of a wrong scale, the nearest first; empty when no usual one fits
     causes: tuple[Cause, ...] = field(default=())
-    remedy: str = ''
+    remedy: str = ''  # what else to look at, in words; empty where a change of bus.yml corrects it
 
 
 def judge(

@@ -12,27 +12,16 @@ SAME = 1e-6  # share by which two scales may differ and still be the same
 
 @dataclass(frozen=True, slots=True)
 class AxisScales:
-    """How an axis counts: keys of bus.yml by their names, with the values that the master uses.
+    """How an axis counts: keys of bus.yml by their names, with the values that the master uses."""
 
-    Attributes:
-        scale_from_factor_group: The drive says how it counts (0x608F, 0x6091, 0x6092, 0x6096).
-        scale_pos_to_dev: Increments per [rad] or [m].
-        scale_pos_from_dev: [rad] or [m] per increment.
-        scale_vel_to_dev: Velocity units of the drive per [rad/s] or [m/s].
-        scale_vel_from_dev: [rad/s] or [m/s] per velocity unit of the drive.
-        scale_eff_to_dev: Torque units of the drive per unit of effort.
-        scale_eff_from_dev: Units of effort per torque unit of the drive.
-        offset_pos_from_dev: Added to a position after scaling, in [rad] or [m].
-    """
-
-    scale_from_factor_group: bool
-    scale_pos_to_dev: float
-    scale_pos_from_dev: float
-    scale_vel_to_dev: float
-    scale_vel_from_dev: float
-    scale_eff_to_dev: float
-    scale_eff_from_dev: float
-    offset_pos_from_dev: float
+    scale_from_factor_group: bool  # the drive says how it counts (0x608F, 0x6091, 0x6092, 0x6096)
+    scale_pos_to_dev: float  # increments per [rad] or [m]
+    scale_pos_from_dev: float  # [rad] or [m] per increment
+    scale_vel_to_dev: float  # velocity units of the drive per [rad/s] or [m/s]
+    scale_vel_from_dev: float  # [rad/s] or [m/s] per velocity unit of the drive
+    scale_eff_to_dev: float  # torque units of the drive per unit of effort
+    scale_eff_from_dev: float  # units of effort per torque unit of the drive
+    offset_pos_from_dev: float  # added to a position after scaling, in [rad] or [m]
 
     @classmethod
     def of(cls, source: object) -> AxisScales:

@@ -52,29 +52,17 @@ HeldConsumers = Mapping[int, int | None]
 
 @dataclass(frozen=True, slots=True)
 class BootWrite:
-    """An object that is written to a device at boot.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        data: Its value as an SDO carries it.
-        key: Key of bus.yml, or file, that it comes from.
-        requested: bus.yml has it; a refusal of other writes is no error.
-        mask: Bits that count, None for all; the device keeps the others.
-        temporary: It makes room for the writes that follow, and does not stay.
-        unless_default: An exported DCF leaves it out where the EDS has it as default.
-        fixed: The device has it for good, so it is not written.
-    """
+    """An object that is written to a device at boot."""
 
     index: int
     subindex: int
-    data: bytes
-    key: str
-    requested: bool = True
-    mask: int | None = None
-    temporary: bool = False
-    unless_default: bool = False
-    fixed: bool = False
+    data: bytes  # its value as an SDO carries it
+    key: str  # key of bus.yml, or file, that it comes from
+    requested: bool = True  # bus.yml has it; a refusal of other writes is no error
+    mask: int | None = None  # bits that count, None for all; the device keeps the others
+    temporary: bool = False  # it makes room for the writes that follow, and does not stay
+    unless_default: bool = False  # an exported DCF leaves it out where the EDS has it as default
+    fixed: bool = False  # the device has it for good, so it is not written
 
     @property
     def address(self) -> tuple[int, int]:

@@ -26,134 +26,87 @@ RETRY_FACTOR = 3
 
 @dataclass(frozen=True, slots=True)
 class SourceLocation:
-    """Where something stands in bus.yml.
+    """Where something stands in bus.yml."""
 
-    Attributes:
-        line: Line, from 1; 0 when it is not known.
-        key: Path of the key, such as ``defaults.tpdo.1.mapping``.
-    """
-
-    line: int = 0
-    key: str = ''
+    line: int = 0  # line, from 1; 0 when it is not known
+    key: str = ''  # path of the key, such as ``defaults.tpdo.1.mapping``
 
 
 @dataclass(frozen=True, slots=True)
 class PdoConfig:
-    """One PDO of a device, named from the device's side.
+    """One PDO of a device, named from the device's side."""
 
-    Attributes:
-        number: 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on.
-        enabled: The PDO exists (bit 31 of its COB-ID is clear).
-        cob_id: Its 11-bit CAN identifier; 0 when it is disabled and has none.
-        transmission: Transmission type 0 to 255 (CiA 301, tables 69 and 71).
-        inhibit_time: Shortest time between two transmissions in [s]; None leaves the device's.
-        event_time: Event timer of a TPDO, deadline of an RPDO in [s]; None leaves the device's.
-        sync_start: SYNC counter value at which it starts; None leaves the device's.
-        mapping: The mapped objects.
-        configured: bus.yml names this PDO, so the master writes it at boot.
-        fixed_mapping: The device's mapping is read-only (and equal to ``mapping``).
-        assumed: The EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one.
-    """
-
-    number: int
-    enabled: bool
-    cob_id: int
-    transmission: int
+    number: int  # 1 for the objects 0x1400/0x1600 or 0x1800/0x1A00, and so on
+    enabled: bool  # the PDO exists (bit 31 of its COB-ID is clear)
+    cob_id: int  # its 11-bit CAN identifier; 0 when it is disabled and has none
+    transmission: int  # transmission type 0 to 255 (CiA 301, tables 69 and 71)
+    # shortest time between two transmissions in [s]; None leaves the device's
     inhibit_time: float | None = None
+    # event timer of a TPDO, deadline of an RPDO in [s]; None leaves the device's
     event_time: float | None = None
+    # SYNC counter value at which it starts; None leaves the device's
     sync_start: int | None = None
     mapping: tuple[MappedObject, ...] = ()
-    configured: bool = False
-    fixed_mapping: bool = False
+    configured: bool = False  # bus.yml names this PDO, so the master writes it at boot
+    fixed_mapping: bool = False  # the device's mapping is read-only (and equal to ``mapping``)
+    # the EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one
     assumed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class SdoWrite:
-    """An object to be written at boot.
-
-    Attributes:
-        index: Object index.
-        subindex: Sub-index.
-        data: The value as it is sent.
-        timeout: How long the device may take for it in [s]; None as for any object.
-        location: Where bus.yml has it.
-    """
+    """An object to be written at boot."""
 
     index: int
     subindex: int
-    data: bytes
+    data: bytes  # the value as it is sent
+    # how long the device may take for it in [s]; None as for any object
     timeout: float | None = None
+    # where bus.yml has it
     location: SourceLocation = field(default=SourceLocation(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class NodeConfig:
-    """A device of the bus.
+    """A device of the bus."""
 
-    Attributes:
-        name: Key in bus.yml; also the name of its ROS node.
-        node_id: CANopen node id, 1 to 127.
-        driver: Driver class as bus.yml names it, e.g. ``ros2_canopen::Cia402Driver``.
-        namespace: ROS namespace, empty for none.
-        remappings: ROS remappings, from name to name.
-        eds: The EDS or DCF file.
-        dictionary: Its objects, defaults resolved for this node id.
-        identity: Expected identity.
-        heartbeat_producer: Period of the device's heartbeat in [s], as bus.yml or else the EDS
-            says; 0 for none.
-        heartbeat_timeout: How long the master waits for a heartbeat in [s]; 0 for no supervision.
-        heartbeat_consumer: The device shall watch the master's heartbeat; it then has 0x1016 and
-            the master sends one.
-        guard_time: Period of node guarding in [s]; 0 for none.
-        life_time_factor: Guard times after which either side takes the other for lost.
-        retry_factor: Missing answers after which a guarded device counts as lost.
-        boot: The master checks and configures the device; false leaves it alone, and it is taken
-            as it is.
-        mandatory: The network is not operational without it.
-        reset_communication: The device may be reset at boot; false keeps a running one alive.
-        restore_configuration: Sub-index of 0x1011 by which defaults are restored at boot, 0 for
-            none.
-        sdo_timeout: How long an SDO answer may take in [s].
-        boot_timeout: How long one boot attempt waits for the device in [s].
-        poll_period: How often objects that no PDO carries are read in [s] (``period`` of bus.yml).
-        tpdos: All TPDOs of the device, by ascending number.
-        rpdos: All RPDOs of the device, by ascending number.
-        sdo_writes: ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the
-            order of writing.
-        parameter_writes: What its DCF wants written before all else: ParameterValues that are
-            not the defaults.
-        axes: The axes of a CiA 402 drive, by ascending channel.
-        line: Line of bus.yml at which the node begins.
-    """
-
-    name: str
+    name: str  # key in bus.yml; also the name of its ROS node
     node_id: int
-    driver: str
+    driver: str  # as bus.yml names it, e.g. ``ros2_canopen::Cia402Driver``
     eds: Path
-    dictionary: ObjectDictionary
-    namespace: str = ''
-    remappings: dict[str, str] = field(default_factory=dict)
+    dictionary: ObjectDictionary  # its objects, defaults resolved for this node id
+    namespace: str = ''  # ROS namespace, empty for none
+    remappings: dict[str, str] = field(default_factory=dict)  # ROS remappings, from name to name
     identity: Identity = ANY_DEVICE
+    # period of the device's heartbeat in [s], as bus.yml or else the EDS says; 0 for none
     heartbeat_producer: float = 0.0
+    # how long the master waits for a heartbeat in [s]; 0 for no supervision
     heartbeat_timeout: float = 0.0
+    # the device shall watch the master's heartbeat; it then has 0x1016 and the master sends one
     heartbeat_consumer: bool = False
-    guard_time: float = 0.0
-    life_time_factor: int = 0
-    retry_factor: int = RETRY_FACTOR
+    guard_time: float = 0.0  # period of node guarding in [s]; 0 for none
+    life_time_factor: int = 0  # guard times after which either side takes the other for lost
+    retry_factor: int = RETRY_FACTOR  # missing answers after which a guarded device counts as lost
+    # the master checks and configures the device; false leaves it alone, and it is taken as it is
     boot: bool = True
-    mandatory: bool = False
+    mandatory: bool = False  # the network is not operational without it
+    # the device may be reset at boot; false keeps a running one alive
     reset_communication: bool = True
+    # sub-index of 0x1011 by which defaults are restored at boot, 0 for none
     restore_configuration: int = 0
-    sdo_timeout: float = SDO_TIMEOUT
-    boot_timeout: float = BOOT_TIMEOUT
+    sdo_timeout: float = SDO_TIMEOUT  # how long an SDO answer may take in [s]
+    boot_timeout: float = BOOT_TIMEOUT  # how long one boot attempt waits for the device in [s]
+    # how often objects that no PDO carries are read in [s] (``period`` of bus.yml)
     poll_period: float = POLL_PERIOD
-    tpdos: tuple[PdoConfig, ...] = ()
-    rpdos: tuple[PdoConfig, ...] = ()
+    tpdos: tuple[PdoConfig, ...] = ()  # all TPDOs of the device, by ascending number
+    rpdos: tuple[PdoConfig, ...] = ()  # all RPDOs of the device, by ascending number
+    # ``time_cob_id``, ``error_behavior`` and the list ``sdo`` of bus.yml, in the order of writing
     sdo_writes: tuple[SdoWrite, ...] = ()
+    # what its DCF wants written before all else: ParameterValues that are not the defaults
     parameter_writes: tuple[SdoWrite, ...] = ()
+    # the axes of a CiA 402 drive, by ascending channel
     axes: tuple[DriveConfig, ...] = (DriveConfig(),)
-    line: int = 0
+    line: int = 0  # line of bus.yml at which the node begins
 
     def write_of(self, index: int, subindex: int) -> SdoWrite | None:
         """Return the last write of an object in bus.yml."""
@@ -244,21 +197,14 @@ class NodeConfig:
 
 @dataclass(frozen=True, slots=True)
 class BusConfig:
-    """A whole bus.
+    """A whole bus."""
 
-    Attributes:
-        file: The bus.yml that it was read from.
-        master: The master.
-        nodes: The devices in the order of the file.
-        warnings: What was odd but could be understood.
-        locations: Where each key stands, by the names that lead to it: ``('master', 'node_id')``,
-            ``('joint1', 'tpdo', '1', 'mapping')``; defaults belong to every device.
-    """
-
-    file: Path
+    file: Path  # the bus.yml that it was read from
     master: MasterConfig
-    nodes: tuple[NodeConfig, ...]
-    warnings: tuple[Problem, ...] = ()
+    nodes: tuple[NodeConfig, ...]  # the devices in the order of the file
+    warnings: tuple[Problem, ...] = ()  # what was odd but could be understood
+    # where each key stands, by the names that lead to it: ``('master', 'node_id')``, ``('joint1',
+    # 'tpdo', '1', 'mapping')``; defaults belong to every device
     locations: Mapping[tuple[str, ...], SourceLocation] = field(
         default_factory=dict, compare=False
     )

@@ -40,27 +40,17 @@ ACCELERATION_ADDRESSES: tuple[tuple[int, int], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class FactorGroup:
-    """Ratios and units of a drive, None where it has no such object.
+    """Ratios and units of a drive, None where it has no such object."""
 
-    Attributes:
-        resolution: Encoder increments per revolution of the motor (0x608F).
-        gear: Revolutions of the motor per revolution of the shaft (0x6091).
-        feed: Position units per revolution of the shaft (0x6092).
-        velocity_factor: Velocity units per position unit per second (0x6096).
-        acceleration_factor: Acceleration units per velocity unit per second (0x6097).
-        position_unit: What 0x60A8 names.
-        velocity_unit: What 0x60A9 names.
-        acceleration_unit: What 0x60AA names.
-    """
-
-    resolution: float | None = None
-    gear: float | None = None
-    feed: float | None = None
-    velocity_factor: float | None = None
+    resolution: float | None = None  # encoder increments per revolution of the motor (0x608F)
+    gear: float | None = None  # revolutions of the motor per revolution of the shaft (0x6091)
+    feed: float | None = None  # position units per revolution of the shaft (0x6092)
+    velocity_factor: float | None = None  # velocity units per position unit per second (0x6096)
+    # acceleration units per velocity unit per second (0x6097)
     acceleration_factor: float | None = None
-    position_unit: NamedUnit | None = None
-    velocity_unit: NamedUnit | None = None
-    acceleration_unit: NamedUnit | None = None
+    position_unit: NamedUnit | None = None  # what 0x60A8 names
+    velocity_unit: NamedUnit | None = None  # what 0x60A9 names
+    acceleration_unit: NamedUnit | None = None  # what 0x60AA names
 
     @classmethod
     def read(cls, value: Callable[[int, int], int | None]) -> FactorGroup:

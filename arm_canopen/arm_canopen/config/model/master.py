@@ -13,64 +13,43 @@ HEARTBEAT_PERIOD = 0.2  # [s] not 0: by it alone devices notice that the master 
 
 @dataclass(frozen=True, slots=True)
 class MasterConfig:
-    """The master's own settings.
-
-    Attributes:
-        node_id: CANopen node id, 1 to 127.
-        name: Key in bus.yml; also the name of its ROS node.
-        driver: Driver class as bus.yml names it.
-        namespace: ROS namespace, empty for none.
-        remappings: ROS remappings, from name to name.
-        bitrate: Bit rate in [bit/s], for the bus load.
-        sync_period: SYNC period in [s]; 0 sends none.
-        sync_window: Time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit.
-        sync_overflow: Highest SYNC counter value, 0 for a SYNC without counter.
-        time_cob_id: 0x1012 of the master: CAN identifier of TIME, with bit 30 when it sends it.
-        time_period: Period of TIME in [s]; 0 sends none.
-        cycle_period: Period of the control cycle in [s]: that of SYNC, without one the shortest
-            ``period`` of a device.
-        heartbeat_producer: Period of the master's own heartbeat in [s]; 0 for none.
-        heartbeat_timeout: How long a device that watches the master waits for its heartbeat in
-            [s], for 0x1016; 0 when there is none.
-        start: The master runs its cycle from the start; false waits for NMT start with SYNC and
-            RPDOs.
-        start_nodes: The master starts devices when they are booted.
-        start_all_nodes: Devices are started by one broadcast, when all mandatory ones are booted.
-        reset_all_nodes: The loss of a mandatory device resets all devices.
-        stop_all_nodes: The loss of a mandatory device stops all devices.
-        nmt_inhibit_time: Shortest time between two NMT commands in [s].
-        emcy_inhibit_time: Shortest time between two EMCY frames of the master in [s].
-        error_behavior: 0x1029 of the master by sub-index: what it does when it loses a device.
-        identity: 0x1018 of the master, for the files of other tools.
-        boot_time: How long mandatory devices may take to boot in [s]; 0 for no limit.
-        boot_timeout: SDO timeout during boot in [s].
-    """
+    """The master's own settings."""
 
     node_id: int
-    name: str = 'master'
-    driver: str = 'ros2_canopen::MasterDriver'
-    namespace: str = ''
-    remappings: dict[str, str] = field(default_factory=dict)
-    bitrate: int = 1_000_000
-    sync_period: float = 0.0
+    name: str = 'master'  # key in bus.yml; also the name of its ROS node
+    driver: str = 'ros2_canopen::MasterDriver'  # driver class as bus.yml names it
+    namespace: str = ''  # ROS namespace, empty for none
+    remappings: dict[str, str] = field(default_factory=dict)  # ROS remappings, from name to name
+    bitrate: int = 1_000_000  # bit rate in [bit/s], for the bus load
+    sync_period: float = 0.0  # SYNC period in [s]; 0 sends none
+    # time after SYNC within which synchronous PDOs are sent in [s]; 0 for no limit
     sync_window: float = 0.0
-    sync_overflow: int = 0
+    sync_overflow: int = 0  # highest SYNC counter value, 0 for a SYNC without counter
+    # 0x1012 of the master: CAN identifier of TIME, with bit 30 when it sends it
     time_cob_id: int = 0x100
-    time_period: float = 0.0
+    time_period: float = 0.0  # period of TIME in [s]; 0 sends none
+    # period of the control cycle in [s]: that of SYNC, without one the shortest ``period`` of a
+    # device
     cycle_period: float = 0.01
+    # period of the master's own heartbeat in [s]; 0 for none
     heartbeat_producer: float = HEARTBEAT_PERIOD
+    # how long a device that watches the master waits for its heartbeat in [s], for 0x1016; 0 when
+    # there is none
     heartbeat_timeout: float = 0.0
+    # the master runs its cycle from the start; false waits for NMT start with SYNC and RPDOs
     start: bool = True
-    start_nodes: bool = True
+    start_nodes: bool = True  # the master starts devices when they are booted
+    # devices are started by one broadcast, when all mandatory ones are booted
     start_all_nodes: bool = False
-    reset_all_nodes: bool = False
-    stop_all_nodes: bool = False
-    nmt_inhibit_time: float = 0.0
-    emcy_inhibit_time: float = 0.0
+    reset_all_nodes: bool = False  # the loss of a mandatory device resets all devices
+    stop_all_nodes: bool = False  # the loss of a mandatory device stops all devices
+    nmt_inhibit_time: float = 0.0  # shortest time between two NMT commands in [s]
+    emcy_inhibit_time: float = 0.0  # shortest time between two EMCY frames of the master in [s]
+    # 0x1029 of the master by sub-index: what it does when it loses a device
     error_behavior: dict[int, int] = field(default_factory=dict)
-    identity: Identity = ANY_DEVICE
-    boot_time: float = 0.0
-    boot_timeout: float = 2.0
+    identity: Identity = ANY_DEVICE  # 0x1018 of the master, for the files of other tools
+    boot_time: float = 0.0  # how long mandatory devices may take to boot in [s]; 0 for no limit
+    boot_timeout: float = 2.0  # SDO timeout during boot in [s]
 
     @property
     def is_lifecycle(self) -> bool:

@@ -14,21 +14,14 @@ from ...standard.objects import Index, PDO_COUNT_MAX
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """One of the two directions, seen from the device.
+    """One of the two directions, seen from the device."""
 
-    Attributes:
-        name: Key in bus.yml.
-        communication: Index of the first communication parameter.
-        mapping: Index of the first mapping parameter.
-        default_cob_id: Pre-defined COB-ID of PDO 1 to 4 by number and node id.
-        mappable: Whether an object may be mapped in this direction.
-    """
-
-    name: str
-    communication: int
-    mapping: int
+    name: str  # key in bus.yml
+    communication: int  # index of the first communication parameter
+    mapping: int  # index of the first mapping parameter
+    # pre-defined COB-ID of PDO 1 to 4 by number and node id
     default_cob_id: Callable[[int, int], int]
-    mappable: Callable[[ObjectEntry], bool]
+    mappable: Callable[[ObjectEntry], bool]  # whether an object may be mapped in this direction
 
     @property
     def title(self) -> str:

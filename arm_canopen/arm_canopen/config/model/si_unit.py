@@ -24,18 +24,12 @@ SQUARED_TIMES: dict[int, tuple[float, str]] = {0x57: (1.0, 's2')}
 
 @dataclass(frozen=True, slots=True)
 class LengthUnit:
-    """A unit of a position.
+    """A unit of a position."""
 
-    Attributes:
-        size: In [rad] or [m].
-        name: Its name.
-        slides: It is one of a joint that slides.
-        counts: It is an increment: the size is one of these, and nobody knows how far that is.
-    """
-
-    size: float
+    size: float  # in [rad] or [m]
     name: str
-    slides: bool = False
+    slides: bool = False  # it is one of a joint that slides
+    # it is an increment: the size is one of these, and nobody knows how far that is
     counts: bool = False
 
 
@@ -56,19 +50,12 @@ RATES = {0xC0: LengthUnit(2.0 * math.pi / 60.0, 'rpm')}
 
 @dataclass(frozen=True, slots=True)
 class NamedUnit:
-    """What one unit of a drive is.
+    """What one unit of a drive is."""
 
-    Attributes:
-        size: In [rad], [m] or [inc], or per second.
-        text: In words.
-        slides: It is one of a joint that slides.
-        counts: It is made of increments.
-    """
-
-    size: float
-    text: str
-    slides: bool = False
-    counts: bool = False
+    size: float  # in [rad], [m] or [inc], or per second
+    text: str  # in words
+    slides: bool = False  # it is one of a joint that slides
+    counts: bool = False  # it is made of increments
 
 
 RPM = NamedUnit(2.0 * math.pi / 60.0, 'rpm')

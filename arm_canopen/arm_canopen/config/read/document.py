@@ -41,19 +41,12 @@ class ScalarKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A single value.
+    """A single value."""
 
-    Attributes:
-        place: Where it is written.
-        text: Its text, without quotes.
-        kind: What YAML takes it for.
-        quoted: It is written in quotes or as a block.
-    """
-
-    place: Place
-    text: str
-    kind: ScalarKind
-    quoted: bool = False
+    place: Place  # where it is written
+    text: str  # its text, without quotes
+    kind: ScalarKind  # what YAML takes it for
+    quoted: bool = False  # it is written in quotes or as a block
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +59,10 @@ class YamlList:
 
 @dataclass(frozen=True, slots=True)
 class YamlMap:
-    """A mapping, merge keys resolved.
+    """A mapping, merge keys resolved."""
 
-    Attributes:
-        place: Place of the key that it belongs to.
-        entries: Values by the text of their key; whole numbers as keys are written in decimal.
-    """
-
-    place: Place
+    place: Place  # place of the key that it belongs to
+    # values by the text of their key; whole numbers as keys are written in decimal
     entries: dict[str, Item] = field(default_factory=dict)
 
 
@@ -82,15 +71,10 @@ Item: TypeAlias = Scalar | YamlList | YamlMap
 
 @dataclass(frozen=True, slots=True)
 class DocumentKind:
-    """The messages for a kind of file that is wrong as a whole.
+    """The messages for a kind of file that is wrong as a whole."""
 
-    Attributes:
-        name: What it is called.
-        beginning: What its top level is to look like.
-    """
-
-    name: str
-    beginning: str
+    name: str  # what it is called
+    beginning: str  # what its top level is to look like
 
 
 BUS_YML = DocumentKind(

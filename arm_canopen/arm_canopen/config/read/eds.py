@@ -24,23 +24,15 @@ TOLERATED = 'the file is read all the same; correct it when a value is missing'
 
 @dataclass(frozen=True, slots=True)
 class Eds:
-    """The content of an EDS or DCF.
-
-    Attributes:
-        path: The file.
-        dictionary: Its objects; defaults with ``$NODEID`` are still node-relative.
-        node_id: Node id of a DCF, None in an EDS.
-        dummy_types: Data types that may stand in an RPDO as a gap.
-        warnings: What was odd but could be understood.
-        numbers: VendorNumber, ProductNumber and RevisionNumber of [DeviceInfo]; 0 where it has
-            none.
-    """
+    """The content of an EDS or DCF."""
 
     path: Path
-    dictionary: ObjectDictionary
-    node_id: int | None = None
+    dictionary: ObjectDictionary  # its objects; defaults with ``$NODEID`` are still node-relative
+    node_id: int | None = None  # node id of a DCF, None in an EDS
+    # data types that may stand in an RPDO as a gap
     dummy_types: frozenset[int] = frozenset(DUMMY_TYPES)
-    warnings: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()  # what was odd but could be understood
+    # VendorNumber, ProductNumber and RevisionNumber of [DeviceInfo]; 0 where it has none
     numbers: tuple[int, int, int] = (0, 0, 0)
 
 

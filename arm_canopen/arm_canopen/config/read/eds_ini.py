@@ -17,30 +17,19 @@ COMMENT_MARKS = (';', '#')
 
 @dataclass(frozen=True, slots=True)
 class IniValue:
-    """The text right of an equals sign.
+    """The text right of an equals sign."""
 
-    Attributes:
-        text: The text without blanks around it.
-        line: Its line, from 1.
-    """
-
-    text: str
-    line: int
+    text: str  # the text without blanks around it
+    line: int  # its line, from 1
 
 
 @dataclass(slots=True)
 class IniSection:
-    """A section and its values.
+    """A section and its values."""
 
-    Attributes:
-        title: Name as the file writes it.
-        line: Line of its head, from 1.
-        values: Values by lower-case key.
-    """
-
-    title: str
-    line: int
-    values: dict[str, IniValue] = field(default_factory=dict)
+    title: str  # name as the file writes it
+    line: int  # line of its head, from 1
+    values: dict[str, IniValue] = field(default_factory=dict)  # values by lower-case key
 
     def text(self, key: str) -> str:
         """Return the text of a lower-case key, empty when it is missing or empty."""
@@ -55,14 +44,11 @@ class IniSection:
 
 @dataclass(slots=True)
 class IniFile:
-    """All sections of a file.
+    """All sections of a file."""
 
-    Attributes:
-        sections: Sections by name in lower case without blanks.
-        oddities: Line and description of everything that had to be skipped or guessed.
-    """
-
+    # sections by name in lower case without blanks
     sections: dict[str, IniSection] = field(default_factory=dict)
+    # line and description of everything that had to be skipped or guessed
     oddities: list[tuple[int, str]] = field(default_factory=list)
 
 

@@ -35,13 +35,10 @@ COLLECTIONS = (ObjectCode.ARRAY, ObjectCode.RECORD, ObjectCode.DEFSTRUCT)
 
 
 class ObjectReader:
-    """Reads all objects of one file.
-
-    Attributes:
-        oddities: Line, key and description of everything that had to be skipped or guessed.
-    """
+    """Reads all objects of one file."""
 
     def __init__(self, ini: IniFile) -> None:
+        # line, key and description of everything that had to be skipped or guessed
         self.oddities: list[tuple[int, str, str]] = []
         self._ini = ini
         self._objects: dict[int, IniSection] = {}

@@ -26,15 +26,10 @@ BOOLEAN_WORDS = {'true': True, 'false': False}
 
 @dataclass(frozen=True, slots=True)
 class EdsValue:
-    """A value as an EDS gives it.
+    """A value as an EDS gives it."""
 
-    Attributes:
-        value: The value; of a sum with ``$NODEID`` all but the node id.
-        node_relative: The node id is to be added.
-    """
-
-    value: Value
-    node_relative: bool = False
+    value: Value  # the value; of a sum with ``$NODEID`` all but the node id
+    node_relative: bool = False  # the node id is to be added
 
 
 def parse_integer(text: str) -> int:

@@ -43,35 +43,22 @@ CONVERTERS: dict[Kind, Callable[[Item], Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of bus.yml.
-
-    Attributes:
-        name: The key.
-        kind: What stands behind it.
-        field: Attribute of the model that it fills.
-        per_unit: Units of the file per unit of the model, 1000 for [ms]; None for no conversion.
-        low: Smallest value, in units of the file.
-        high: Largest value, in units of the file.
-        zero: True allows 0 beside the range, False refuses it within the range.
-        choices: The only values allowed, with their meaning.
-        default: Value of an absent key in units of the file, where no record of settings has it.
-        neutral: Value with which a key that is not used, or refused, requests nothing.
-        use: What is made of it.
-        why: Reason for the default, the range or the use, as the user reads it.
-    """
+    """A key of bus.yml."""
 
     name: str
-    kind: Kind
-    field: str = ''
+    kind: Kind  # what stands behind it
+    field: str = ''  # attribute of the model that it fills
+    # units of the file per unit of the model, 1000 for [ms]; None for no conversion
     per_unit: float | None = None
-    low: float | None = None
-    high: float | None = None
-    zero: bool | None = None
-    choices: Mapping[int, str] | None = None
+    low: float | None = None  # smallest value, in units of the file
+    high: float | None = None  # largest value, in units of the file
+    zero: bool | None = None  # True allows 0 beside the range, False refuses it within the range
+    choices: Mapping[int, str] | None = None  # the only values allowed, with their meaning
+    # value of an absent key in units of the file, where no record of settings has it
     default: Any = None
-    neutral: Any = None
-    use: Use = Use.READ
-    why: str = ''
+    neutral: Any = None  # value with which a key that is not used, or refused, requests nothing
+    use: Use = Use.READ  # what is made of it
+    why: str = ''  # reason for the default, the range or the use, as the user reads it
 
     def convert(self, item: Item) -> Any:  # noqa: ANN401 (the kind decides)
         """Return a value in units of the file.

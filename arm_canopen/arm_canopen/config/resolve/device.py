@@ -29,19 +29,13 @@ DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
 
 @dataclass(frozen=True, slots=True)
 class DeviceDraft:
-    """A device before the COB-IDs of the whole bus are known.
+    """A device before the COB-IDs of the whole bus are known."""
 
-    Attributes:
-        config: Its configuration without PDOs; None when its EDS or its node id is missing.
-        section: Its section, defaults merged.
-        settings: The values of the section.
-        pdos: Its PDOs, TPDOs first.
-    """
-
+    # its configuration without PDOs; None when its EDS or its node id is missing
     config: NodeConfig | None
-    section: YamlMap
-    settings: DeviceSettings
-    pdos: list[PdoDraft] = field(default_factory=list)
+    section: YamlMap  # its section, defaults merged
+    settings: DeviceSettings  # the values of the section
+    pdos: list[PdoDraft] = field(default_factory=list)  # its PDOs, TPDOs first
 
     def place_of(self, key: str) -> Place:
         """Return the place of a key, that of the section when the key is absent."""

@@ -28,13 +28,7 @@ CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD,
 
 @dataclass(frozen=True, slots=True)
 class BusContext:
-    """What a device meets on its bus.
-
-    Attributes:
-        options: Section ``options``.
-        settings: Section ``master``.
-        master: The master.
-    """
+    """What a device meets on its bus."""
 
     options: Options
     settings: MasterSettings

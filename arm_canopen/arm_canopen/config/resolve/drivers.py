@@ -13,17 +13,11 @@ from ..read.document import YamlMap
 
 @dataclass(frozen=True, slots=True)
 class DriverClass:
-    """A driver class of ros2_canopen.
+    """A driver class of ros2_canopen."""
 
-    Attributes:
-        name: As bus.yml writes it.
-        package: ROS package that has it upstream.
-        for_master: It drives the master, not a device.
-    """
-
-    name: str
-    package: str
-    for_master: bool = False
+    name: str  # as bus.yml writes it
+    package: str  # ROS package that has it upstream
+    for_master: bool = False  # it drives the master, not a device
 
 
 DRIVER_CLASSES: tuple[DriverClass, ...] = (

@@ -17,15 +17,11 @@ PATH_VARIABLE = '@BUS_CONFIG_PATH@'
 
 
 class EdsFiles:
-    """The EDS files of a bus. Devices that share a file share what was read from it.
-
-    Attributes:
-        folder: What ``@BUS_CONFIG_PATH@`` stands for.
-        beside: Folder of the bus.yml, where a file is looked for that is not in ``dcf_path``.
-    """
+    """The EDS files of a bus. Devices that share a file share what was read from it."""
 
     def __init__(self, folder: Path, beside: Path) -> None:
-        self.folder = folder
+        self.folder = folder  # what ``@BUS_CONFIG_PATH@`` stands for
+        # folder of the bus.yml, where a file is looked for that is not in ``dcf_path``
         self.beside = beside
         self._read: dict[Path, Eds | None] = {}
 

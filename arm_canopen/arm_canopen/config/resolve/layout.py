@@ -23,16 +23,11 @@ NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The sections of a bus.yml.
+    """The sections of a bus.yml."""
 
-    Attributes:
-        options: The section ``options``, empty when absent.
-        master: The section ``master``, empty when absent.
-        devices: Each device with the ``defaults`` below its own values, in the order of the file.
-    """
-
-    options: YamlMap
-    master: YamlMap
+    options: YamlMap  # the section ``options``, empty when absent
+    master: YamlMap  # the section ``master``, empty when absent
+    # each device with the ``defaults`` below its own values, in the order of the file
     devices: dict[str, YamlMap] = field(default_factory=dict)
 
 

@@ -33,21 +33,13 @@ SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
 
 @dataclass(frozen=True, slots=True)
 class PdoDraft:
-    """A PDO before the COB-IDs of the whole bus are known.
-
-    Attributes:
-        config: What is known.
-        direction: TPDO or RPDO.
-        device: Name of the device.
-        place: Where to complain: its COB-ID in bus.yml, else the PDO or the device.
-        auto: It wants a COB-ID from the free range.
-    """
+    """A PDO before the COB-IDs of the whole bus are known."""
 
     config: PdoConfig
     direction: Direction
     device: str
-    place: Place
-    auto: bool = False
+    place: Place  # where to complain: its COB-ID in bus.yml, else the PDO or the device
+    auto: bool = False  # it wants a COB-ID from the free range
 
     @property
     def title(self) -> str:

@@ -33,36 +33,25 @@ NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Section ``options``.
+    """Section ``options``."""
 
-    Attributes:
-        dcf_path: Folder of the EDS files, empty for none.
-        heartbeat_multiplier: Heartbeat periods until a heartbeat counts as lost.
-        retry_factor: Missing answers after which a guarded device counts as lost.
-    """
-
-    dcf_path: str = ''
-    heartbeat_multiplier: float = 3.0
+    dcf_path: str = ''  # folder of the EDS files, empty for none
+    heartbeat_multiplier: float = 3.0  # heartbeat periods until a heartbeat counts as lost
+    # missing answers after which a guarded device counts as lost
     retry_factor: int = DEVICE.retry_factor
 
 
 @dataclass(frozen=True, slots=True)
 class MasterSettings:
-    """Section ``master``; attributes as in :class:`.model.MasterConfig`.
-
-    Attributes:
-        watch_devices: The master supervises the devices' heartbeats.
-        vendor_id: Part of ``identity``, as the three below.
-        heartbeat_multiplier: Periods that devices wait for the master's heartbeat, None for the
-            options' value.
-    """
+    """Section ``master``; attributes as in :class:`.model.MasterConfig`."""
 
     node_id: int | None = None
     driver: str = ''
     namespace: str = ''
     bitrate: int = MASTER.bitrate
-    watch_devices: bool = True
+    watch_devices: bool = True  # the master supervises the devices' heartbeats
     heartbeat_producer: float = MASTER.heartbeat_producer
+    # periods that devices wait for the master's heartbeat, None for the options' value
     heartbeat_multiplier: float | None = None
     sync_period: float = MASTER.sync_period
     sync_window: float = MASTER.sync_window
@@ -76,7 +65,7 @@ class MasterSettings:
     stop_all_nodes: bool = MASTER.stop_all_nodes
     nmt_inhibit_time: float = MASTER.nmt_inhibit_time
     emcy_inhibit_time: float = MASTER.emcy_inhibit_time
-    vendor_id: int = ANY_DEVICE.vendor_id
+    vendor_id: int = ANY_DEVICE.vendor_id  # part of ``identity``, as the three below
     product_code: int = ANY_DEVICE.product_code
     revision_number: int = ANY_DEVICE.revision_number
     serial_number: int = ANY_DEVICE.serial_number
@@ -86,21 +75,14 @@ class MasterSettings:
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings:
-    """Section of a device; attributes as in :class:`.model.NodeConfig`, None when not given.
-
-    Attributes:
-        dcf: EDS or DCF file, empty when not given.
-        dcf_path: Its folder, None for that of the options.
-        poll_period: ``period``; without SYNC it is the cycle, too.
-        num_channels: Number of axes.
-    """
+    """Section of a device; attributes as in :class:`.model.NodeConfig`, None when not given."""
 
     node_id: int | None = None
     driver: str = ''
     namespace: str = ''
-    dcf: str = ''
-    dcf_path: str | None = None
-    poll_period: float = DEVICE.poll_period
+    dcf: str = ''  # EDS or DCF file, empty when not given
+    dcf_path: str | None = None  # its folder, None for that of the options
+    poll_period: float = DEVICE.poll_period  # ``period``; without SYNC it is the cycle, too
     sdo_timeout: float = DEVICE.sdo_timeout
     boot_timeout: float = DEVICE.boot_timeout
     revision_number: int = ANY_DEVICE.revision_number
@@ -115,7 +97,7 @@ class DeviceSettings:
     mandatory: bool = DEVICE.mandatory
     reset_communication: bool = DEVICE.reset_communication
     restore_configuration: int = DEVICE.restore_configuration
-    num_channels: int = len(DEVICE.axes)
+    num_channels: int = len(DEVICE.axes)  # number of axes
 
 
 def read_options(section: YamlMap, findings: Findings) -> Options:

@@ -54,31 +54,21 @@ class UnitRule(Enum):
 
 @dataclass(frozen=True, slots=True)
 class AxisUnits:
-    """What 1.0 means for an axis.
-
-    Attributes:
-        name: Name of the axis.
-        rule: Where its scale comes from.
-        increments: Position increments of 1.0; 0 when it is unknown.
-        velocity: Device velocity units of 1.0 per second.
-        acceleration: Device acceleration units of 1.0 per second squared.
-        acceleration_by: Who says that; empty where it is assumed that the drive counts velocity
-            units per second.
-        radians: Angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it
-            does not have it.
-        factors: Objects of the factor group that say it.
-        motion: Speeds and accelerations that the drive has after boot, by object, in user units
-            per second and second squared.
-    """
+    """What 1.0 means for an axis."""
 
     name: str
-    rule: UnitRule
-    increments: float
-    velocity: float
-    acceleration: float
+    rule: UnitRule  # where its scale comes from
+    increments: float  # position increments of 1.0; 0 when it is unknown
+    velocity: float  # device velocity units of 1.0 per second
+    acceleration: float  # device acceleration units of 1.0 per second squared
+    # who says that; empty where it is assumed that the drive counts velocity units per second
     acceleration_by: str
+    # angle of the shaft of 1.0 in [rad], by the factor group of the EDS; None when it does not
+    # have it
     radians: float | None
-    factors: tuple[Index, ...] = ()
+    factors: tuple[Index, ...] = ()  # objects of the factor group that say it
+    # speeds and accelerations that the drive has after boot, by object, in user units per second
+    # and second squared
     motion: Mapping[Index, float] = field(default_factory=dict)
 
 

@@ -42,19 +42,13 @@ DEVICE_CHECKS: tuple[Callable[[Subject], None], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What was found.
+    """What was found."""
 
-    Attributes:
-        errors: What cannot work.
-        warnings: What works, and probably not as it was meant.
-        load: What the bus will carry, None when the file could not be read.
-        units: What 1.0 means for each axis of a drive.
-    """
-
-    errors: tuple[Problem, ...]
-    warnings: tuple[Problem, ...]
+    errors: tuple[Problem, ...]  # what cannot work
+    warnings: tuple[Problem, ...]  # what works, and probably not as it was meant
+    # what the bus will carry, None when the file could not be read
     load: LoadEstimate | None = None
-    units: tuple[AxisUnits, ...] = ()
+    units: tuple[AxisUnits, ...] = ()  # what 1.0 means for each axis of a drive
 
 
 def check_bus(

@@ -19,17 +19,11 @@ from ..pdo_direction import Direction, RPDO, TPDO
 
 @dataclass(frozen=True, slots=True)
 class UsedMode:
-    """A mode in which an axis is used by bus.yml.
-
-    Attributes:
-        axis: The axis.
-        mode: The mode.
-        key: Key of bus.yml that names it.
-    """
+    """A mode in which an axis is used by bus.yml."""
 
     axis: DriveConfig
     mode: OperationMode
-    key: str
+    key: str  # key of bus.yml that names it
 
     def at(self, index: int) -> int:
         """Return the index of an object of the profile for this axis."""
@@ -38,17 +32,11 @@ class UsedMode:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A device under check.
-
-    Attributes:
-        bus: Its bus.
-        node: The device.
-        findings: Gets what is wrong.
-    """
+    """A device under check."""
 
     bus: BusConfig
     node: NodeConfig
-    findings: Findings
+    findings: Findings  # gets what is wrong
 
     def place(self, *names: str) -> Place:
         """Return the place of a key of the device, or of the nearest thing around it."""

@@ -24,23 +24,14 @@ POLLED = (Index.STATUSWORD, Index.MODE_OF_OPERATION_DISPLAY, Index.POSITION_ACTU
 
 @dataclass(frozen=True, slots=True)
 class Traffic:
-    """Frames of one service.
+    """Frames of one service."""
 
-    Attributes:
-        device: Name of the device whose service it is, or of the master.
-        service: What they are: ``TPDO 1``, ``SYNC``, ``heartbeat``.
-        cob_id: Their identifier.
-        size: Length of the payload in [byte].
-        rate: Frames in [1/s].
-        reason: Why so many.
-    """
-
-    device: str
-    service: str
-    cob_id: int
-    size: int
-    rate: float
-    reason: str
+    device: str  # name of the device whose service it is, or of the master
+    service: str  # what they are: ``TPDO 1``, ``SYNC``, ``heartbeat``
+    cob_id: int  # their identifier
+    size: int  # length of the payload in [byte]
+    rate: float  # frames in [1/s]
+    reason: str  # why so many
 
     @property
     def bits(self) -> float:
@@ -59,14 +50,10 @@ class LoadEstimate:
 
     SDO that polls nothing, EMCY and NMT come on top; they are rare, and let everything cyclic
     pass.
-
-    Attributes:
-        bitrate: Bit rate in [bit/s].
-        traffic: All services with a rate.
     """
 
-    bitrate: int
-    traffic: tuple[Traffic, ...]
+    bitrate: int  # bit rate in [bit/s]
+    traffic: tuple[Traffic, ...]  # all services with a rate
 
     @property
     def frames_per_second(self) -> float:
