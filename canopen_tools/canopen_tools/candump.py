@@ -49,12 +49,7 @@ class Listener:
     """Receives batches of frames until it is stopped or its time is over."""
 
     def __init__(self, bus: Bus, timeout: float) -> None:
-        """Listen.
-
-        Args:
-            bus: Where.
-            timeout: How long in [s]; infinity until :meth:`stop`.
-        """
+        """Listen for timeout [s]; infinity until :meth:`stop`."""
         self._bus = bus
         self._end = monotonic() + timeout
         self._stopped = False
@@ -87,16 +82,7 @@ class Screen:
         count: int | None = None,
         quiet: bool = False,
     ) -> None:
-        """Prepare.
-
-        Args:
-            describer: Makes what puts the frames of one bus into words.
-            chosen: Which ones to show.
-            line_format: How.
-            buses: Names of several buses, for a column; empty for one bus.
-            count: After how many it is full, None for never.
-            quiet: Print nothing, but count.
-        """
+        """Prepare; several buses have a column, count None is never full, and quiet only counts."""
         self._describers = defaultdict[str, FrameDescriber](describer)
         self._bus_width = max(map(len, buses), default=0)
         self._filter = chosen
@@ -128,14 +114,7 @@ class Screen:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the program.
-
-    Args:
-        argv: Command line without the program; None takes the process's own.
-
-    Returns:
-        Exit code: 0, or 1 when the bus or a file cannot be read.
-    """
+    """Run the program; return 0, or 1 when the bus or a file cannot be read."""
     parser = _parser()
     try:
         arguments = split_ros_arguments(sys.argv[1:] if argv is None else argv)
@@ -165,12 +144,7 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _show_log(options: argparse.Namespace, config: BusConfig | None) -> None:
-    """Show a log as if its frames came now, or convert it; its times are of the wall clock.
-
-    Raises:
-        CodecError: It cannot be read, or has another bus than the one that is asked for, or
-            several where one is wanted.
-    """
+    """Show a log as if its frames came now, or convert it; its times are of the wall clock."""
     path, wanted = Path(options.read), options.interface
     logged = read_buses(path)
     first = list(islice(logged, _LOOK_AHEAD))

@@ -75,11 +75,7 @@ def identity_text(identity: Identity) -> str:
 
 
 def match_eds(identity: Identity, candidates: Sequence[Eds]) -> Match:
-    """Return the EDS of a device.
-
-    Args:
-        identity: What the device says of itself; 0 where it says nothing.
-        candidates: The files that there are; one that is there twice counts once.
+    """Return the EDS of a device, which says 0 where it says nothing; equal files count once.
 
     Raises:
         NoMatchError: None fits.

@@ -21,10 +21,7 @@ def expected_objects(
 ) -> list[BootWrite]:
     """Return everything that bus.yml decides of a device: its identity, and what boot leaves.
 
-    Args:
-        config: The bus.
-        node: The device.
-        consumers: What the device has in 0x1016, by sub-index; None: those of its EDS.
+    Consumers are what the device has in 0x1016, by sub-index; None: those of its EDS.
     """
     return [*_identity(node), *held_after_boot(config, node, consumers)]
 

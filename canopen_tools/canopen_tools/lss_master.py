@@ -51,14 +51,7 @@ class LssMaster:
         timeout: float = TIMEOUT,
         scan_timeout: float = SCAN_TIMEOUT,
     ) -> None:
-        """Take the way to the bus.
-
-        Args:
-            scheduler: Time.
-            send: Hands a frame to the bus.
-            timeout: Longest time for an answer in [s].
-            scan_timeout: The same for a step of fast scan, in [s], at first.
-        """
+        """Time-outs in [s]: the longest of an answer, and of a step of fast scan at first."""
         self.answers: list[LssMessage] = []  # answers since the last request
         self._scheduler = scheduler
         self._send = send
@@ -177,10 +170,7 @@ class LssMaster:
         return (await self._only_answer(message, 'node id')).byte
 
     async def set_node_id(self, node_id: int) -> None:
-        """Give the device in the configuration state a node id, from its next reset on.
-
-        Args:
-            node_id: 1 to 127, or 255 for none.
+        """Give the device in the configuration state a node id from its next reset on; 255: none.
 
         Raises:
             LssError: It refuses the id, or none answers, or several do.
@@ -191,10 +181,7 @@ class LssMaster:
         await self._configure(message, f'node id {node_id}')
 
     async def set_bit_rate(self, bit_rate: int) -> None:
-        """Give the device in the configuration state a bit rate.
-
-        Args:
-            bit_rate: In [bit/s]; one of the standard table.
+        """Give the device in the configuration state a bit rate of the standard table in [bit/s].
 
         Raises:
             LssError: It is not in the table, or is refused, or none answers, or several do.
@@ -218,9 +205,8 @@ class LssMaster:
     def activate_bit_rate(self, delay: float) -> None:
         """Have all devices in the configuration state take their new bit rate; nobody answers.
 
-        Args:
-            delay: Time in [s] that they are silent before and again after the switch, so that
-                everybody else can switch, too.
+        They are silent for delay [s] before and again after the switch, so that all others can
+        switch, too.
         """
         milliseconds = round(delay * 1e3).to_bytes(2, 'little')
         self._put(lss_bytes(LssCommand.ACTIVATE_BIT_TIMING, *milliseconds))
@@ -235,11 +221,7 @@ class LssMaster:
             raise LssError(f'{title}: {ERROR_TEXTS.get(code, "error")} (LSS error {code})')
 
     async def _only_answer(self, message: LssMessage, title: str) -> LssMessage:
-        """Send a request, and make sure that it is one device that answers.
-
-        Raises:
-            LssError: None answers, or several do.
-        """
+        """Send a request, and make sure that it is one device that answers."""
         self._put(message, message.command)
         if not await self._answered(self._timeout):
             raise LssError(f'{title}: no device answers; none is in the configuration state')

@@ -62,11 +62,7 @@ FEEDBACK = (
 
 
 def bus_text(devices: Sequence[NewDevice], period_ms: int) -> str:
-    """Return a bus.yml.
-
-    Args:
-        devices: One or more.
-        period_ms: Time between two SYNC in [ms].
+    """Return a bus.yml of one or more devices; SYNC is sent each period_ms [ms].
 
     Raises:
         NewBusError: A name or node id is there twice, or an EDS does not say what is needed.

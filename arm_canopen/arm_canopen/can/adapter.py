@@ -35,13 +35,7 @@ class AdapterBus(Bus):
     """
 
     def __init__(self, name: str, interface: str, channel: str, bitrate: int | None) -> None:
-        """Open the interface.
-
-        Args:
-            name: Name of the bus.
-            interface: python-can's name of the driver.
-            channel: The driver's name of the channel.
-            bitrate: Bit rate in [bit/s]; None leaves the adapter's.
+        """Open python-can's interface at the driver's channel; bitrate None leaves the adapter's.
 
         Raises:
             BusError: python-can does not know the interface or cannot open it.
@@ -107,11 +101,7 @@ class AdapterBus(Bus):
         return frames
 
     def _reopen(self) -> None:
-        """Go on with the adapter where it is back; opening it may take a driver seconds.
-
-        Raises:
-            BusError: It is not back yet.
-        """
+        """Go on with the adapter where it is back; opening it may take a driver seconds."""
         if self._reopening is None:
             self._reopening = Future()
             Thread(target=self._replace, args=(self._reopening,), daemon=True).start()
@@ -152,10 +142,6 @@ class AdapterBus(Bus):
         """Return the next message; one that its driver cannot decode is dropped.
 
         Drivers of serial adapters raise whatever a line with a damaged byte leads to.
-
-        Raises:
-            can.CanError, OSError: The adapter went away.
-            BusError: It delivers damaged messages only.
         """
         try:
             message = self._bus.recv(timeout)
@@ -214,12 +200,7 @@ class AdapterBus(Bus):
 
 
 def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
-    """Return the frame as python-can's message.
-
-    Args:
-        frame: The frame.
-        timestamp: Time of reception on the wall clock in [s], 0 for a frame to be sent.
-    """
+    """Return python-can's message with its time on the wall clock in [s], 0 for one to be sent."""
     return can.Message(
         timestamp=timestamp,
         arbitration_id=frame.can_id,
@@ -232,12 +213,7 @@ def to_message(frame: Frame, timestamp: float = 0.0) -> can.Message:
 
 
 def from_message(message: can.Message, timestamp: float) -> Frame:
-    """Return python-can's message as a frame.
-
-    Args:
-        message: A classic CAN message.
-        timestamp: Time of reception on the steady clock in [s].
-    """
+    """Return python-can's classic message as a frame, with its steady time in [s]."""
     return Frame(
         message.arbitration_id,
         bytes(message.data),

@@ -49,24 +49,16 @@ class Bus(ABC):
         """
 
     def limit_queue(self, frames: int) -> None:  # noqa: B027  # most cannot do it
-        """Limit the frames that wait for the bus, where the interface can do it.
+        """Limit the frames that wait for the bus to about so many, where the interface can do it.
 
         Those beyond are refused. What waits while the cable is off leaves when it is on again.
-
-        Args:
-            frames: About how many.
         """
 
     @abstractmethod
     def receive(self, timeout: float) -> list[Frame]:
-        """Wait for frames.
+        """Wait for the first frame at most timeout [s]; return all that are there, in their order.
 
-        Args:
-            timeout: Longest time to wait for the first one in [s]; 0 only looks.
-
-        Returns:
-            All frames that are there, in the order of arrival; empty after the time-out or
-            after :meth:`wake`.
+        The list is empty after the time-out or after :meth:`wake`.
 
         Raises:
             BusError: The interface went away.

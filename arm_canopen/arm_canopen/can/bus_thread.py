@@ -30,14 +30,7 @@ class BusThread:
     """
 
     def __init__(self, bus: Bus, name: str, serve: Callable[[], None], owner: str) -> None:
-        """Prepare; the thread starts with :meth:`start`.
-
-        Args:
-            bus: An open bus; it stays the caller's to close.
-            name: Name of the thread.
-            serve: The owner's loop, until :attr:`stopping`.
-            owner: Who that is, for messages.
-        """
+        """Prepare; serve is the owner's loop until :attr:`stopping`. The caller closes the bus."""
         self.stopping = False
         # called in the thread, at its end, with the defect that has ended it
         self.on_failure: Callable[[Exception], None] = lambda error: None
@@ -54,19 +47,11 @@ class BusThread:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def refuse_before_start(self, reason: str) -> None:
-        """Refuse what is handed over before the start, which otherwise waits for it.
-
-        Args:
-            reason: Text of the BusError.
-        """
+        """Refuse what is handed over before the start, which otherwise waits for it."""
         self._too_early = reason
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start the thread.
-
-        Args:
-            begin: Called first in the thread, which may want a priority.
-        """
+        """Start the thread, which calls begin first; it may want a priority."""
         self._begin = begin
         self._started = True
         self._thread.start()
@@ -91,10 +76,7 @@ class BusThread:
         return future
 
     def run(self, begin: Callable[[Future[T]], None]) -> Future[T]:
-        """Start something in the thread that ends later.
-
-        Args:
-            begin: Gets the future, whose result is set in the thread.
+        """Start something in the thread that ends later, there it sets the result of the future.
 
         Returns:
             The future; a BusError where the thread ends before.

@@ -53,14 +53,7 @@ def log_channel(bus_name: str) -> str:
 
 
 def format_line(frame: Frame, timestamp: float, channel: str, *, sent: bool = False) -> str:
-    """Return the line of a frame, with its direction and its end.
-
-    Args:
-        frame: A classic CAN frame.
-        timestamp: Its time on the wall clock in [s].
-        channel: Name of the bus, as of :func:`log_channel`.
-        sent: It was sent by whoever writes, and not received.
-    """
+    """Return the line of a frame, with its wall clock time in [s], its direction and its end."""
     can_id, data, _, is_extended, is_remote, is_error, remote_length = frame
     if is_error:
         return f'({timestamp:.6f}) {channel} {can_id | _ERROR_FLAG:08X}#{data.hex().upper()}\n'

@@ -66,12 +66,6 @@ class CandumpWriter:
     """Writes lines of candump."""
 
     def __init__(self, path: Path, channel: str) -> None:
-        """Open a new file.
-
-        Args:
-            path: Where to.
-            channel: Name of the bus, as of :func:`.log_channel`.
-        """
         self.file = path.open('w', encoding='ascii')
         self._channel = channel
 
@@ -93,13 +87,7 @@ class LogWriter:
     """
 
     def __init__(self, path: Path, bus_name: str, wall_offset: float) -> None:
-        """Open a new file.
-
-        Args:
-            path: Where to; its suffix chooses the format.
-            bus_name: Name of the bus; the log has a name that canplayer can play to.
-            wall_offset: Wall clock minus steady clock in [s].
-        """
+        """Open a file, its format by its suffix; wall_offset is wall minus steady clock in [s]."""
         suffix = path.suffix.lower()
         self._writer: CandumpWriter | can.ASCWriter | can.BLFWriter
         if suffix == '.asc':
@@ -136,9 +124,7 @@ class _TextFormat:
 def read_log(path: Path, interface: str = '') -> Iterator[Frame]:
     """Yield the frames of one bus; their time stamps are on the wall clock where the log has it.
 
-    Args:
-        path: The log; its format shows in what it contains.
-        interface: The bus, as the log names it; empty for the only one.
+    The format shows in what the log contains. It names its bus; empty means the only one.
 
     Raises:
         CodecError: The log is damaged, of an unknown format, has CAN FD frames, or those of

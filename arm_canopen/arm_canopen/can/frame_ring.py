@@ -36,13 +36,10 @@ class FrameRing:
     SENT = 0x80  # direction of a frame that this process has sent
 
     def __init__(self, capacity: int) -> None:
-        """Take the memory.
-
-        Args:
-            capacity: How many frames it holds, of :data:`RECORD_SIZE` each.
+        """Allocate a record for each frame.
 
         Raises:
-            ValueError: It holds none.
+            ValueError: The capacity is not positive.
         """
         if capacity < 1:
             raise ValueError(f'a ring of {capacity} frames holds nothing')
@@ -54,13 +51,7 @@ class FrameRing:
         self._at = 0  # [byte] where the next one goes
 
     def record(self, frame: Frame, timestamp: float, direction: int = 0) -> None:
-        """Keep a frame.
-
-        Args:
-            frame: A classic CAN frame.
-            timestamp: Its steady time in [s].
-            direction: 0 for a frame that was received, :attr:`SENT` for one that was sent.
-        """
+        """Keep a frame with its steady time in [s]; direction is :attr:`SENT` or 0 (received)."""
         can_id, data, _, is_extended, is_remote, is_error, remote_length = frame
         if is_extended or is_remote or is_error:
             can_id |= _EXTENDED * is_extended | _REMOTE * is_remote | _ERROR * is_error

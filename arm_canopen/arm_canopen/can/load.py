@@ -25,12 +25,7 @@ _SAMPLES = 10  # per window
 
 
 def frame_bits(size: int, *, is_extended: bool = False) -> int:
-    """Return the bits of a frame without stuffing, with intermission.
-
-    Args:
-        size: Length of the payload in [byte].
-        is_extended: The identifier has 29 bits.
-    """
+    """Return the bits of a frame with a payload of size [byte]: no stuffing, with intermission."""
     return _FRAME_BITS + 8 * size + (_EXTENSION_BITS if is_extended else 0)
 
 
@@ -73,15 +68,10 @@ class BusLoad:
     """
 
     def __init__(self, bitrate: int, now: float, window: float = 1.0) -> None:
-        """Start empty.
-
-        Args:
-            bitrate: Bit rate of the bus in [bit/s].
-            now: Steady time in [s].
-            window: How far the figures look back in [s], when they are read often enough.
+        """Start at a steady time in [s]; figures look back window [s] when they are read often.
 
         Raises:
-            ValueError: Bit rate or window is not positive.
+            ValueError: Bit rate in [bit/s] or window is not positive.
         """
         if bitrate <= 0 or window <= 0.0:
             raise ValueError(f'bit rate {bitrate} and window {window} must be positive')
@@ -99,11 +89,7 @@ class BusLoad:
         counts[len(frame.data)] += 1
 
     def figures(self, now: float) -> LoadFigures:
-        """Return the figures of the last window.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Return the figures of the last window before a steady time in [s]."""
         newest = self._sample(now)
         samples = self._samples
         while len(samples) > 1 and samples[1].time <= now - self._window:

@@ -35,12 +35,7 @@ class MulticastBus(SocketBus):
     """A bus on a multicast group of the loopback interface."""
 
     def __init__(self, name: str, group: str, port: int) -> None:
-        """Join the group.
-
-        Args:
-            name: Name of the bus.
-            group: IPv4 multicast address.
-            port: UDP port.
+        """Join the IPv4 multicast group at a UDP port.
 
         Raises:
             BusError: The sockets cannot be opened.

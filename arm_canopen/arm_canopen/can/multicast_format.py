@@ -79,11 +79,7 @@ def encode(frame: Frame) -> bytes:
 
 
 def decode(datagram: bytes, timestamp: float) -> Frame:
-    """Read a datagram.
-
-    Args:
-        datagram: What was received.
-        timestamp: Time of reception on the steady clock in [s]; the one inside is the sender's.
+    """Read a datagram; the frame has the steady time in [s], since the one inside is the sender's.
 
     Raises:
         CodecError: It is no classic CAN frame.

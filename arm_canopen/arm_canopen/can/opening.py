@@ -35,10 +35,7 @@ _log = logging.getLogger(__name__)
 
 
 def open_bus(name: str) -> Bus:
-    """Open a bus.
-
-    Args:
-        name: See the table above; ``auto`` picks one, logs which, and the bus carries its name.
+    """Open a bus by a name of the table; ``auto`` picks one and logs which, and it has that name.
 
     Raises:
         BusError: No such interface, or it is down; the message names the remedy.

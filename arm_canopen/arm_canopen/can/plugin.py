@@ -34,12 +34,7 @@ class ArmCanopenBus(can.BusABC):
         receive_own_messages: bool = False,
         **_: object,
     ) -> None:
-        """Open the bus.
-
-        Args:
-            channel: Its name, as :func:`arm_canopen.can.open_bus` takes it.
-            can_filters: What :meth:`recv` returns, None for all.
-            receive_own_messages: Refused; these buses never do.
+        """Open the bus of the name that :func:`arm_canopen.can.open_bus` takes.
 
         Raises:
             can.CanInitializationError: It cannot be opened, or own messages were requested.

@@ -46,12 +46,7 @@ def prepare_receiver(sock: socket.socket) -> None:
 
 
 def loss_text(name: str, granted: int) -> str:
-    """Say that frames were lost, and what helps.
-
-    Args:
-        name: Name of the bus.
-        granted: Size of the receive buffer in [byte].
-    """
+    """Return that frames were lost, and what helps with the granted receive buffer in [byte]."""
     text = f'{name}: frames were lost, because they came faster than this process reads them'
     if granted >= RECEIVE_BUFFER:
         return text

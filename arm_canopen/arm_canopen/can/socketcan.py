@@ -132,12 +132,7 @@ def pack(frame: Frame) -> bytes:
 
 
 def unpack(packed: bytes, timestamp: float) -> Frame:
-    """Read the kernel's struct can_frame of 16 bytes.
-
-    Args:
-        packed: What was received.
-        timestamp: Time of reception on the steady clock in [s].
-    """
+    """Read the kernel's struct can_frame of 16 bytes, received at a steady time in [s]."""
     can_id, length, data = _FRAME.unpack(packed)
     data = data[:length]
     if not can_id & _ANY_FLAG:

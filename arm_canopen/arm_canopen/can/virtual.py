@@ -98,12 +98,7 @@ _wires_lock = Lock()
 
 
 def open_virtual(name: str, channel: str) -> VirtualBus:
-    """Connect to the wire of a channel; it lives as long as a bus on it.
-
-    Args:
-        name: Name of the bus, e.g. ``virtual:test``.
-        channel: The part behind the colon.
-    """
+    """Connect to the wire of a channel; it lives as long as a bus on it."""
     with _wires_lock:
         wire = _wires.get(channel)
         if wire is None:

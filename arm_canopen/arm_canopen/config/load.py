@@ -20,9 +20,7 @@ def load_bus(
 ) -> BusConfig:
     """Read a bus.yml of either format and the EDS files that it names.
 
-    Args:
-        path: The bus.yml.
-        bus_config_path: What ``@BUS_CONFIG_PATH@`` stands for; its own folder when None.
+    ``@BUS_CONFIG_PATH@`` stands for bus_config_path, or for the folder of the file.
 
     Returns:
         The bus; oddities are among its warnings.
@@ -40,9 +38,7 @@ def load_bus(
 def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Report:
     """Read a bus.yml and report everything that is wrong with it and its EDS files at once.
 
-    Args:
-        path: The bus.yml.
-        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
+    The bit rate in [bit/s] replaces that of bus.yml.
     """
     try:
         config, findings = _read_and_resolve(Path(path), None)
@@ -52,11 +48,7 @@ def check_file(path: str | os.PathLike[str], bitrate: int | None = None) -> Repo
 
 
 def _read_and_resolve(file: Path, bus_config_path: Path | None) -> tuple[BusConfig, Findings]:
-    """Make as much of a bus as can be understood, and collect everything that is wrong.
-
-    Raises:
-        ConfigError: The file cannot be read at all.
-    """
+    """Make as much of a bus as can be understood, and collect everything that is wrong."""
     findings = Findings()
     document = read_document(file, findings)
     return resolve_bus(document, file, bus_config_path, findings), findings

@@ -65,13 +65,8 @@ def own_cob_id(
     """Return the COB-ID of a device whose file may give that of another node id.
 
     Many EDS files leave out ``$NODEID``, and a DCF may have been made for another device: of the
-    pre-defined connection set a device has the identifier that its own node id gives.
-
-    Args:
-        address: Index and sub-index of the object.
-        cob_id: Its value in the file.
-        node_id: The device.
-        file_node_id: Node id for which the file was made, None when it does not say that.
+    pre-defined connection set a device has the identifier that its own node id gives. A file
+    that names no node id has None.
     """
     base = PREDEFINED.get(address)
     if base is None or cob_id & COB_ID_EXTENDED:

@@ -104,15 +104,9 @@ def integer_range(data_type: DataType) -> tuple[int, int] | None:
 
 
 def encode(data_type: DataType, value: Value) -> bytes:
-    """Encode a value as it travels in an SDO (CiA 301, 7.1.4).
+    """Encode a value as SDOs carry it (CiA 301, 7.1.4): little-endian, of the type's length.
 
-    Args:
-        data_type: Type of the object.
-        value: Number for numeric types, str for strings, bytes for octet strings, times and
-            domains.
-
-    Returns:
-        The bytes, little-endian, of the type's length.
+    Strings are str, octet strings, times and domains are bytes.
 
     Raises:
         CodecError: The value is of another kind or outside the type's range.

@@ -13,15 +13,7 @@ from .datatypes import DataType, Value
 
 
 def object_address(index: int, subindex: int | None = None) -> str:
-    """Return an object as every message names it.
-
-    Args:
-        index: Object index.
-        subindex: Sub-index, None for the object as a whole.
-
-    Returns:
-        ``0x607D:02``, or ``0x607D`` for the whole.
-    """
+    """Return an object as every message names it: ``0x607D:02``, or ``0x607D`` for the whole."""
     return f'0x{index:04X}' if subindex is None else f'0x{index:04X}:{subindex:02X}'
 
 

@@ -24,14 +24,7 @@ SIMILAR_MAX = 4
 
 
 def find_object(dictionary: ObjectDictionary, path: str) -> ObjectEntry:
-    """Find an object by number or name.
-
-    Args:
-        dictionary: Objects of the device.
-        path: As described above.
-
-    Returns:
-        The object.
+    """Find an object by number or name, as described above.
 
     Raises:
         ObjectError: There is none, or there are several; the message names the candidates.

@@ -184,12 +184,7 @@ def is_signed(index: int, subindex: int) -> bool:
 
 
 def slow_timeout(index: int, usual: float) -> float:
-    """Return how long a device may take for the write of an object in [s].
-
-    Args:
-        index: Object index.
-        usual: How long it may take for any object in [s].
-    """
+    """Return how long a device may take to write an object in [s]; usually it may take usual."""
     return max(usual, SLOW_WRITES.get(index, 0.0))
 
 

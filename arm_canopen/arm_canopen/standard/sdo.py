@@ -176,11 +176,7 @@ def _decode_segment(data: bytes) -> Segment:
 
 
 def _padded(data: bytes) -> bytes:
-    """Return a frame of a server with the unused bytes that it may have left out.
-
-    Raises:
-        CodecError: The frame is empty, longer than 8 bytes, or bytes are missing that it uses.
-    """
+    """Return a frame of a server with the unused bytes that it may have left out."""
     if not data or len(data) > FRAME_BYTES or len(data) < _used_bytes(data[0]):
         raise CodecError(f'an SDO frame has 8 bytes, got {len(data)}')
     if data[0] >> 5 == 2 and data[0] & 0x03 == 0x02:  # the frame's length is that of the value

@@ -32,25 +32,13 @@ def unused_bytes(size: int) -> int:
 
 
 def end_frame(command: int, data: bytes, *, with_crc: bool) -> bytes:
-    """Return the frame by which who sent the data ends the transfer.
-
-    Args:
-        command: `DOWNLOAD_END` or `UPLOAD_END`.
-        data: All data of the transfer.
-        with_crc: Both sides have agreed on checksums.
-    """
+    """Return `DOWNLOAD_END` or `UPLOAD_END` for all data, with their checksum where agreed."""
     crc = checksum(data) if with_crc else 0
     return struct.pack('<BH5x', command | unused_bytes(len(data)) << 2, crc)
 
 
 def block_frames(data: bytes, position: int, segments: int) -> list[bytes]:
-    """Return the segments of the next block.
-
-    Args:
-        data: All data of the transfer.
-        position: How many bytes of it the other side has.
-        segments: How many segments the other side takes at a time.
-    """
+    """Return the segments of the next block; the other side has the data up to position."""
     frames = []
     for number in range(1, segments + 1):
         start = position + (number - 1) * SEGMENT_BYTES

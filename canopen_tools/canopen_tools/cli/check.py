@@ -63,13 +63,9 @@ def run(options: argparse.Namespace) -> int:
 def show_check(
     path: Path, bit_rate: int | None = None, *, strict: bool = False, frames: bool = False
 ) -> int:
-    """Show what is wrong with a bus.yml; return the exit code.
+    """Show what is wrong with a bus.yml, and with frames the load of each; return the exit code.
 
-    Args:
-        path: The file.
-        bit_rate: Of the bus in [bit/s]; None takes that of the file.
-        strict: Whether warnings count as errors.
-        frames: Whether the load of each frame is listed.
+    The bit rate in [bit/s] replaces that of the file. Strict makes warnings errors.
     """
     report = check_file(path, bit_rate)
     for problem in report.errors:

@@ -89,16 +89,7 @@ def _consumers(session: Session, target: Target) -> HeldConsumers:
 
 
 def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> list[BootWrite]:
-    """Return what to compare.
-
-    Args:
-        target: The device.
-        consumers: What it has in 0x1016, by sub-index.
-        defaults: Compare other objects with their defaults, too.
-
-    Raises:
-        UsageError: No file describes the device.
-    """
+    """Return what to compare; consumers are what the device has in 0x1016, by sub-index."""
     configured: list[BootWrite] = []
     if target.bus is not None and target.config is not None:
         configured = expected_objects(target.bus, target.config, consumers)
@@ -118,11 +109,7 @@ def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> lis
 
 
 def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
-    """Read an object.
-
-    Raises:
-        SdoError: The device refused, or does not answer.
-    """
+    """Read an object."""
 
     async def upload() -> bytes:
         client = session.client(target.node_id, target.name, target.dictionary)

@@ -174,11 +174,7 @@ def _lss(options: argparse.Namespace) -> Iterator[tuple[Session, LssMaster]]:
 
 
 def _select(session: Session, master: LssMaster, options: argparse.Namespace) -> None:
-    """Bring one device into the configuration state.
-
-    Raises:
-        LssError: There is none.
-    """
+    """Bring one device into the configuration state."""
     master.switch_all(LssState.WAITING)
     session.listen(PAUSE)
     if options.address:
@@ -230,11 +226,7 @@ def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int
 
 
 def _refuse_taken(session: Session, wanted: int) -> None:
-    """Make sure that nobody has a node id.
-
-    Raises:
-        LssError: Somebody sends its heartbeat, or answers its SDO.
-    """
+    """Refuse a node id whose heartbeat or SDO answer is on the bus."""
 
     async def probe() -> bytes:
         return await session.client(wanted).read(Index.DEVICE_TYPE, 0, PROBE_TIMEOUT)

@@ -29,9 +29,6 @@ INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a verb.
 
-    Args:
-        argv: Command line without the program; None takes the process's own.
-
     Returns:
         Exit code: 0, 1 when something is wrong (with a file, a device or the bus), 2 for wrong
         usage, when nothing was sent.

@@ -74,11 +74,7 @@ def given_devices(options: argparse.Namespace) -> list[NewDevice]:
 
 
 def scanned_devices(options: argparse.Namespace, folder: Path) -> list[NewDevice]:
-    """Return the devices that are on the bus.
-
-    Args:
-        options: The command line.
-        folder: Gets the EDS files that devices have in themselves.
+    """Return the devices on the bus; the folder gets the EDS files that they have in themselves.
 
     Raises:
         UsageError: The command line names a device that is not there, or files that are none.
@@ -175,11 +171,7 @@ def _device(
     candidates: Sequence[Eds],
     folder: Path,
 ) -> NewDevice:
-    """Return a device that was found.
-
-    Raises:
-        NoMatchError: It has no EDS, or shares its node id.
-    """
+    """Return a device that was found."""
     node = found.node_id
     if found.twice:
         raise NoMatchError(

@@ -120,11 +120,7 @@ def _type(options: argparse.Namespace) -> DataType | None:
 
 
 def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> bytes:
-    """Encode the value of the command line.
-
-    Raises:
-        UsageError: The object cannot be written, or the value does not fit it.
-    """
+    """Encode the value of the command line."""
     if not entry.access.writable:
         raise UsageError(
             f'{entry} is read-only ({entry.access.value}) in {target.dictionary.source}'

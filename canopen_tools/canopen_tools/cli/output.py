@@ -48,13 +48,7 @@ def painted(text: str, color: str) -> str:
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: str = '') -> None:
-    """Write a table.
-
-    Args:
-        head: Titles of the columns.
-        rows: Cells.
-        right: Titles of the columns that are flush right, separated by commas.
-    """
+    """Write a table; right names the columns that are flush right, separated by commas."""
     flush_right = set(right.split(','))
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     for row in (head, *rows):

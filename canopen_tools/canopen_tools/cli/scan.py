@@ -113,13 +113,9 @@ def run(options: argparse.Namespace) -> int:
 def find_devices(
     session: Session, config: BusConfig | None, listen: float, *, query: bool
 ) -> dict[int, Found]:
-    """Listen, then read the identity of every node id where that disturbs no master.
+    """Listen for some [s], then read the identity of every node id where that disturbs no master.
 
-    Args:
-        session: The connection to the bus.
-        config: What should be on it; None where nobody knows.
-        listen: How long to listen first in [s].
-        query: Read beside a master, too.
+    Query reads beside a master, too.
 
     Returns:
         Devices by node id: those that are there, and those of the configuration.

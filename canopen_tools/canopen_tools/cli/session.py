@@ -32,12 +32,7 @@ class Session:
     """Listens to a bus and runs coroutines on it."""
 
     def __init__(self, bus: Bus, config: BusConfig | None = None) -> None:
-        """Begin to listen.
-
-        Args:
-            bus: An open bus.
-            config: What should be on it; helps to know a master by its frames.
-        """
+        """Begin to listen; the configuration helps to know a master by its frames."""
         self.bus = bus
         self.scheduler = Scheduler(monotonic())
         self.states: dict[int, NmtState] = {}  # NMT states by node id, from their heartbeats

@@ -49,11 +49,7 @@ class Target:
         return slow_timeout(entry.index, self.timeout)
 
     def entry(self, path: str, data_type: DataType | None = None) -> ObjectEntry:
-        """Find an object by number or name.
-
-        Args:
-            path: As described in ``standard/object_path.py``.
-            data_type: Its type, whatever the file has; then it need not be in the file.
+        """Find an object by a path of ``standard/object_path.py``; with a type it needs no file.
 
         Raises:
             UsageError: There is none; the message names similar ones.

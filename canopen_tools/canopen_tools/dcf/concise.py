@@ -40,11 +40,8 @@ def device_writes(
 ) -> list[SdoWrite]:
     """Return what a master writes to a device at boot, in the order of dcfgen.
 
-    Args:
-        config: The bus.
-        node: The device.
-        complete: Write also what the EDS has as default; dcfgen leaves it out, so a device that
-            holds something else keeps it.
+    Complete also writes what the EDS has as default; dcfgen leaves it out, so a device that
+    holds something else keeps it.
     """
     return [
         SdoWrite(*write.address, _value(node, write))

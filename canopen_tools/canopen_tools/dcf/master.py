@@ -54,11 +54,7 @@ SIDES: dict[str, Side] = {
 
 
 def master_dcf(config: BusConfig, upload_files: Mapping[int, str]) -> str:
-    """Return the DCF of the master.
-
-    Args:
-        config: The bus.
-        upload_files: Path of the concise DCF by node id, for those devices that have one.
+    """Return the DCF of the master, with the path of each device's concise DCF by node id.
 
     Raises:
         CodecError: The devices have more PDOs of one direction than the master can have.

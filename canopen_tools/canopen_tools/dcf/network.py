@@ -35,12 +35,7 @@ the guard time."""
 def network_objects(
     config: BusConfig, upload_files: Mapping[int, str]
 ) -> Iterator[tuple[int, DcfObject]]:
-    """Yield the objects by index.
-
-    Args:
-        config: The bus.
-        upload_files: Path of the concise DCF by node id, for those devices that have one.
-    """
+    """Yield the objects by index; upload_files has the paths of concise DCFs by node id."""
     nodes = config.nodes
     if upload_files:
         yield 0x1F22, _files('Concise DCF', upload_files)

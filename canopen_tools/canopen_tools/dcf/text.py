@@ -63,12 +63,7 @@ DcfObject = DcfEntry | DcfRecord | DcfArray
 
 
 def dcf_text(head: Mapping[str, Mapping[str, str]], objects: Mapping[int, DcfObject]) -> str:
-    """Return the text of a DCF.
-
-    Args:
-        head: Sections before the objects, such as FileInfo, each with its keys.
-        objects: All objects by index.
-    """
+    """Return the text of a DCF: the sections before the objects, each with its keys, and these."""
     lines: list[str] = []
     for title, keys in head.items():
         lines += [f'[{title}]', *(f'{key}={value}' for key, value in keys.items()), '']

@@ -32,14 +32,7 @@ IDENTITY_KEYS = (
 
 
 def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings: Findings) -> None:
-    """Check the sections FileInfo and DeviceInfo.
-
-    Args:
-        path: The file.
-        ini: Its sections.
-        dictionary: Its objects.
-        findings: Gets what is wrong.
-    """
+    """Check the sections FileInfo and DeviceInfo."""
     for name, title in (('fileinfo', 'FileInfo'), ('deviceinfo', 'DeviceInfo')):
         if name not in ini.sections:
             findings.warning(Place(path), f'no section [{title}]', 'add it')
@@ -74,13 +67,7 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
 
 
 def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:
-    """Check that each object is in the list that it belongs to, and in one only.
-
-    Args:
-        path: The file.
-        ini: Its sections.
-        findings: Gets what is wrong.
-    """
+    """Check that each object is in the list that it belongs to, and in one only."""
     seen: dict[int, str] = {}
     for name, title in LISTS.items():
         section = ini.sections.get(name)

@@ -13,12 +13,7 @@ from arm_canopen.standard.dictionary import object_address, ObjectEntry
 
 
 def check_pdo_objects(eds: Eds, findings: Findings) -> None:
-    """Check communication and mapping parameters of every PDO.
-
-    Args:
-        eds: The file.
-        findings: Gets what is wrong.
-    """
+    """Check communication and mapping parameters of every PDO."""
     for direction in (RPDO, TPDO):
         for number in direction.numbers(eds.dictionary):
             _check_identifier(eds, direction, number, findings)

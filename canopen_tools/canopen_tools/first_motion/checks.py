@@ -39,12 +39,7 @@ def motion_mode(axis: DriveConfig) -> OperationMode:
 
 
 def read_facts(master: CanopenMaster, axis: DriveConfig, speed: float) -> AxisFacts:
-    """Read from a drive what a first motion has to know.
-
-    Args:
-        master: The master; the drive is booted.
-        axis: The axis.
-        speed: Speed that is wanted in [rad/s] or [m/s].
+    """Read from a booted drive what a first motion at a speed in [rad/s] or [m/s] has to know.
 
     Raises:
         DriveError: Its units are unknown.

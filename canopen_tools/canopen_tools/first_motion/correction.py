@@ -18,12 +18,7 @@ def apply(
 ) -> None:
     """Change keys in a bus.yml; the file is replaced as a whole, or not at all.
 
-    Args:
-        correction: The keys.
-        path: The file.
-        device: Name of the device.
-        joint: Name of its axis.
-        channel: Place of the axis in ``channels``; None for a device with one axis.
+    The channel is the place of the axis in ``channels``; None for a device with one axis.
 
     Raises:
         FirstMotionError: It has a form in which nothing is changed, or the result would differ.

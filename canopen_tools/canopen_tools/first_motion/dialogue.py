@@ -20,12 +20,7 @@ class FirstMotionError(CanopenError):
 
 
 def ask_seen(kind: JointKind, reported: float) -> Seen:
-    """Ask what the person saw.
-
-    Args:
-        kind: What the joint does.
-        reported: Distance that the drive reports, in [rad] or [m].
-    """
+    """Ask what the person saw; the drive reports a distance in [rad] or [m]."""
     say(
         'What did you see? + is the direction in which the position of the joint shall grow (of '
         'its axis in the URDF, by the right-hand rule).'

@@ -48,13 +48,7 @@ class ProfileMover:
     def __init__(
         self, master: CanopenMaster, axis: DriveConfig, plan: MotionPlan, speed_dev: int
     ) -> None:
-        """Write the speed.
-
-        Args:
-            master: The master.
-            axis: The axis.
-            plan: The motion.
-            speed_dev: Its speed in velocity units of the drive.
+        """Write the speed, in velocity units of the drive.
 
         Raises:
             DriveError: The drive does not take the speed; nothing has moved.

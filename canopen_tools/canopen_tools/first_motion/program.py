@@ -124,11 +124,7 @@ def _correct(
     record: Record,
     judgement: Judgement,
 ) -> bool:
-    """Show the change of bus.yml, and make it when the person wants.
-
-    Returns:
-        Whether it was made.
-    """
+    """Show the change of bus.yml, and make it when the person wants; return whether it was."""
     causes, is_certain = judgement.causes, judgement.verdict is Verdict.WRONG_SIGN
     cause = None
     if causes:

@@ -23,13 +23,7 @@ class SlowMotion:
     """
 
     def __init__(self, axis: str, target: float, speed: float) -> None:
-        """Begin at rest.
-
-        Args:
-            axis: Name of the drive.
-            target: Where it ends, in [rad] or [m].
-            speed: Largest speed per second.
-        """
+        """Begin at rest, towards a target in [rad] or [m], at most at speed [1/s]."""
         self.axes: Sequence[str] = (axis,)  # name of the drive
         self.problem = ''  # why the drive was taken away; empty while it follows
         self._target = target

@@ -41,11 +41,7 @@ class FrameDescriber:
     """
 
     def __init__(self, config: BusConfig | None = None) -> None:
-        """Prepare for a bus.
-
-        Args:
-            config: What is on the bus; without it devices have numbers and PDOs no objects.
-        """
+        """Prepare for a bus; without it devices have numbers and PDOs no objects."""
         self._names: dict[int, str] = {}
         self._objects: dict[int, ObjectNames] = {}
         self._sdo: dict[int, SdoFollower] = {}

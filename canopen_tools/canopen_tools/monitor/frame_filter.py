@@ -29,10 +29,7 @@ class FrameFilter:
     """
 
     def __init__(self, terms: Sequence[str] = ()) -> None:
-        """Prepare the terms.
-
-        Args:
-            terms: Terms of the table above; several may stand in one, with commas.
+        """Read terms of the table above; several may stand in one, with commas.
 
         Raises:
             ValueError: A term is none of these.

@@ -44,13 +44,10 @@ class LineFormat:
     def __init__(
         self, style: TimeStyle, wall_offset: float, *, color: bool = False, node_width: int = 9
     ) -> None:
-        """Prepare the columns.
+        """Prepare the columns; wall_offset is wall clock minus that of the time stamps in [s].
 
-        Args:
-            style: How to show the time.
-            wall_offset: Wall clock minus the clock of the time stamps in [s].
-            color: Paint the meaning by its service, and alerts in red.
-            node_width: Characters that the name of a device takes.
+        Colors paint the meaning by its service, and alerts in red. The name of a device takes
+        node_width characters.
         """
         self._style = style
         self._offset = wall_offset

@@ -19,14 +19,7 @@ class PdoDescriber:
     """Describes the frames of one PDO."""
 
     def __init__(self, label: str, node: NodeConfig, pdo: PdoConfig, names: ObjectNames) -> None:
-        """Prepare the mapping.
-
-        Args:
-            label: e.g. ``TPDO1``.
-            node: The device.
-            pdo: Its PDO.
-            names: Names of the device's objects.
-        """
+        """Prepare the mapping; the label is like ``TPDO1``."""
         self._label = label
         self._node = node.name
         self._node_id = node.node_id

@@ -59,11 +59,6 @@ class SdoFollower:
     """Puts the SDO frames of one device into words."""
 
     def __init__(self, names: ObjectNames) -> None:
-        """Begin with no transfer on.
-
-        Args:
-            names: Names and types of the device's objects.
-        """
         self._names = names
         self._transfer: _Transfer | None = None
         self._block = BlockFollower(names)

@@ -115,13 +115,7 @@ def _consumer_text(entry: ConsumerHeartbeatTime) -> str:
 
 
 def value_text(index: int, subindex: int, value: Value) -> str:
-    """Write a value as a person reads it.
-
-    Args:
-        index: Object index.
-        subindex: Sub-index.
-        value: Decoded value.
-    """
+    """Write a decoded value as a person reads it."""
     if isinstance(value, bytes):
         return value.hex(' ') or 'nothing'
     if isinstance(value, str):
@@ -152,13 +146,9 @@ def _is_pdo(index: int, *bases: int) -> bool:
 
 
 def data_text(index: int, subindex: int, data_type: DataType | None, data: bytes) -> str:
-    """Write the bytes of an SDO as a person reads them.
+    """Write the bytes of an SDO as a person reads them; expedited ones may exceed their type.
 
-    Args:
-        index: Object index.
-        subindex: Sub-index.
-        data_type: Type by the EDS, None when it is unknown.
-        data: The value as it was sent; an expedited one may be longer than its type.
+    The type by the EDS is None when it is unknown.
     """
     data_type = data_type or _likely_type(index, len(data))
     if data_type is None:

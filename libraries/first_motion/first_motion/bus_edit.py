@@ -34,14 +34,8 @@ def edited(
 
     A key that stands there gets its new value; others are added below the first key. Comments,
     order and quotes of everything else stay. A line above says why, and a comment behind a value
-    that is changed begins with ``before:``.
-
-    Args:
-        text: A bus.yml that could be read.
-        device: Name of the device.
-        values: New values by key.
-        reason: Why, in a line.
-        channel: Place of the axis in ``channels``; None for a device with one axis.
+    that is changed begins with ``before:``. The channel is the place of the axis in ``channels``,
+    None for a device with one axis.
 
     Raises:
         BusEditError: The device is an alias, or its axes have no ``channels`` to write to.
@@ -67,12 +61,8 @@ def replace_file(
     """Change a file; it is replaced as a whole, or not at all.
 
     Where the path is a link its file is changed, and the link stays: a workspace that is built
-    with links has the file in its sources.
-
-    Args:
-        path: The file.
-        edit: Returns the new text for the one that it has.
-        check: Looks at the new file, and raises where it must not take the place of the old one.
+    with links has the file in its sources. The check raises where the new file must not take the
+    place of the old one.
     """
     path = path.resolve()
     text = edit(path.read_text(encoding='utf-8'))

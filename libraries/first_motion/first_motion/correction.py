@@ -27,13 +27,7 @@ class Correction:
 
 
 def propose(scales: AxisScales, judgement: Judgement, cause: Cause | None) -> Correction:
-    """Return the correction of a sign or scale.
-
-    Args:
-        scales: Those of the axis that moved.
-        judgement: What was concluded; its verdict wants a change.
-        cause: The cause of a wrong scale; None takes it by what was seen by eye.
-    """
+    """Return the correction of a sign or scale; cause None takes it by what was seen by eye."""
     turned = 'the sign was wrong'
     if judgement.verdict is Verdict.WRONG_SIGN:
         factor, why = 1.0, turned

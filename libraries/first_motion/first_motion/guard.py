@@ -77,11 +77,7 @@ class MotionPlan:
     others: Mapping[str, float] = field(default_factory=dict)  # where the other joints stand
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be guarded: nothing is beyond a limit that is not a number.
-
-        Raises:
-            ValueError: A value is not finite, or the joint would not move.
-        """
+        """Refuse what cannot be guarded: nothing is beyond a limit that is not a number."""
         for name in ('start', 'distance', 'speed', 'increment'):
             if not math.isfinite(value := getattr(self, name)):
                 raise ValueError(f'{name} of the motion is {value}; no motion can be guarded')
@@ -116,12 +112,7 @@ class MotionGuard:
     """Decides, sample by sample, whether the joint may move on."""
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
-        """Begin at rest, and without a key.
-
-        Args:
-            plan: The motion.
-            now: Time.
-        """
+        """Begin at rest, and without a key."""
         self.plan = plan  # the motion
         self.outcome = Outcome.RUNNING  # how it ended
         self.detail = ''  # the same with figures, for a person; empty while it runs
@@ -144,13 +135,10 @@ class MotionGuard:
         return self._end(Outcome.FINISHED if self._has_begun else Outcome.IDLE)
 
     def step(self, now: float, sample: Sample, *, held: bool, busy: bool) -> Order:
-        """Take a sample; return what is to be done.
+        """Take a sample of the drives; return what is to be done.
 
-        Args:
-            now: Time.
-            sample: What the drives report.
-            held: The person holds the key.
-            busy: The drive still carries out what was ordered last, so it is not ordered to go.
+        Held: the person holds the key. Busy: the drive still carries out what was ordered last, so
+        it is not ordered to go.
         """
         if self.outcome is not Outcome.RUNNING:
             return Order.END

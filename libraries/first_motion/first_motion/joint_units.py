@@ -84,12 +84,9 @@ def too_fast(kind: JointKind, speed: float) -> str:
 
 
 def too_few_increments(kind: JointKind, distance: float, scale: float) -> str:
-    """Return why a distance cannot be seen; empty when it can.
+    """Return why a distance in [rad] or [m] cannot be seen; empty when it can.
 
-    Args:
-        kind: What the joint does.
-        distance: How far it shall go, in [rad] or [m].
-        scale: Increments per [rad] or [m].
+    The scale is in increments per [rad] or [m].
     """
     increments = abs(distance * scale)
     if increments >= INCREMENTS_MIN:

@@ -104,15 +104,7 @@ class Judgement:
 def judge(
     kind: JointKind, commanded: float, reported: float, seen: Seen, facts: DriveFacts
 ) -> Judgement:
-    """Conclude from a motion.
-
-    Args:
-        kind: What the joint does.
-        commanded: Distance that was commanded, in [rad] or [m].
-        reported: Distance that the drive reports, likewise.
-        seen: What the person saw.
-        facts: What the drive says about itself.
-    """
+    """Conclude from a motion, commanded and reported in [rad] or [m]."""
     if seen.other_joint:
         return Judgement(
             Verdict.OTHER_JOINT,

@@ -32,10 +32,8 @@ class AxisScales:
 def corrected(axis: AxisScales, sign: int, factor: float) -> dict[str, float | bool]:
     """Return the keys to change with their new values, in the order of the file.
 
-    Args:
-        axis: The axis with the scales that the master uses.
-        sign: -1 to turn the direction, else 1.
-        factor: Way of the joint over what the drive reported, without the sign.
+    The sign is -1 to turn the direction, and the factor the way of the joint over what the drive
+    reported, without the sign.
     """
     change = sign / factor
     to_dev = axis.scale_pos_to_dev * change

@@ -114,11 +114,8 @@ def boot_writes(
 ) -> list[BootWrite]:
     """Return everything that is written to a device at boot, in this order.
 
-    Args:
-        bus: The bus.
-        node: The device.
-        consumers: What the device holds in 0x1016, read while :func:`consumer_to_read` names an
-            entry; None: as in its EDS.
+    What the device holds in 0x1016 is read while :func:`consumer_to_read` names an entry; None
+    takes it from its EDS.
     """
     return list(_Plan(bus, node, consumers).writes())
 
@@ -128,10 +125,7 @@ def held_after_boot(
 ) -> list[BootWrite]:
     """Return what the device holds after its boot: what was written, and mappings that it has.
 
-    Args:
-        bus: The bus.
-        node: The device.
-        consumers: As with :func:`boot_writes`.
+    Consumers are those of :func:`boot_writes`.
     """
     writes = [*_fixed_mappings(node), *assumed_cob_ids(node), *boot_writes(bus, node, consumers)]
     return list({write.address: write for write in writes}.values())  # the last one counts
@@ -143,13 +137,7 @@ def is_requested(bus: BusConfig, node: NodeConfig, *keys: str) -> bool:
 
 
 def consumer_to_read(bus: BusConfig, node: NodeConfig, held: HeldConsumers) -> int | None:
-    """Return the entry of 0x1016 that has to be read next; None when the master's is known.
-
-    Args:
-        bus: The bus.
-        node: The device.
-        held: What was read so far.
-    """
+    """Return the entry of 0x1016 to read next after those held; None: the master's is known."""
     for subindex in _watch_slots(bus, node):
         if subindex not in held:
             return subindex

@@ -124,13 +124,7 @@ class NodeConfig:
         return None if value & COB_ID_INVALID else value & CAN_ID_MASK
 
     def write_timeout(self, index: int, subindex: int, usual: float | None = None) -> float:
-        """Return how long the device may take for a write in [s].
-
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            usual: How long it may take for any object in [s]; None for :attr:`sdo_timeout`.
-        """
+        """Return how long the device may take for a write in [s], usually sdo_timeout."""
         write = self.write_of(index, subindex)
         if write is not None and write.timeout is not None:
             return write.timeout
@@ -141,10 +135,7 @@ class NodeConfig:
     ) -> Value | None:
         """Return what an object holds after boot by the files; None where no file has it.
 
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            data_type: Its type where the EDS does not have it.
+        The data type is for an object that the EDS lacks.
 
         Raises:
             CodecError: What is written to it at boot does not fit its type.

@@ -54,11 +54,7 @@ class FactorGroup:
 
     @classmethod
     def read(cls, value: Callable[[int, int], int | None]) -> FactorGroup:
-        """Make one of what the objects hold.
-
-        Args:
-            value: Returns what an object of the first axis holds; None where there is none.
-        """
+        """Make one of what value returns for objects of the first axis, None for those missing."""
         ratios = {
             name: _ratio(value(index, 1), value(index, 2))
             for name, index in FACTOR_OBJECTS.items()

@@ -26,12 +26,7 @@ EVENT_TIMER_SUBINDEX = 5
 
 
 def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
-    """Return a TPDO of a drive with an event timer, if it needs one and nobody has chosen.
-
-    Args:
-        pdo: The TPDO.
-        dictionary: The objects of its device.
-    """
+    """Return a TPDO of a drive with an event timer, if it needs one and nobody has chosen."""
     index = Index.TPDO_COMMUNICATION + pdo.number - 1
     entry = dictionary.get(index, EVENT_TIMER_SUBINDEX)
     chosen = pdo.event_time is not None or pdo.transmission < EVENT_DRIVEN
@@ -48,9 +43,7 @@ def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
 def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
     """Return the time in [s] after which a TPDO counts as lost; infinite where that is unknown.
 
-    Args:
-        pdo: The TPDO.
-        sync_period: Time between two SYNCs in [s]; 0 where this master sends none.
+    The SYNC period in [s] is 0 where this master sends none.
     """
     if 1 <= pdo.transmission <= SYNCHRONOUS_MAX and sync_period > 0.0:
         return max(STALE_AFTER, PERIODS_MISSED * pdo.transmission * sync_period)
@@ -60,12 +53,7 @@ def longest_silence(pdo: PdoConfig, sync_period: float) -> float:
 
 
 def loss_unnoticed(pdo: PdoConfig, silence: float) -> bool:
-    """Return whether a TPDO carries state of a drive, and nothing shows that it got lost.
-
-    Args:
-        pdo: The TPDO.
-        silence: Time in [s] after which it counts as lost.
-    """
+    """Return whether nothing shows that a drive's state got lost for silence [s] in a TPDO."""
     return silence == math.inf and _carries_state(pdo)
 
 

@@ -86,12 +86,7 @@ BUS_YML = DocumentKind(
 def read_document(
     path: str | os.PathLike[str], findings: Findings, kind: DocumentKind = BUS_YML
 ) -> YamlMap:
-    """Read a YAML file whose top level is a mapping.
-
-    Args:
-        path: The file.
-        findings: Gets duplicate keys and the like.
-        kind: What the file is meant to be.
+    """Read a YAML file whose top level is a mapping; findings gets duplicate keys and the like.
 
     Raises:
         ConfigError: The file is missing or unreadable, is not YAML, or is no mapping.
@@ -253,11 +248,7 @@ def reindent(
 ) -> list[tuple[yaml.Node, yaml.Node]]:
     """Put keys below the number that they follow, where a listing has lost their indentation.
 
-    A number without a value that is followed by words can mean nothing else.
-
-    Args:
-        pairs: Keys and values of a mapping as they are written.
-        report: Called with each number to which keys were put.
+    A number without a value that is followed by words can mean nothing else. Each is reported.
     """
     result: list[tuple[yaml.Node, yaml.Node]] = []
     for key, value in pairs:

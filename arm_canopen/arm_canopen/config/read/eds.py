@@ -37,13 +37,7 @@ class Eds:
 
 
 def load_eds(path: str | os.PathLike[str]) -> Eds:
-    """Read an EDS or DCF file.
-
-    Args:
-        path: The file.
-
-    Returns:
-        Its objects and all oddities as warnings.
+    """Read an EDS or DCF file; oddities are its warnings.
 
     Raises:
         ConfigError: The file is missing, unreadable or has no objects.

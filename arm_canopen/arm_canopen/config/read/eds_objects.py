@@ -222,11 +222,7 @@ class ObjectReader:
                     yield from _compact_mapping(mapping + number)
 
     def _check_lists(self, compact: set[int]) -> None:
-        """Compare the three lists of objects with the sections that there are.
-
-        Args:
-            compact: Objects that need no section.
-        """
+        """Compare the three lists of objects with the sections, which compact ones do not need."""
         listed: set[int] = set()
         for name in LISTS:
             section = self._ini.sections.get(name)

@@ -50,10 +50,6 @@ def parse_integer(text: str) -> int:
 def parse_value(data_type: DataType, text: str) -> EdsValue | None:
     """Read a DefaultValue, ParameterValue or limit.
 
-    Args:
-        data_type: Type of the object.
-        text: Text right of the equals sign.
-
     Returns:
         The value, or None when the text is empty or the type has no value in a file (DOMAIN).
 

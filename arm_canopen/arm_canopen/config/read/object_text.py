@@ -13,11 +13,7 @@ BYTE_TYPES = frozenset({DataType.DOMAIN, DataType.OCTET_STRING, *TIME_BITS})
 
 
 def text_from_bytes(data_type: DataType, data: bytes) -> str:
-    """Write a value as text: a number, true or false, a string, or bytes in hexadecimal.
-
-    Args:
-        data_type: Type of the object.
-        data: Its bytes, as an SDO carries them.
+    """Write the bytes of an SDO as text: a number, true or false, a string, or hexadecimal bytes.
 
     Raises:
         CodecError: The bytes do not fit the type.
@@ -32,10 +28,6 @@ def bytes_from_text(data_type: DataType, text: str) -> bytes:
     """Read a value from text; the inverse of :func:`text_from_bytes`.
 
     Whole numbers may be hexadecimal, with ``0x``.
-
-    Args:
-        data_type: Type of the object.
-        text: The value.
 
     Raises:
         CodecError: The text is no value of this type.

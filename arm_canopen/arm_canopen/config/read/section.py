@@ -33,11 +33,6 @@ def read_section(mapping: YamlMap, keys: Sequence[Key], findings: Findings) -> d
 
     Blocks (lists and mappings) are left to their own readers.
 
-    Args:
-        mapping: The section.
-        keys: Its table.
-        findings: Gets unknown keys, bad values and keys that are not used.
-
     Returns:
         Values in units of the model by field; defaults of the table are filled in.
     """

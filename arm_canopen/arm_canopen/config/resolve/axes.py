@@ -22,13 +22,7 @@ POLICIES = {policy.value: policy for policy in RecoveryPolicy}
 
 
 def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> DriveConfig:
-    """Build the settings that count for all axes of a drive.
-
-    Args:
-        section: Section of the device.
-        values: Values of its drive keys by field.
-        findings: Gets what is wrong.
-    """
+    """Build the settings that count for all axes of a drive from its drive keys by field."""
     if 'switching_state' in values:
         values['switching_state'] = _switching_state(section, values, findings)
     if 'recovery' in values:
@@ -49,15 +43,7 @@ def check_node_name(name: str, place: Place, findings: Findings) -> None:
 def read_axes(
     name: str, section: YamlMap, count: int, drive: DriveConfig, findings: Findings
 ) -> tuple[DriveConfig, ...]:
-    """Return one record for each axis.
-
-    Args:
-        name: Name of the device.
-        section: Its section.
-        count: Number of axes.
-        drive: What counts for all of them.
-        findings: Gets what is wrong.
-    """
+    """Return one record for each axis; what counts for all of them is in drive."""
     names = [name] if count == 1 else [f'{name}_{number}' for number in range(count)]
     given = listing(section, 'channel_names', findings)
     if given is not None:

@@ -27,17 +27,7 @@ DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
 def resolve_bus(
     document: YamlMap, file: Path, bus_config_path: Path | None, findings: Findings
 ) -> BusConfig:
-    """Make a bus of its bus.yml and the EDS files that this names.
-
-    Args:
-        document: What stands in the bus.yml.
-        file: The bus.yml.
-        bus_config_path: What ``@BUS_CONFIG_PATH@`` stands for; the folder of the file when None.
-        findings: Gets everything that is wrong.
-
-    Returns:
-        The bus without what is wrong.
-    """
+    """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
     layout = lay_out(document, findings)
     options = read_options(layout.options, findings)
     settings = read_master_settings(layout.master, findings)

@@ -32,16 +32,11 @@ RESERVED: tuple[tuple[range, str], ...] = (
 
 
 def assign_cob_ids(drafts: Sequence[PdoDraft], findings: Findings) -> list[PdoDraft]:
-    """Give every PDO its final COB-ID.
+    """Give every PDO its final COB-ID, in the order of the file.
 
-    Args:
-        drafts: All PDOs of the bus in the order of the file.
-        findings: Gets reserved and doubled identifiers. When only EDS defaults are concerned,
-            these are warnings; two RPDOs with one identifier, of which one frame would move two
-            axes, are an error.
-
-    Returns:
-        The PDOs in the same order.
+    Reserved and doubled identifiers are reported. When only EDS defaults are concerned, these
+    are warnings; two RPDOs with one identifier, of which one frame would move two axes, are an
+    error.
     """
     used = {draft.config.cob_id for draft in drafts if draft.config.enabled and not draft.auto}
     free = iter([cob_id for cob_id in FREE_RANGE if cob_id not in used])

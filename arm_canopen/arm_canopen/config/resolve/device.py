@@ -46,15 +46,7 @@ class DeviceDraft:
 def read_device(
     name: str, section: YamlMap, options: Options, eds_files: EdsFiles, findings: Findings
 ) -> DeviceDraft:
-    """Read everything about a device that does not depend on master and other devices.
-
-    Args:
-        name: Its name.
-        section: Its section, defaults merged.
-        options: Section ``options``.
-        eds_files: The EDS files of the bus.
-        findings: Gets everything that is wrong.
-    """
+    """Read everything about a device that does not depend on master and other devices."""
     settings, axes = read_device_settings(name, section, findings)
     eds = _find_eds(section, settings, options, eds_files, findings)
     names = texts(section, 'remappings', findings)

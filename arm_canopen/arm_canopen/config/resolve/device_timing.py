@@ -38,14 +38,7 @@ class BusContext:
 def finish_device(
     draft: DeviceDraft, config: NodeConfig, context: BusContext, findings: Findings
 ) -> NodeConfig:
-    """Complete a device.
-
-    Args:
-        draft: The device; its PDOs have their final COB-IDs.
-        config: Its configuration so far.
-        context: The keys of the whole bus.
-        findings: Gets what does not fit together.
-    """
+    """Complete a device whose PDOs have their final COB-IDs."""
     master = context.master
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)

@@ -15,12 +15,7 @@ from .pdos import PdoDraft
 
 
 def check_drive_types(pdos: Sequence[PdoDraft], findings: Findings) -> None:
-    """Refuse mapped objects that have no sign for the direction.
-
-    Args:
-        pdos: The PDOs of a drive.
-        findings: Gets what is wrong.
-    """
+    """Refuse mapped objects of a drive that have no sign for the direction."""
     for pdo in pdos:
         for mapped in _unsigned(pdo):
             findings.error(

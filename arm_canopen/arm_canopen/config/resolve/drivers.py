@@ -49,14 +49,7 @@ BASE_CLASSES = {
 
 
 def check_driver(section: YamlMap, name: str, findings: Findings, *, for_master: bool) -> None:
-    """Check the driver class of the master or of a device, and its package.
-
-    Args:
-        section: Section that names it.
-        name: Its name; empty when the section names none.
-        findings: Gets what is wrong.
-        for_master: The section is that of the master.
-    """
+    """Check the driver class of the master or of a device, empty for none, and its package."""
     known = [driver for driver in DRIVER_CLASSES if driver.for_master == for_master]
     item = section.entries.get('driver')
     place = item.place if item is not None else section.place

@@ -26,17 +26,7 @@ class EdsFiles:
         self._read: dict[Path, Eds | None] = {}
 
     def find(self, dcf: str, dcf_path: str, item: Item, findings: Findings) -> Eds | None:
-        """Find and read a file.
-
-        Args:
-            dcf: File name as bus.yml gives it.
-            dcf_path: Folder as bus.yml gives it, empty for none.
-            item: What names the file, for messages.
-            findings: Gets a missing file and the file's own warnings.
-
-        Returns:
-            Its content, None when that cannot be had.
-        """
+        """Find and read a file by its name and folder in bus.yml, and report what is wrong."""
         candidates = self._candidates(dcf, dcf_path)
         for path in candidates:
             if _exists(path):
@@ -56,12 +46,7 @@ class EdsFiles:
         return None
 
     def default_drive(self, item: Item, findings: Findings) -> Eds | None:
-        """Return what any CiA 402 drive has, for a drive without a file of its own.
-
-        Args:
-            item: The section of the device, for messages.
-            findings: Gets a warning.
-        """
+        """Return what any CiA 402 drive has, with a warning, for a drive without a file."""
         findings.warning(
             item.place,
             "no 'dcf': it is taken for a CiA 402 drive as the standard has it; which device "

@@ -44,15 +44,7 @@ def build_master(
     device_periods: list[float],
     findings: Findings,
 ) -> MasterConfig:
-    """Build the master's configuration.
-
-    Args:
-        section: Section ``master``.
-        settings: Its values.
-        options: Section ``options``.
-        device_periods: ``period`` of every device in [s]; they count when there is no SYNC.
-        findings: Gets times that do not fit together.
-    """
+    """Build the master's configuration; periods of devices in [s] count when there is no SYNC."""
     time_period = _time_period(settings)
     same = {field: getattr(settings, field) for field in TAKEN_OVER}
     return MasterConfig(

@@ -27,12 +27,7 @@ AXES = range(0x6000, 0xA000)  # CiA 402-2, 7.2
 
 
 def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
-    """Return the writes of a DCF in ascending order; an EDS has none.
-
-    Args:
-        eds: The file, node-relative values resolved.
-        findings: Gets values that are not written, and why.
-    """
+    """Return the writes of a DCF in ascending order; an EDS has none, nor has what is reported."""
     return tuple(
         SdoWrite(
             *entry.address, data, location=SourceLocation(key=f'ParameterValue of {eds.path.name}')

@@ -51,16 +51,9 @@ def is_fixed(direction: Direction, number: int, dictionary: ObjectDictionary) ->
 def eds_mapping(
     direction: Direction, number: int, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
-    """Return the mapping that a PDO has by the EDS.
+    """Return the mapping that a PDO has by the EDS; empty when it cannot be understood.
 
-    Args:
-        direction: TPDO or RPDO.
-        number: Number of the PDO.
-        eds: The device.
-        findings: Gets warnings about objects that the EDS does not have, or not of this length.
-
-    Returns:
-        The mapping, empty when it cannot be understood.
+    Objects that the EDS does not have, or not of this length, are reported as warnings.
     """
     entries = eds.dictionary.subindices(direction.mapping + number - 1)
     count = entries[0].default if entries and entries[0].subindex == 0 else 0
@@ -114,15 +107,7 @@ def _from_word(
 def read_mapping(
     direction: Direction, number: int, entries: YamlList, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
-    """Read the mapping that bus.yml gives a PDO.
-
-    Args:
-        direction: TPDO or RPDO.
-        number: Number of the PDO.
-        entries: The list ``mapping``.
-        eds: The device.
-        findings: Gets objects that cannot be mapped, and mappings that are too long.
-    """
+    """Read the list ``mapping`` that bus.yml gives a PDO; report what cannot be mapped."""
     mapping = tuple(_mapped_objects(direction, entries, eds, findings))
     bits = sum(mapped.bits for mapped in mapping)
     slots = mapping_slots(direction, number, eds.dictionary)

@@ -53,15 +53,7 @@ class PdoReader:
     def __init__(
         self, name: str, device: YamlMap, eds: Eds, node_id: int, *, findings: Findings
     ) -> None:
-        """Keep what the device is.
-
-        Args:
-            name: Its name.
-            device: Its section, defaults merged.
-            eds: Its EDS, node-relative defaults resolved.
-            node_id: Its node id.
-            findings: Gets PDOs that the device does not have, and everything wrong with one.
-        """
+        """Prepare for a device, whose EDS has node-relative defaults resolved."""
         self._name = name
         self._device = device
         self._eds = eds

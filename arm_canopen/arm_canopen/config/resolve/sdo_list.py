@@ -46,13 +46,6 @@ class SdoReader:
     """Reads what a device's section wants written at boot."""
 
     def __init__(self, dictionary: ObjectDictionary, findings: Findings) -> None:
-        """Keep the device's objects.
-
-        Args:
-            dictionary: Objects of the device.
-            findings: Gets objects that do not exist or cannot be written, and values that do not
-                fit.
-        """
         self._dictionary = dictionary
         self._findings = findings
 

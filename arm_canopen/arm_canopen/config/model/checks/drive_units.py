@@ -117,13 +117,7 @@ def _motion(
 def reported_increments(
     bus: BusConfig, node: NodeConfig, axis: DriveConfig, position: float
 ) -> int:
-    """Return what an axis reports in 0x6064 at a position, in [inc].
-
-    Args:
-        bus: The bus.
-        node: A drive on it.
-        axis: One of its axes.
-        position: A position in user units.
+    """Return what an axis reports in 0x6064 at a position in user units, in [inc].
 
     Raises:
         ValueError: It is not a number, or does not fit 0x6064 (INTEGER32).
@@ -251,11 +245,7 @@ def _check_offsets(subject: Subject, axis: DriveConfig, units: AxisUnits) -> Non
 
 
 def is_coarse(scale: float) -> bool:
-    """Whether whole increments miss positions by more than the tolerance.
-
-    Args:
-        scale: Increments per user unit.
-    """
+    """Whether whole increments miss positions by more than the tolerance."""
     return 0.5 / abs(scale) > POSITION_TOLERANCE
 
 

@@ -56,10 +56,7 @@ def check_bus(
 ) -> Report:
     """Check a bus as a whole.
 
-    Args:
-        config: The bus; its own warnings are not repeated.
-        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
-        findings: What was found before, which the report then has, too.
+    The bit rate in [bit/s] replaces that of bus.yml. Findings have what was found before.
     """
     findings = Findings() if findings is None else findings
     subjects = [Subject(config, node, findings) for node in config.nodes]

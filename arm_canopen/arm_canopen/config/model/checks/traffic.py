@@ -72,12 +72,7 @@ class LoadEstimate:
 
 
 def estimate_load(config: BusConfig, bitrate: int | None = None) -> LoadEstimate:
-    """Estimate the load of a bus.
-
-    Args:
-        config: The bus.
-        bitrate: Bit rate in [bit/s]; None takes that of bus.yml.
-    """
+    """Estimate the load of a bus; the bit rate in [bit/s] replaces that of bus.yml."""
     traffic = [*_master_traffic(config)]
     for node in config.nodes:
         subject = Subject(config, node, Findings())
