@@ -131,7 +131,7 @@ class Drive:
 
     def read(self) -> None:
         """Take the state from the process image."""
-        if self.node.operational and not self._begun:
+        if not self._begun and self.node.operational:
             self._begun = True
             self.view.cache.begin()
             if self.config is self.node.config.drive:  # one axis polls for all
@@ -143,7 +143,7 @@ class Drive:
         self._state = view.state
         if view.state is DriveState.UNKNOWN:
             return
-        self.following_error = self.control.setpoint - view.position
+        self.following_error = self.control.setpoint - view.observed
         if before is DriveState.UNKNOWN and self.node.taken_over and self.control.goal is None:
             self._take_over()
         elif self._unknown and view.fresh:
@@ -333,21 +333,23 @@ class Drive:
             return
         bit = bool(self.view.statusword & FOLLOWS_COMMAND)
         before, self._follows = self._follows, bit
-        rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
-        if before and not bit and not rests:  # in mode 7 bit 12 may go where nothing moves
-            self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
-            self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
+        if before and not bit:
+            rests = isinstance(mode, InterpolatedPosition) and not mode.velocity
+            if not rests:  # in mode 7 bit 12 may go where nothing moves
+                self.released(Refusal(RefusalCause.NOT_FOLLOWING, 'bit 12'))
+                self.warn(f'does not follow its set-points any more (bit 12): {self.describe()}')
         if isinstance(mode, CyclicPosition):
             self._watch_position(mode)
 
     def _watch_position(self, mode: CyclicPosition) -> None:
         view, setpoint = self.view, mode.setpoint
-        position = view.units.position_commanded(view.position_inc())
+        position = view.units.position_commanded(view.observed_inc)
         shown = mode.number is OperationMode.CYCLIC_POSITION and bool(
             view.statusword & FOLLOWING_ERROR
         )
-        margin = MARGIN_TIME * view.parameters.profile.velocity
-        window = view.parameters.following_window or margin
+        parameters = view.parameters
+        margin = MARGIN_TIME * parameters.profile.velocity
+        window = parameters.following_window or margin
         following = self._following.judge(
             self._scheduler.now,
             setpoint,

@@ -67,7 +67,10 @@ class DriveObjects:
     @property
     def controlword_muted(self) -> bool:
         """Whether an RPDO with the controlword of this axis is kept back, for whichever axis."""
-        return any(output.kept_back_by for output in self._controlling)
+        for output in self._controlling:  # noqa: SIM110  # in every cycle, as in fresh()
+            if output.kept_back_by:
+                return True
+        return False
 
     @property
     def mutes_controlword(self) -> bool:

@@ -45,6 +45,8 @@ class DriveView:
         state: State shown in the last cycle.
         statusword: 0x6041 as it was then.
         fresh: Its TPDOs showed its state in the last cycle, young enough to act on.
+        observed: Actual position as it was then, in user units; NaN before the first.
+        observed_inc: The same in [inc].
         error: 0x603F in words when it was faulted last, else empty.
         cache: Reads its parameters.
     """
@@ -73,7 +75,7 @@ class DriveView:
         self.statusword = 0
         self.fresh = False
         self.error = ''
-        self._position = math.nan
+        self.observed = self.observed_inc = math.nan
         self._looked: tuple[int, float] | None = None  # statusword and position, by SDO
         self._looked_at = -math.inf
         self._scheduler = scheduler
@@ -94,8 +96,9 @@ class DriveView:
     @property
     def _looks(self) -> bool:
         """Whether :meth:`look` has shown the state that TPDOs do not show."""
-        recent = self._scheduler.now - self._looked_at <= LOOK_AGE_MAX
-        return not self.fresh and self._looked is not None and recent
+        if self.fresh or self._looked is None:
+            return False
+        return self._scheduler.now - self._looked_at <= LOOK_AGE_MAX
 
     @property
     def age(self) -> float:
@@ -112,9 +115,9 @@ class DriveView:
     @property
     def position(self) -> float:
         """Actual position in user units: the last one of a lost drive, NaN before the first."""
-        position_inc = self.objects.position
+        position_inc = None if self._looks else self.objects.position
         if position_inc is None:
-            return self._position
+            return self.observed
         return self.units.position_from_device(position_inc)
 
     @property
@@ -222,11 +225,11 @@ class DriveView:
 
     def observe(self) -> None:
         """Take state and position from the process image, or from the last look by SDO."""
-        shown = self.objects.observe() if self.node.operational else None
-        self.fresh = shown is not None and self.objects.fresh(self._scheduler.now)
+        objects, now = self.objects, self._scheduler.now
+        shown = objects.observe() if self.node.operational else None
+        self.fresh = shown is not None and objects.fresh(now)
         if self.fresh and shown is not None:
-            stamp = self.objects.position_timestamp
-            self._estimate.note(self._scheduler.now, shown[1], stamp)
+            self._estimate.note(now, shown[1], objects.position_timestamp)
         elif self._looks:
             shown = self._looked
         else:
@@ -234,8 +237,8 @@ class DriveView:
         if shown is None:
             self.state, self.statusword = DriveState.UNKNOWN, 0
             return
-        word, position_inc = shown
-        self._position = self.units.position_from_device(position_inc)
+        word, self.observed_inc = shown
+        self.observed = self.units.position_from_device(self.observed_inc)
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 

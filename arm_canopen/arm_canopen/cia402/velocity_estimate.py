@@ -37,11 +37,11 @@ class VelocityEstimate:
                 counts as still there.
         """
         positions = self._positions
-        if stamp is not None and positions and stamp <= positions[-1][0]:
-            if now - positions[-1][0] <= self.window:
+        if stamp is not None:
+            if not positions or stamp > positions[-1][0]:
+                now = stamp
+            elif now - positions[-1][0] <= self.window:
                 return
-        elif stamp is not None:
-            now = stamp
         positions.append((now, position_inc))
         while len(positions) > 2 and positions[1][0] <= now - self.window:
             positions.popleft()

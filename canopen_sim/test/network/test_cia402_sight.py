@@ -203,6 +203,8 @@ def test_a_stop_reaches_a_drive_that_cannot_be_seen(stop: str, answers: tuple[in
             arm.net.do(BLIND, stop, preempt=True)
     else:
         arm.net.do(BLIND, stop, preempt=True)
+        shown = arm.net.drives[BLIND].view.position
+        assert shown == pytest.approx(arm.motor(BLIND), abs=2e-3)
     device = arm.net.devices[BLIND].drive
     assert device is not None
     assert device.velocity == 0.0
