@@ -15,8 +15,7 @@ from arm_model import RobotModel
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 """The robots, a chain with sliding joints, and a tree."""
 
-ROUNDING = 1e-4
-"""Accuracy of a distance that was searched for from another begin in [m]."""
+ROUNDING = 1e-4  # accuracy of a distance that was searched for from another begin in [m]
 
 
 @pytest.mark.parametrize('model', ARMS, ids=lambda model: model.name)

@@ -35,8 +35,7 @@ CORNERS = list(product((-0.5, 0.5), repeat=3))
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
 TRIANGLES = [(a, b, c) for a, b, c, _ in FACES] + [(a, c, d) for a, _, c, d in FACES]
 
-SHAPE = '<geometry><sphere radius="0.03"/></geometry>'
-"""What :func:`chain_texts` makes links of."""
+SHAPE = '<geometry><sphere radius="0.03"/></geometry>'  # what :func:`chain_texts` makes links of
 
 
 def obj() -> str:

@@ -37,8 +37,7 @@ if TYPE_CHECKING:
     from isolation import Isolation
     from typing_extensions import Self
 
-TIMEOUT = 60.0
-"""Longest time for an answer in [s]."""
+TIMEOUT = 60.0  # longest time for an answer in [s]
 
 JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
@@ -54,12 +53,7 @@ def robots() -> Path:
 
 
 def moveit_package(name: str, folder: Path) -> Path:
-    """Write a package as the Setup Assistant writes it, with a virtual joint in its SRDF.
-
-    Args:
-        name: panda or prbt.
-        folder: Where to.
-    """
+    """Write a package as the Setup Assistant writes it, with a virtual joint in its SRDF."""
     path = folder / f'{name}_moveit_config'
     shutil.copytree(PACKAGES / name, path)
     source, root = SEMANTICS[name]
@@ -73,12 +67,7 @@ def moveit_package(name: str, folder: Path) -> Path:
 
 
 def panda_parameters(folder: Path, **others: object) -> Path:
-    """Write what describes the Panda as a parameter file.
-
-    Args:
-        folder: Where to.
-        **others: Further parameters.
-    """
+    """Write what describes the Panda as a parameter file."""
     panda = robots() / 'panda'
     values = {
         'robot_description': expand_xacro(panda / 'panda.urdf.xacro'),
@@ -108,8 +97,6 @@ class MoveGroupRig:
         """Start it.
 
         Args:
-            isolation: Its domain.
-            *arguments: Of move_group.
             positions: Of the joints in [rad]; by default the Panda's ready.
         """
         self.positions = dict(positions or zip(JOINTS, READY, strict=True))

@@ -25,11 +25,8 @@ from arm_model import (
 from arm_planning import OrientationConstraint, PathConstraints, PositionConstraint
 from arm_trajectory import Path
 
-DENSE = 1e-3
-"""Motion of a joint from one look of the independent sampler to the next in [rad]."""
-
-RATE_TOLERANCE = 1e-6
-"""Share by which a limit may be exceeded, for rounding."""
+DENSE = 1e-3  # motion of a joint from one look of the independent sampler to the next in [rad]
+RATE_TOLERANCE = 1e-6  # share by which a limit may be exceeded, for rounding
 
 
 def with_box(

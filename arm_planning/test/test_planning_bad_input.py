@@ -161,8 +161,7 @@ def near(joint: str, position: float) -> JointConstraint:
 
 
 JOINT, POSE, CODE = joint_goal(MOVED), in_front(), PlanningCode
-FOLDED = [0.0, 1.7, 0.0, -2.9, 0.0, 1.57, 0.785]
-"""Where the hand touches the base in [rad]."""
+FOLDED = [0.0, 1.7, 0.0, -2.9, 0.0, 1.57, 0.785]  # where the hand touches the base in [rad]
 
 
 Refusal = tuple[str, MotionPlanRequest, PlanningCode, str]

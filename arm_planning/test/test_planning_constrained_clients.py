@@ -47,8 +47,7 @@ HAND = 'panda_link8'
 START = READY
 GOAL = [0.303, 0.397, 1.997, -1.993, -0.37, 1.805, 1.306]
 """Another state in which the hand looks down in [rad]; it does not on the straight way there."""
-STEP = 4e-3
-"""Time between two looks in [s]."""
+STEP = 4e-3  # time between two looks in [s]
 URDF = ET.fromstring(expand_xacro(robots() / 'panda' / 'panda.urdf.xacro'))  # noqa: S314
 
 
@@ -112,8 +111,7 @@ def vector(rotation: Array) -> Array:
     return skew * (angle / (2.0 * math.sin(angle)) if angle > 1e-9 else 0.5)
 
 
-DOWN = np.diag([1.0, -1.0, -1.0])
-"""The hand looks down."""
+DOWN = np.diag([1.0, -1.0, -1.0])  # the hand looks down
 
 
 def keeps_level(parameterization: int) -> tuple[Constraints, Callable[[Array], float]]:

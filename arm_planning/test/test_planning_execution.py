@@ -32,7 +32,6 @@ class Controller:
     """An action client of a controller that answers as the test wants."""
 
     def __init__(self) -> None:
-        """Accept what comes."""
         self.is_ready, self.cancels = True, 0
         self.result: Future[Any] = Future()
         self.forgets = False
@@ -89,7 +88,6 @@ class Bench:
         monkeypatch: pytest.MonkeyPatch,
         known: Mapping[str, controllers.Controller] = ARM,
     ) -> None:
-        """Put it together."""
         self.clients = {each.action(name): Controller() for name, each in known.items()}
         self.controller = next(iter(self.clients.values()))
         self.ends: list[tuple[PlanningCode, str]] = []

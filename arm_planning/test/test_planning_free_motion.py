@@ -34,23 +34,12 @@ pytestmark = pytest.mark.slow
 SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '6')))
 """Of the random scenes; more of them by the environment."""
 
-OVERLAP_TOLERANCE = 1e-6
-"""Overlap that counts as rounding in [m]."""
-
-TIMEOUT = 60.0
-"""Time for planning in [s]: a busy machine is no failure."""
-
-LENGTH, LINE_TOLERANCE = 0.2, 1e-4
-"""A straight way of the tip, and how far it may be off, in [m]."""
-
-NEARBY = 0.12
-"""How far a motion leads in [m] or [rad]."""
-
-JUMP = 1e-6
-"""Of a position in [rad] or its derivatives, where one motion follows another."""
-
-AROUND = 0.9
-"""How far a goal may be from the ready pose in [rad]."""
+OVERLAP_TOLERANCE = 1e-6  # overlap that counts as rounding in [m]
+TIMEOUT = 60.0  # time for planning in [s]: a busy machine is no failure
+LENGTH, LINE_TOLERANCE = 0.2, 1e-4  # a straight way of the tip, and how far it may be off, in [m]
+NEARBY = 0.12  # how far a motion leads in [m] or [rad]
+JUMP = 1e-6  # of a position in [rad] or its derivatives, where one motion follows another
+AROUND = 0.9  # how far a goal may be from the ready pose in [rad]
 
 
 def request(start: Array, goal: Array) -> MotionRequest:

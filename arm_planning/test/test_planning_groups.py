@@ -30,19 +30,13 @@ from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_changes import scene_for
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 
-ACROSS = np.pi / 2
-"""Where right_2 holds its bar across the left arm in [rad]."""
+ACROSS = np.pi / 2  # where right_2 holds its bar across the left arm in [rad]
 
 STATES = 100
 MOTIONS = 6
-SHARES = np.linspace(0.0, 1.0, 50).tolist()
-"""Where a straight motion is looked at."""
-
-STEP = 0.01
-"""Time between two looks at a motion in [s]."""
-
-SLACK = 1e-3
-"""How much less a pair may keep than nothing in [m], for looks between the planner's."""
+SHARES = np.linspace(0.0, 1.0, 50).tolist()  # where a straight motion is looked at
+STEP = 0.01  # time between two looks at a motion in [s]
+SLACK = 1e-3  # how much less a pair may keep than nothing in [m], for looks between the planner's
 
 
 @cache

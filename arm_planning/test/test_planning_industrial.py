@@ -39,11 +39,8 @@ from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow
 
-STRAIGHT = 1e-4
-"""How far a link may be off its line or arc in [m]."""
-
-TURNED = 1e-3
-"""How far it may be turned off it in [rad]."""
+STRAIGHT = 1e-4  # how far a link may be off its line or arc in [m]
+TURNED = 1e-3  # how far it may be turned off it in [rad]
 
 seeds = st.integers(0, 10**6)
 

@@ -31,7 +31,6 @@ class Bench:
     """Both actions and their clients in one node."""
 
     def __init__(self, client: RosClient) -> None:
-        """Offer them."""
         self.client = client
         self.plans = 0
         self.stops = True

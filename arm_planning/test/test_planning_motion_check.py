@@ -16,11 +16,8 @@ from arm_planning.free.motion_check import MotionCheck
 from arm_planning.validity import MARGIN, ValidityCheck
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
-MOTIONS = 40
-"""Straight motions that are compared with a dense sampler in each scene."""
-
-TOUCH = 1e-3
-"""How deep a wire is touched in [m]."""
+MOTIONS = 40  # straight motions that are compared with a dense sampler in each scene
+TOUCH = 1e-3  # how deep a wire is touched in [m]
 
 
 def plane() -> PlanningScene:

@@ -25,8 +25,7 @@ from std_srvs.srv import Empty
 from node_runner import LATCHED
 
 MOVED = [0.9, *READY[1:]]
-EDGE = 0.08
-"""Of the smallest cells in [m]."""
+EDGE = 0.08  # of the smallest cells in [m]
 
 
 def one_block(depth: int = 16) -> bytes:
@@ -55,7 +54,6 @@ class Cloud:
     """move_group and what is sent to it."""
 
     def __init__(self, rig: MoveGroupRig) -> None:
-        """Keep it."""
         self.rig = rig
 
     def apply(self, scene: PlanningScene) -> bool:

@@ -50,17 +50,10 @@ pytestmark = pytest.mark.slow
 SEEDS = range(int(os.environ.get('PLANNING_SEEDS', '3')))
 """Of the random scenes; more of them by the environment."""
 
-TIMEOUT = 60.0
-"""Time for planning in [s]: a busy machine is no failure."""
-
-OVERLAP_TOLERANCE = 1e-6
-"""Overlap that counts as rounding in [m]."""
-
-FREE_TURN = 4.0
-"""Tolerance of an axis about which a link may turn as it likes in [rad]."""
-
-EDGE = 1e-9
-"""Of a constraint, for rounding, in [m] and [rad]."""
+TIMEOUT = 60.0  # time for planning in [s]: a busy machine is no failure
+OVERLAP_TOLERANCE = 1e-6  # overlap that counts as rounding in [m]
+FREE_TURN = 4.0  # tolerance of an axis about which a link may turn as it likes in [rad]
+EDGE = 1e-9  # of a constraint, for rounding, in [m] and [rad]
 
 APART, AROUND = 1.0, 0.9
 """How far start and goal are apart at least, and from the ready pose at most, in [rad]."""

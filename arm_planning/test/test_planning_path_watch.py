@@ -97,7 +97,6 @@ class Executions:
     """Executions that the test begins, and what was stopped of them."""
 
     def __init__(self) -> None:
-        """Nothing is on its way."""
         self.running: list[Execution] = []
         self.stopped: list[tuple[Execution, PlanningCode, str]] = []
         self.begun: Callable[[], None] = lambda: None
@@ -126,7 +125,6 @@ class Later:
     """A thread that does its work when the test wants."""
 
     def __init__(self) -> None:
-        """Nothing is to be done."""
         self.work: list[tuple[Callable[[], Any], Callable[[Future[Any]], None]]] = []
 
     def submit(self, work: Callable[[], Any], then: Callable[[Future[Any]], None]) -> None:

@@ -39,7 +39,6 @@ class Camera:
     """
 
     def __init__(self, rig: MoveGroupRig, prefix: str = '') -> None:
-        """Publish where the table is, latched; the links of the robot have a prefix in TF."""
         self.rig = rig
         node = rig.client.node
         self._moving = node.create_publisher(TFMessage, '/tf', 100)

@@ -21,11 +21,8 @@ from arm_model import (
 from arm_planning import ValidityCheck
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
-THIN = 0.002
-"""Thickness of a sheet in [m], which coarse sampling would pass through."""
-
-NEAR = 0.0005
-"""Distance of an arm that nearly touches in [m]."""
+THIN = 0.002  # thickness of a sheet in [m], which coarse sampling would pass through
+NEAR = 0.0005  # distance of an arm that nearly touches in [m]
 
 
 @pytest.fixture

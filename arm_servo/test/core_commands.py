@@ -25,8 +25,7 @@ from arm_servo.core.requests import (
 from arm_servo.jog.servo_source import JointCommand, PoseCommand, TwistCommand
 from arm_trajectory import TrajectoryGoal
 
-TIMEOUT = 0.1
-"""Time for which a jog counts in [s]."""
+TIMEOUT = 0.1  # time for which a jog counts in [s]
 
 
 def command(

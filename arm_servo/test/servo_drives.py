@@ -39,7 +39,6 @@ class Drives:
         model: RobotModel | None = None,
         begin: Sequence[float] | None = None,
     ) -> None:
-        """Let the drives be ready to follow; a test that changes the scene has its own model."""
         self.now = 100.0
         self.gateway = CommandGateway(
             MotionCore(model or robot(name)), worker or InlineWorker(), lambda: self.now

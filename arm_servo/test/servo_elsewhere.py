@@ -38,7 +38,6 @@ class Elsewhere:
     def __init__(
         self, following: FollowingLimits | None = None, worker: Executor | None = None
     ) -> None:
-        """Stand in the ready pose."""
         model = robot('gp110')
         self.now = 50.0
         self.at = np.array(ready('gp110'))

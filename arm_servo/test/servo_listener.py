@@ -30,7 +30,6 @@ class ServoListener:
     """
 
     def __init__(self, client: RosClient, urdf: str, srdf: str) -> None:
-        """Subscribe, offer the services, and know the robot."""
         self.client = client
         node = client.node
         node.declare_parameter('robot_description', urdf)

@@ -21,18 +21,12 @@ PI = math.pi
 
 @dataclass(frozen=True, slots=True)
 class Opw:
-    """Parameters of an arm.
+    """Parameters of an arm."""
 
-    Attributes:
-        a: Offsets a1, a2 and b in [m].
-        c: Lengths c1 to c4 in [m].
-        signs: Sense of each joint against the paper's.
-        offsets: What the paper's angle is less by, theta = sign q - offset, in [rad].
-    """
-
-    a: tuple[float, float, float]
-    c: tuple[float, float, float, float]
-    signs: tuple[int, ...]
+    a: tuple[float, float, float]  # offsets a1, a2 and b in [m]
+    c: tuple[float, float, float, float]  # lengths c1 to c4 in [m]
+    signs: tuple[int, ...]  # sense of each joint against the paper's
+    # what the paper's angle is less by, theta = sign q - offset, in [rad]
     offsets: tuple[float, ...]
 
 

@@ -16,25 +16,17 @@ from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.jog.servo_source import Command, ServoSource
 from arm_trajectory import OnlineTrajectoryGenerator
 
-PERIOD = 0.01
-"""Cycle of the tests in [s]: slower than in use, so that they are quick."""
+PERIOD = 0.01  # cycle of the tests in [s]: slower than in use, so that they are quick
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """What came out of a run.
+    """What came out of a run."""
 
-    Attributes:
-        states: State after every cycle, the start first.
-        report: The last report.
-        held_up: What the safety filter held up, by any cycle.
-        moved: Twist from the first pose to the last, in the base.
-    """
-
-    states: list[RobotState]
-    report: MotionReport
-    held_up: list[Limiter]
-    moved: Array
+    states: list[RobotState]  # state after every cycle, the start first
+    report: MotionReport  # the last report
+    held_up: list[Limiter]  # what the safety filter held up, by any cycle
+    moved: Array  # twist from the first pose to the last, in the base
 
 
 def twist_between(model: RobotModel, start: Array, end: Array) -> Array:

@@ -12,8 +12,7 @@ from arm_model import Array, JointLimits, RobotModel, RobotState
 from arm_servo import Execution, MotionCore, Phase, SetPoint
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
-PERIOD = 0.004
-"""Cycle of the streams in [s]."""
+PERIOD = 0.004  # cycle of the streams in [s]
 
 
 def kept(limits: JointLimits, states: list[RobotState], period: float = PERIOD) -> None:

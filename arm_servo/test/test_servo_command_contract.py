@@ -31,11 +31,8 @@ from arm_trajectory import GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow
 
-SETTLED = 400
-"""Cycles in which everything has come to rest."""
-
-AT_REST = 50
-"""Cycles without motion after which nothing begins by itself any more."""
+SETTLED = 400  # cycles in which everything has come to rest
+AT_REST = 50  # cycles without motion after which nothing begins by itself any more
 
 Give = Callable[[CommandGateway, float, Array], MotionCommand | None]
 

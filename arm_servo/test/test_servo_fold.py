@@ -22,15 +22,13 @@ ELBOW = {
     'gp110': (2, math.pi / 2 - math.atan2(0.235, 1.02)),
 }
 
-STUCK = 0.05
-"""Share of the asked speed below which the tool has come to its end."""
+STUCK = 0.05  # share of the asked speed below which the tool has come to its end
 
 
 class Jogger:
     """Jogs the tool of an arm along a line."""
 
     def __init__(self, name: str, period: float, down: float) -> None:
-        """Start in the ready pose, to go away from the arm and down by an angle in [rad]."""
         self.model, self.period, self.now = robot(name), period, 0.0
         self.core = MotionCore(self.model)
         self.core.reset(ready(name))

@@ -26,7 +26,6 @@ class Stick:
     """A client that jogs the first joint of an arm whose drives others may take."""
 
     def __init__(self, client: str = 'stick') -> None:
-        """Let the arm follow."""
         self.drives = Drives()
         self.drives.attach()
         self.drives.run(2)

@@ -39,8 +39,7 @@ def kept(model: RobotModel, result: Run) -> None:
 AT_BOUND = 0.02
 """How near a joint is to its limit in [rad], or links in [m], when they hold a motion up."""
 
-LOST = 0.12
-"""Scaled singular value below which a direction is as good as lost."""
+LOST = 0.12  # scaled singular value below which a direction is as good as lost
 
 
 def holds_up(model: RobotModel, state: RobotState, limiter: Limiter) -> bool:

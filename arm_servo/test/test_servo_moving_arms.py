@@ -37,8 +37,7 @@ CLEARANCE = 0.005
 """What jogs keep from other links by default, and all else from arms that move, in [m]."""
 TOLERANCE = 2e-4
 ARMS = {'left': ('left_1', 'left_2'), 'right': ('right_1', 'right_2')}
-OUT = (0.9, 0.0)
-"""Away from the other arm."""
+OUT = (0.9, 0.0)  # away from the other arm
 
 
 def _joint(name: str, parent: str, xyz: str) -> str:
@@ -95,7 +94,6 @@ class Pair:
     """
 
     def __init__(self, left: Sequence[float] = OUT, right: Sequence[float] = OUT) -> None:
-        """Let them stand somewhere; the right one turns the other way."""
         self.cores = {
             'left': MotionCore(model('left', {'right': ARMS['right']})),
             'right': MotionCore(model('right', {'left': ARMS['left']})),

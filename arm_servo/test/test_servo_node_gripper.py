@@ -37,7 +37,6 @@ class Gripper:
     """
 
     def __init__(self, clock: Any, *, allow_stalling: bool = False) -> None:
-        """Let the drives be ready."""
         self.drives = Drives()
         self.drives.attach()
         self.drives.run(2)

@@ -63,7 +63,6 @@ class Robot:
     """
 
     def __init__(self, left: float = 0.0, right: float = 0.0, gate: float = 1.0) -> None:
-        """Let the arms follow where they are."""
         self.arms = {}
         for side, other, at in (('left', 'right', left), ('right', 'left', right)):
             model = RobotModel(*texts(), side, moved_by_others={other: [other]})

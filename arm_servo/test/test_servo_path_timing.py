@@ -28,8 +28,7 @@ from arm_trajectory import (
 
 pytestmark = pytest.mark.slow
 
-EXACT = 5e-4
-"""What counts as on the path in [rad]: a cycle sees a step of the jerk as one."""
+EXACT = 5e-4  # what counts as on the path in [rad]: a cycle sees a step of the jerk as one
 
 FREE = CoreSettings(check_self_collision=False)
 
@@ -50,15 +49,7 @@ def slowed(goal: TrajectoryGoal, factor: float) -> TrajectoryGoal:
 def time_optimal(
     limits: JointLimits, begin: Array, end: Array, kind: str, step: float
 ) -> TrajectoryGoal:
-    """Return the straight way as planners give it: without a thought of jerk, sampled.
-
-    Args:
-        limits: Its speeds and accelerations are used to the full.
-        begin: Positions at the begin.
-        end: Positions at the end.
-        kind: p, pv or pva: what the points have.
-        step: Time from point to point.
-    """
+    """Return the straight way as planners give it: without a thought of jerk, sampled."""
     way = end - begin
     most = np.maximum(np.abs(way), 1e-9)
     speed, gain = np.min(limits.velocity / most), np.min(limits.acceleration / most)

@@ -15,8 +15,7 @@ IN_PLANE = {
     'about y': [0.0, 0.0, 0.0, 0.0, 0.3, 0.0],
 }
 """Twists for which the Panda's arm stays in the plane that it is in when it is ready."""
-SIDEWAYS = [0, 2, 4, 6]
-"""Joints that lead out of that plane."""
+SIDEWAYS = [0, 2, 4, 6]  # joints that lead out of that plane
 
 
 @pytest.mark.parametrize('pause', [0, 10, 13, 20], ids='pauses of {} cycles'.format)

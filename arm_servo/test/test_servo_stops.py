@@ -18,8 +18,7 @@ from arm_trajectory import GoalError, GoalPoint, TrajectoryGoal
 pytestmark = pytest.mark.slow
 
 PERIOD = 0.01
-CLEAR = 0.0045
-"""Clearance of a stop in [m], and a little for sliding along."""
+CLEAR = 0.0045  # clearance of a stop in [m], and a little for sliding along
 
 
 def ask_back(core: MotionCore) -> None:

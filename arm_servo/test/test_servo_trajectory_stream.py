@@ -28,18 +28,14 @@ from arm_servo.core.trajectory_stream import TOGETHER, TrajectoryStream
 from arm_servo.ros.trajectory.controller import TrajectoryController
 from arm_servo.ros.trajectory.parameters import declare_trajectory
 
-STEP = 0.004
-"""How far each trajectory of a stream goes in [rad]."""
-
-MOVED = 0.01
-"""Farther than this a stream has moved the arm in [rad]."""
+STEP = 0.004  # how far each trajectory of a stream goes in [rad]
+MOVED = 0.01  # farther than this a stream has moved the arm in [rad]
 
 
 class Arm:
     """A trajectory controller whose messages the test hands over, cycle by cycle."""
 
     def __init__(self, node: Any) -> None:
-        """Let the arm follow."""
         self.drives = Drives()
         joints = self.drives.gateway.model.joints
         parameters = declare_trajectory(node, joints)
@@ -220,7 +216,6 @@ class Clock:
     """Steady time that the test moves."""
 
     def __init__(self) -> None:
-        """Begin somewhere."""
         self.now = 100.0
 
     def __call__(self) -> float:
