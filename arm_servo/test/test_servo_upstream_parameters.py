@@ -20,10 +20,10 @@ from arm_model import ModelError
 from arm_model.ros import GroupModels
 from arm_servo import check_parameters, CoreSettings, MotionCore
 from arm_servo.ros.group_motion import Offers
+from arm_servo.ros.parameter_check import check_names
 from arm_servo.ros.parameter_sheet import ParameterSheet
 from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
 from arm_servo.ros.topics_backend import build_motion
-from arm_servo.ros.upstream_parameters import check_names
 
 pytestmark = pytest.mark.slow
 
@@ -298,21 +298,24 @@ def test_nodes_begin_with_upstream_parameters(
 
     try:
         build_motion(make_node, offers)
-        for node in made:
-            sheet: Any = SimpleNamespace(
+        sheets: list[Any] = [
+            SimpleNamespace(
                 get_logger=lambda: SimpleNamespace(info=reported.append),
                 get_parameters_by_prefix=node.get_parameters_by_prefix,
                 has_parameter=node.has_parameter,
                 _parameter_overrides=node._parameter_overrides,
             )
-            check_names(sheet)
+            for node in made
+        ]
+        check_names(sheets)
     finally:
         for node in made:
             node.destroy_node()
         rclpy.shutdown()
-    assert len(reported) == len(made)
-    assert any('moveit_servo.use_smoothing' in line for line in reported)
-    assert not any('moveit_servo.check_collisions' in line for line in reported)
+    (line,) = reported
+    assert 'moveit_servo.use_smoothing' in line
+    assert 'moveit_servo.check_collisions' not in line
+    assert 'robot_description,' not in line
 
 
 def servo_parameters(**values: object) -> ServoParameters:

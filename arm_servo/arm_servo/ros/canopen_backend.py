@@ -25,8 +25,8 @@ from .controller_manager import ControllerManager, declare_manager
 from .group_motion import MakeNode, Offers, RobotMotion
 from .joint_state_broadcaster import JointStateBroadcaster
 from .other_programs import watch_other_programs
+from .parameter_check import check_names
 from .scene_listener import SceneListener
-from .upstream_parameters import check_names
 
 if TYPE_CHECKING:
     from arm_canopen import MasterProcess
@@ -133,8 +133,7 @@ class CanopenMotion:
         self.nodes = [manager, *robot.nodes, broadcaster]
         entries = robot.entries(self._master.bus.master.sync_period)
         self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
-        for node in self.nodes:
-            check_names(node)
+        check_names(self.nodes)
         for note in models.notes:
             manager.get_logger().warning(note)
 

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes would refuse of a parameter file, without running them."""
+"""What the nodes refuse of their parameters, and what they would refuse of a file."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
@@ -17,6 +17,15 @@ if TYPE_CHECKING:
 
 Declare = Callable[['Node'], object]  # declares the parameters of a node
 EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
+OF_OTHERS = (
+    *('publish_robot_description', 'publish_robot_description_semantic'),
+    'robot_description_name',
+    'moveit_servo.check_octomap_collisions',
+    *('moveit_servo.command_out_topic', 'moveit_servo.command_out_type'),
+    'moveit_servo.publish_joint_accelerations',
+    'moveit_servo.scene_collision_proximity_threshold',
+)
+"""Parameters of MoveIt without effect here that look like ours."""
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -34,17 +43,33 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
     from node_runner import ParameterError, refuse_misspelt
 
     from .parameter_sheet import ParameterSheet
-    from .upstream_parameters import is_upstream
 
     problems = []
     for name, declare in _nodes(models, document).items():
         sheet = ParameterSheet(name, _given(document, name))
         try:
             declare(sheet.node)
-            refuse_misspelt(sheet.node, is_upstream)
+            refuse_misspelt(sheet.node, OF_OTHERS)
         except (ParameterError, ModelError) as error:
             problems.append((name, str(error)))
     return problems
+
+
+def check_names(nodes: Sequence[Node]) -> None:
+    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
+
+    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
+
+    Raises:
+        ParameterError: A name looks like one that there is.
+    """
+    from node_runner import refuse_misspelt
+
+    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)}
+    unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
+    if unused:
+        names = ', '.join(sorted(unused))
+        nodes[0].get_logger().info(f'parameters without effect here: {names}')
 
 
 def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declare]:

@@ -35,9 +35,9 @@ from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
 from .group_motion import ArmMotion, MakeNode, Offers, RobotMotion
 from .other_programs import watch_other_programs
+from .parameter_check import check_names
 from .scene_listener import SceneListener
 from .servo.parameters import PREFIX
-from .upstream_parameters import check_names
 
 THREAD_PRIORITY = 40
 """SCHED_FIFO priority of the loop, unless a parameter says another; that of moveit_servo."""
@@ -106,8 +106,7 @@ def serve_topics(stop: threading.Event, offers: Offers) -> None:
             return node
 
         threads = build_motion(make_node, offers)
-        for node in nodes:
-            check_names(node)
+        check_names(nodes)
         settle_process_memory(nodes[0])
         for thread in threads:
             thread.start(failed=stop.set)

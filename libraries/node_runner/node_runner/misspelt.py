@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Collection, Iterable
 import difflib
 
 from rclpy.node import Node
@@ -15,31 +15,33 @@ ALIKE = 0.8  # of SequenceMatcher: one letter in five; short names for other nod
 RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later than our look
 
 
-def refuse_misspelt(node: Node, is_known: Callable[[str], bool] = lambda _: False) -> list[str]:
+def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
     """Refuse a parameter that looks like one of a node's; rclpy would ignore it.
 
     Others are left alone: a parameter file may be for several nodes.
 
     Args:
         node: A node that has declared all its parameters.
-        is_known: Whether a name is one of another program's, which looks like one by chance.
+        similar: Names of other programs that look like one by chance.
 
     Returns:
-        The names that were given and are known so; they have no effect.
+        The names that were given and that the node has not; they have no effect on it.
 
     Raises:
         ParameterError: There is one; the message names the likely one.
     """
     given = node._parameter_overrides  # noqa: SLF001  # there is no public way to read it
-    others = [name for name in given if not node.has_parameter(name)]
-    elsewhere = [name for name in others if is_known(name)]
-    unknown = [name for name in others if name not in elsewhere]
+    unknown = [
+        name
+        for name in given
+        if not node.has_parameter(name) and not name.startswith(RCLPY_PREFIX)
+    ]
     known = node.get_parameters_by_prefix('')
     refuse_similar(
-        (name for name in unknown if not name.startswith(RCLPY_PREFIX)),
+        (name for name in unknown if name not in similar),
         (name for name in known if not name.startswith(RCLPY_PREFIX)),
     )
-    return elsewhere
+    return unknown
 
 
 def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
