@@ -19,13 +19,16 @@ Declare = Callable[['Node'], object]  # declares the parameters of a node
 EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
 OF_OTHERS = (
     *('publish_robot_description', 'publish_robot_description_semantic'),
-    'robot_description_name',
-    'moveit_servo.check_octomap_collisions',
-    *('moveit_servo.command_out_topic', 'moveit_servo.command_out_type'),
-    'moveit_servo.publish_joint_accelerations',
-    'moveit_servo.scene_collision_proximity_threshold',
+    *('robot_description_name', 'publish_dynamic_joint_states'),
+    *(
+        f'moveit_servo.{name}'
+        for name in (
+            *('check_octomap_collisions', 'command_out_topic', 'command_out_type', 'joint_topic'),
+            *('publish_joint_accelerations', 'scene_collision_proximity_threshold'),
+        )
+    ),
 )
-"""Parameters of MoveIt without effect here that look like ours."""
+"""Parameters that have no effect on some nodes, and look like those that have."""
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
