@@ -55,8 +55,11 @@ def profile_text(reach: Reach) -> str:
     allowed = _find(root, 'interfaceWhiteList')
     for interface in reach.interfaces:
         _add(allowed, 'address').text = interface.address
+    builtin = _find(root, 'builtin')
+    # the default of 3 s: each announcement goes to up to 32 ports of each peer, 20 kB altogether
+    builtin.remove(_find(builtin, 'discovery_config'))
     if reach.peers:
-        first = _add(_add(_find(root, 'rtps'), 'builtin'), 'initialPeersList')
+        first = _add(builtin, 'initialPeersList')
         for peer in (_DISCOVERY_GROUP, *reach.peers):
             _add(_add(_add(first, 'locator'), 'udpv4'), 'address').text = peer
     return ET.tostring(root, encoding='unicode')

@@ -50,11 +50,13 @@ def test_the_default_is_loopback_alone() -> None:
     assert texts(profile, 'type') == ['UDPv4']
     assert texts(profile, 'useBuiltinTransports') == ['false']
     assert texts(profile, 'non_blocking_send') == ['true']
+    assert texts(profile, 'nanosec') == ['250000000']
 
 
 def test_an_open_profile_adds_interfaces_and_peers() -> None:
-    """Loopback stays, and discovery by multicast beside the peers."""
+    """Loopback stays, and discovery by multicast beside the peers; announcements are rare."""
     profile = profile_text(OPEN)
+    assert texts(profile, 'leaseAnnouncement') == []
     assert children(profile, 'interfaceWhiteList') == ['127.0.0.1', '10.0.0.5']
     assert texts(profile, 'address')[-2:] == ['239.255.0.1', '10.0.0.9']
 
