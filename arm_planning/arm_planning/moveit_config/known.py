@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of MoveIt's move_group by their names: what they must be, and what has no effect."""
+"""Parameters of MoveIt's move_group that count here, by their names: what they must be."""
 
 from __future__ import annotations
 
@@ -17,18 +17,7 @@ LIMITS = 'robot_description_planning.joint_limits'
 CARTESIAN = 'robot_description_planning.cartesian_limits'
 KINEMATICS = 'robot_description_kinematics'
 MANAGER = 'moveit_simple_controller_manager'
-
-OWN_IK = 'inverse kinematics is closed form where the arm has one, else a numeric one of its own'
-OWN_PLANNERS = "RRT-Connect and Pilz' motions are built in, checked and timed without plug-ins"
-MEASURED = 'paths are measured everywhere, not at samples'
-OWN_SEARCH = 'the search sets itself up'
-NO_PIPELINE = 'this planning pipeline is not here'
-DIRECT = 'controllers are reached by their actions, and switched by nobody'
-ALWAYS = 'all capabilities and topics are there always'
-NO_SENSORS = 'there are no updaters of octomaps; send octomaps with planning scenes'
-ONE_ROTATION = "Pilz' planner uses the velocity of rotation only"
-NO_DATABASE = 'there is no warehouse'
-NO_MOVEIT_CPP = 'these are of MoveItCpp'
+PLANNING = 'robot_description_planning.'
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +27,6 @@ class Known:
     pattern: str  # its name; ``*`` is one key, ``**`` one or more
     needed: str = ''  # what its value must be, in words; empty for anything
     fits: Callable[[object], bool] = lambda _: True  # whether a value is that
-    reason: str = ''  # why it has no effect; empty where it has one
 
     def matches(self, name: str) -> bool:
         """Return whether a name is one of these."""
@@ -93,23 +81,10 @@ def texts(pattern: str) -> Known:
     return Known(pattern, 'a list of texts', fits)
 
 
-def ignored(reason: str, *patterns: str) -> list[Known]:
-    """Return parameters that have no effect."""
-    return [Known(pattern, reason=reason) for pattern in patterns]
-
-
 KNOWN: Sequence[Known] = (
     text('robot_description'),
     text('robot_description_semantic'),
     number(f'{KINEMATICS}.*.kinematics_solver_timeout', 0.0),
-    *ignored(
-        OWN_IK,
-        *(
-            f'{KINEMATICS}.*.kinematics_solver{part}'
-            for part in ('', '_search_resolution', '_attempts')
-        ),
-        f'{KINEMATICS}.**',
-    ),
     factor('robot_description_planning.default_velocity_scaling_factor'),
     factor('robot_description_planning.default_acceleration_scaling_factor'),
     *(
@@ -128,21 +103,13 @@ KNOWN: Sequence[Known] = (
     signed(f'{CARTESIAN}.max_trans_acc', 1.0),
     signed(f'{CARTESIAN}.max_trans_dec', -1.0),
     signed(f'{CARTESIAN}.max_rot_vel', 1.0),
-    *ignored(ONE_ROTATION, f'{CARTESIAN}.max_rot_acc', f'{CARTESIAN}.max_rot_dec'),
     texts('planning_pipelines'),
     texts('planning_pipelines.pipeline_names'),
-    *ignored(NO_MOVEIT_CPP, 'planning_pipelines.**'),
     text('default_planning_pipeline'),
     text('ompl.planner_configs.*.type'),
-    *ignored(OWN_SEARCH, 'ompl.planner_configs.*.*'),
     texts('ompl.*.planner_configs'),
     text('ompl.*.default_planner_config'),
     text('pilz_industrial_motion_planner.default_planner_config'),
-    *ignored(
-        MEASURED, 'ompl.*.longest_valid_segment_fraction', 'ompl.longest_valid_segment_fraction'
-    ),
-    *ignored(OWN_PLANNERS, 'ompl.**', 'pilz_industrial_motion_planner.**'),
-    *ignored(NO_PIPELINE, 'chomp.**', 'stomp.**', 'trajopt.**', 'lerp.**'),
     texts(f'{MANAGER}.controller_names'),
     text(f'{MANAGER}.*.type'),
     text(f'{MANAGER}.*.action_ns'),
@@ -155,23 +122,17 @@ KNOWN: Sequence[Known] = (
     number('trajectory_execution.allowed_goal_duration_margin', 0.0),
     flag('trajectory_execution.execution_duration_monitoring'),
     flag('allow_trajectory_execution'),
-    *ignored(DIRECT, f'{MANAGER}.**', 'moveit_controller_manager', 'moveit_manage_controllers'),
-    *ignored(DIRECT, 'moveit_ros_control_interface.**', 'trajectory_execution.**'),
-    *ignored(
-        ALWAYS,
-        *('capabilities', 'disable_capabilities', 'monitor_dynamics'),
-        *('publish_robot_description', 'publish_robot_description_semantic'),
-        *('publish_planning_scene', 'publish_geometry_updates'),
-        *('publish_state_updates', 'publish_transforms_updates', 'publish_planning_scene_hz'),
-    ),
-    *ignored(
-        NO_SENSORS, 'sensors', 'sensors.**', 'octomap_frame', 'octomap_resolution', 'max_range'
-    ),
-    *ignored(NO_DATABASE, 'warehouse_host', 'warehouse_port', 'warehouse_plugin', 'warehouse.**'),
-    *ignored(NO_MOVEIT_CPP, 'planning_scene_monitor_options.**', 'plan_request_params.**'),
-    *ignored(NO_MOVEIT_CPP, 'planning_scene_monitor.**', 'plan_execution.**', 'sense_for_plan.**'),
 )
 """All of them; the first that matches counts."""
+
+WITHOUT_EFFECT = frozenset(
+    {
+        *('kinematics_solver', 'kinematics_solver_search_resolution'),
+        *('kinematics_solver_attempts', 'max_rot_acc', 'max_rot_dec'),
+        *('publish_robot_description', 'publish_robot_description_semantic'),
+    }
+)
+"""Keys of MoveIt that do not count here and look like some that do."""
 
 ALIKE = 0.8  # how much a key that is misspelt resembles the right one, of 1
 
@@ -190,7 +151,7 @@ def at(name: str, places: Mapping[str, Place]) -> str:
 
 
 def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
-    """Refuse a value that is none.
+    """Refuse a value of the wrong kind, and misspelt names of limits.
 
     Args:
         values: Parameters by name; others than MoveIt's are passed over.
@@ -201,21 +162,28 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
     """
     for name, value in values.items():
         found = known_of(name)
-        if found is None:
+        if found is not None:
+            if not found.fits(value):
+                raise ConfigError(f'{at(name, places)} is {value!r}; it must be {found.needed}')
+        elif name.startswith(PLANNING):
             table, _, key = name.rpartition('.')
-            keys = _keys(table)
-            close = difflib.get_close_matches(key, keys, 1, ALIKE)
-            if close or name.startswith(CLOSED):
-                hint = f'did you mean {close[0]!r}?' if close else f'it has {", ".join(keys)}'
+            close = _meant(name)
+            if close or (name.startswith(CLOSED) and key not in WITHOUT_EFFECT):
+                hint = f'did you mean {close!r}?' if close else f'it has {", ".join(_keys(table))}'
                 raise ConfigError(f'{at(name, places)}: {table} has no {key!r}; {hint}')
-        elif not found.fits(value):
-            raise ConfigError(f'{at(name, places)} is {value!r}; it must be {found.needed}')
 
 
 def _keys(table: str) -> list[str]:
     """Return the keys that are known in a table."""
-    keys = [each.pattern.rpartition('.') for each in KNOWN if not each.reason]
+    keys = [each.pattern.rpartition('.') for each in KNOWN]
     return [key for above, _, key in keys if above and Known(above).matches(table)]
+
+
+def _meant(name: str) -> str:
+    """Return the key of its table that an unknown name resembles; empty for none."""
+    table, _, key = name.rpartition('.')
+    close = difflib.get_close_matches(key, _keys(table), 1, ALIKE)
+    return close[0] if close and key not in WITHOUT_EFFECT else ''
 
 
 def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
@@ -224,30 +192,9 @@ def misspelt(names: Sequence[str], places: Mapping[str, Place]) -> list[str]:
     Args:
         places: Where they come from, of those that come from a file.
     """
-    lines = []
-    for name in names:
-        found, (table, _, key) = known_of(name), name.rpartition('.')
-        if found is not None and found.reason and found.pattern.endswith('**'):
-            close = difflib.get_close_matches(key, _keys(table), 1, ALIKE)
-            lines += [
-                f'{at(name, places)}: without effect; did you mean {each!r}?' for each in close
-            ]
-    return lines
-
-
-def without_effect(names: Sequence[str], sensors: Sequence[str] = ()) -> list[str]:
-    """Return a line for each reason why parameters have no effect, with their names.
-
-    Args:
-        sensors: Names of updaters of octomaps, which have tables of their own.
-    """
-    reasons: dict[str, dict[str, None]] = {}
-    for name in names:
-        found, table = known_of(name), name.partition('.')[0]
-        if found is None and table in sensors:
-            reasons.setdefault(NO_SENSORS, {})[f'{table}.*'] = None
-        elif found is not None and found.reason:
-            key = name.rpartition('.')[2]
-            shown = f'ompl.planner_configs.*.{key}' if found.reason is OWN_SEARCH else name
-            reasons.setdefault(found.reason, {})[shown] = None
-    return [f'{", ".join(shown)}: without effect, {reason}' for reason, shown in reasons.items()]
+    meant = {name: _meant(name) for name in names if known_of(name) is None}
+    return [
+        f'{at(name, places)}: without effect; did you mean {key!r}?'
+        for name, key in meant.items()
+        if key
+    ]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..exceptions import ConfigError
-from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, MANAGER, without_effect
+from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, MANAGER
 from .planner_configs import PlannerConfigs
 from .yaml_file import Place
 
@@ -32,7 +32,6 @@ class MoveItSettings:
     default_pipeline: str = ''  # of requests that name none; empty for ours
     default_industrial: str = 'PTP'  # planner of requests to Pilz' pipeline that name none
     sensors: Sequence[str] = ()  # names of updaters of octomaps, whose tables have no effect
-    notes: Sequence[str] = ()  # what has no effect, for the log
 
 
 def read_settings(
@@ -67,7 +66,6 @@ def read_settings(
         default_pipeline=_pipeline(values, places),
         default_industrial=_industrial(values, places),
         sensors=sensors,
-        notes=without_effect(list(values), sensors),
     )
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+import re
 
 from rclpy.node import Node
 from urdf_reader import read_urdf
@@ -23,13 +24,15 @@ from node_runner import (
 
 from ..exceptions import ConfigError
 from ..industrial.limits import CartesianLimits
-from ..moveit_config.known import at, known_of, LIMITS, MANAGER
+from ..moveit_config.known import at, known_of, LIMITS, MANAGER, WITHOUT_EFFECT
 from ..moveit_config.package import MoveItPackage
 from ..moveit_config.settings import MoveItSettings, read_settings
 from ..moveit_config.yaml_file import Place
 from .controllers import Controller, FOLLOW, KINDS
 from .execution import ExecutionLimits
 from .robot_groups import RobotGroups
+
+OMPL_CONFIG = r'^(ompl\.planner_configs\.)[^.]+\.'  # before a key of a planner configuration
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +71,6 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
     if limits is not None and not node.get_parameter('joint_limits').value:
         table = _complete(node, description.urdf, limits, places)
         description = replace(description, limits=table)
-    for note in settings.notes:
-        node.get_logger().info(note)
     return MoveGroupParameters(
         description,
         settings,
@@ -80,19 +81,19 @@ def declare_parameters(node: Node, package: MoveItPackage | None = None) -> Move
 
 
 def declare_others(node: Node, names: Sequence[str]) -> None:
-    """Declare what MoveIt has and nobody declared, so that tools list it; refuse what is misspelt.
-
-    Args:
-        names: Names of all that were given.
+    """Declare what was given and nobody declared, so that tools list it; log it once.
 
     Raises:
         ParameterError: A name that is not known looks like one that is.
     """
-    known = [name for name in names if known_of(name) is not None]
-    declare_given(node, known, "MoveIt's, read at the start")
-    refuse_misspelt(node)
-    if unknown := sorted(set(names) - set(known) - set(node.get_parameters_by_prefix(''))):
-        node.get_logger().info(f'unknown parameters, without effect: {", ".join(unknown)}')
+    read = [name for name in names if known_of(name) is not None]
+    declare_given(node, read, "MoveIt's, read at the start")
+    in_tables = {name for name in names if '.' in name}  # keys of tables are looked at by name
+    unused = sorted(set(names).intersection(refuse_misspelt(node, in_tables | WITHOUT_EFFECT)))
+    declare_given(node, unused, 'without effect here')
+    if unused:
+        shown = dict.fromkeys(re.sub(OMPL_CONFIG, r'\1*.', name) for name in unused)
+        node.get_logger().info(f'parameters without effect here: {", ".join(shown)}')
 
 
 def _complete(
