@@ -118,6 +118,22 @@ class Fault(Enum):
     )
     MODE_HELD_UNDER_HALT = _of_drive('ignores 0x6060 while it is halted', 0, lasting=True)
 
+    RATE_UNITS = FaultKind(
+        'counts velocities and accelerations in other units than its EDS says',
+        ('axis', 'velocity', 'acceleration'),
+        of_drive=True,
+    )
+    ENCODER_SHIFTED = FaultKind(
+        'reads another position from its encoder where it stands',
+        ('axis', 'position'),
+        of_drive=True,
+        lasting=False,
+    )
+    OBJECT_KEPT = FaultKind(
+        'holds another value in an object than its EDS says, after each reset',
+        ('object', 'value'),
+    )
+
     @property
     def label(self) -> str:
         """Its name in services and scenario files."""
@@ -151,6 +167,10 @@ class FaultInjection:
         product: What 0x1018:02 shows.
         revision: What 0x1018:03 shows.
         serial: What 0x1018:04 shows.
+        velocity: What 1 of the velocities of the drive is in [inc/s]; None for its own unit.
+        acceleration: What 1 of its accelerations is in [inc/s^2]; None for its own unit.
+        position: What the encoder reads in [inc].
+        value: What the object holds.
     """
 
     fault: Fault
@@ -169,6 +189,10 @@ class FaultInjection:
     product: int | None = None
     revision: int | None = None
     serial: int | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    position: int = 0
+    value: int = 0
 
     def __post_init__(self) -> None:
         """Refuse what has no meaning.
@@ -182,6 +206,10 @@ class FaultInjection:
                 raise ValueError(f'{name} {value} is not a time of 0 s or more')
         if not 0.0 <= self.probability <= 1.0:
             raise ValueError(f'probability {self.probability} is not 0 to 1')
+        for name in ('velocity', 'acceleration'):
+            unit = getattr(self, name)
+            if unit is not None and not 0.0 < unit < float('inf'):
+                raise ValueError(f'{name} {unit} is not a unit above 0')
         if min(self.count, self.pdo, self.axis) < 0:
             raise ValueError('count, pdo and axis are 0 or more')
         allowed = ('fault', 'duration', *self.fault.value.settings)

@@ -267,12 +267,55 @@ def test_every_fault_says_itself(fault: Fault) -> None:
         (Fault.SDO_DELAY, {'duration': float('nan')}),
         (Fault.DISCONNECT, {'pdo': 1}),
         (Fault.TPDO_LOSS, {'count': -1}),
+        (Fault.RATE_UNITS, {'velocity': 0.0}),
     ],
 )
 def test_nonsense_is_refused(fault: Fault, settings: dict[str, float]) -> None:
     """Values out of range and settings of other faults are arguments of the wrong kind."""
     with pytest.raises(ValueError, match=next(iter(settings))):
         FaultInjection(fault, **settings)  # type: ignore[arg-type]
+
+
+def test_units_that_the_eds_does_not_say(rig: Rig) -> None:
+    """The same motion is another number, until the fault ends."""
+    for index, rate in ((0x60FF, 600), (0x6083, 3_000), (0x6084, 3_000)):
+        rig.put(index, rate)
+    rig.enable(3)
+    rig.run(1.0)
+    assert rig.velocity == pytest.approx(600.0)
+    inject(rig, Fault.RATE_UNITS, velocity=0.5, acceleration=2.0, duration=1.0)
+    assert rig.get(0x606C) == 1_200
+    begin = rig.now
+    rig.put(0x60FF, 2_400)  # 1200 inc/s, at 6000 inc/s^2
+    rig.run(0.05)
+    assert rig.velocity == pytest.approx(600.0 + 6_000.0 * (rig.now - begin), rel=0.1)
+    rig.run(0.9)
+    assert rig.velocity == pytest.approx(1_200.0)
+    rig.run(0.1)
+    assert rig.get(0x606C) == 1_200
+
+
+def test_an_encoder_that_reads_something_else(rig: Rig) -> None:
+    """The motor stays where it is, and its position is another number."""
+    origin = rig.drive.origin - rig.position
+    inject(rig, Fault.ENCODER_SHIFTED, position=-7_000)
+    assert rig.get(0x6064) == -7_000
+    assert rig.drive.origin - rig.position == origin
+    assert rig.device.faults.active == ()
+
+
+def test_an_object_that_holds_its_value(rig: Rig) -> None:
+    """After each reset, until the fault ends; what the device has not cannot be held."""
+    inject(rig, Fault.OBJECT_KEPT, object=(0x60B0, 0), value=-1_000)
+    rig.put(0x60B0, 5)
+    rig.nmt(NmtCommand.RESET_NODE)
+    rig.run(0.1)
+    assert rig.get(0x60B0) == -1_000
+    rig.device.faults.end(rig.now)
+    assert rig.get(0x60B0) == 0
+    for wrong in ({}, {'object': (0x5FFF, 0)}, {'object': (0x6060, 0), 'value': 200}):
+        with pytest.raises(ValueError, match=r'object|hold'):
+            inject(rig, Fault.OBJECT_KEPT, **wrong)
 
 
 @pytest.mark.parametrize('fault', [fault for fault in Fault if fault.value.code])

@@ -292,6 +292,8 @@ def test_settings_as_text() -> None:
         Fault.SDO_ABORT, object=(0x607D, 2), abort=AbortCode.HARDWARE, count=2
     )
     assert not parse_fault('reboot', {'position_kept': 'lost'}).position_kept
+    assert parse_fault('encoder_shifted', {'position': '-7000'}).position == -7000
+    assert parse_fault('rate_units', {'velocity': '104.7'}).velocity == 104.7
 
 
 @pytest.mark.parametrize('lines', [['delay'], ['=3'], ['delay=1', 'delay=2']])

@@ -84,6 +84,7 @@ class Drive:
         self.faults: set[int] = set()
         self.causes: set[Fault] = set()
         self.number = number
+        self._rate_units = rate_units
         self._objects = objects = DriveObjects(store, number, rate_units)
         self._errors = errors
         self._clock = clock
@@ -184,6 +185,26 @@ class Drive:
         now = self._axis.time if now is None else now
         self._move(now)
         self._fail(code, now, at_once=at_once)
+        self._publish(now)
+
+    def count_rates_in(
+        self, velocity: float | None, acceleration: float | None, now: float | None = None
+    ) -> None:
+        """Use other units than those that it was made with, until another call.
+
+        What its objects hold stays the same number.
+
+        Args:
+            velocity: What 1 of its velocities is in [inc/s]; None for its own unit.
+            acceleration: What 1 of its accelerations is in [inc/s^2]; None for its own unit.
+            now: Steady time in [s]; by default when the drive last looked at its axis.
+        """
+        now = self._axis.time if now is None else now
+        self._objects.rate_units = (
+            velocity or self._rate_units[0],
+            acceleration or self._rate_units[1],
+        )
+        self._on_max_velocity(now)
         self._publish(now)
 
     def inject(self, fault: Fault, now: float | None = None, *, lasting: bool = True) -> None:

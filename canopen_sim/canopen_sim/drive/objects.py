@@ -13,10 +13,10 @@ from arm_canopen.standard.target_objects import TARGET_OBJECTS
 
 from ..objects.object_store import Integer, ObjectStore
 from .profile import Limits
-from .rate import Rate
+from .rate import Rate, RateUnit
 
 Bind: TypeAlias = Callable[..., Integer]
-BindRate: TypeAlias = Callable[..., Integer | Rate]
+BindRate: TypeAlias = Callable[..., Rate]
 
 ACCELERATIONS = frozenset(
     {
@@ -57,11 +57,11 @@ class DriveObjects:
         def bind(index: int, subindex: int = 0, *, default: int = 0) -> Integer:
             return store.integer(index + axis * AXIS_OFFSET, subindex, default=default)
 
-        def rate(index: int, subindex: int = 0, *, default: int = 0) -> Integer | Rate:
-            unit = rate_units[index in ACCELERATIONS]
-            variable = bind(index, subindex, default=default)
-            return variable if unit == 1.0 else Rate(variable, unit)
+        def rate(index: int, subindex: int = 0, *, default: int = 0) -> Rate:
+            unit = self._acceleration_unit if index in ACCELERATIONS else self._velocity_unit
+            return Rate(bind(index, subindex, default=default), unit)
 
+        self._velocity_unit, self._acceleration_unit = (RateUnit(unit) for unit in rate_units)
         self._bind_states(bind)
         self._bind_actual_values(bind, rate)
         self._bind_windows(bind, rate)
@@ -169,6 +169,15 @@ class DriveObjects:
         self.negative_torque = bind(Index.NEGATIVE_TORQUE_LIMIT, default=NO_TORQUE_LIMIT)
 
     @property
+    def rate_units(self) -> tuple[float, float]:
+        """What 1 of its velocities is in [inc/s], of its accelerations in [inc/s^2]."""
+        return self._velocity_unit.value, self._acceleration_unit.value
+
+    @rate_units.setter
+    def rate_units(self, units: tuple[float, float]) -> None:
+        self._velocity_unit.value, self._acceleration_unit.value = units
+
+    @property
     def speed(self) -> float:
         """Highest speed of the motor in [inc/s]; 0x607F = 0 means no limit."""
         profile = float(self.max_velocity.value) or float('inf')
@@ -237,7 +246,7 @@ class DriveObjects:
         return min(max(position, min(low, start)), max(high, start))
 
 
-def _ramp(profile: Integer | Rate, maximum: Integer | Rate) -> float:
+def _ramp(profile: Rate, maximum: Rate) -> float:
     """Return the ramp of a profile within its maximum; 0 in either means that it is not set."""
     ramp = float(profile.value) or UNSET_RAMP
     return min(ramp, float(maximum.value) or UNSET_RAMP)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from ..objects.object_store import Integer
@@ -15,29 +16,30 @@ INCREMENTS_PER_SECOND: RateUnits = {}
 """Of a device whose axes all count [inc/s]."""
 
 
+@dataclass(slots=True)
+class RateUnit:
+    """What 1 of all velocities, or of all accelerations, of a drive is."""
+
+    value: float  # [inc/s] or [inc/s^2]
+
+
 class Rate:
     """An object in a unit of its drive, seen in increments per second (or second squared)."""
 
     __slots__ = ('_object', '_unit')
 
-    def __init__(self, variable: Integer, unit: float) -> None:
-        """See an object so.
-
-        Args:
-            variable: The object.
-            unit: What 1 of it is in [inc/s].
-        """
+    def __init__(self, variable: Integer, unit: RateUnit) -> None:
         self._object = variable
         self._unit = unit
 
     @property
     def value(self) -> float:
         """What it holds in [inc/s]."""
-        return self._object.value * self._unit
+        return self._object.value * self._unit.value
 
     def put(self, rate: float) -> None:
         """Store a rate in [inc/s], rounded and held within the type of the object."""
-        self._object.put(rate / self._unit)
+        self._object.put(rate / self._unit.value)
 
     @property
     def listener(self) -> Callable[[float], None] | None:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from arm_canopen.standard.dictionary import object_address
 from arm_canopen.standard.objects import Index
 
 from ..fault import Fault, FaultInjection
@@ -38,6 +39,14 @@ class Axis(Protocol):
 
     def clear(self, fault: Fault, now: float | None = None) -> None:
         """Take the cause of a fault away."""
+
+    def count_from(self, position: float, now: float | None = None) -> None:
+        """Count from a position in [inc] where the motor is."""
+
+    def count_rates_in(
+        self, velocity: float | None, acceleration: float | None, now: float | None = None
+    ) -> None:
+        """Use other units of velocities and accelerations; None for its own."""
 
 
 class Powered(Protocol):
@@ -113,7 +122,8 @@ class FaultInjector:
             now: Steady time in [s].
 
         Raises:
-            ValueError: It is a fault of a drive, and the device is none or lacks the axis.
+            ValueError: It is a fault of a drive, and the device is none or lacks the axis; or of
+                an object, and the device has no such number.
         """
         self._line.now = now
         if injection.fault.value.of_drive and not self._axes(injection):
@@ -126,11 +136,13 @@ class FaultInjector:
             return
         if injection.fault.value.of_drive:
             for drive in self._axes(injection):
-                drive.inject(injection.fault, now, lasting=injection.lasting)
+                self._begin_in(drive, injection, now)
             if not injection.lasting:
                 return
         elif injection.fault is Fault.WRONG_IDENTITY:
             self._disguise(injection)
+        elif injection.fault is Fault.OBJECT_KEPT:
+            self._keep(injection)
         elif injection.fault is Fault.EMCY_FLOOD:
             self._device.repeat_emcy(max(injection.delay, FLOOD_PERIOD_MIN), now)
         line = None
@@ -169,13 +181,25 @@ class FaultInjector:
         if injection.fault.value.of_drive:
             for drive in self._axes(injection):
                 drive.clear(injection.fault, now)
+                if injection.fault is Fault.RATE_UNITS:
+                    drive.count_rates_in(None, None, now)
         elif injection.fault is Fault.WRONG_IDENTITY:
             for address in IDENTITY_OBJECTS.values():
                 self._device.store.overlay.pop(address, None)
+        elif injection.fault is Fault.OBJECT_KEPT and injection.object is not None:
+            self._device.store.saved.pop(injection.object, None)
+            self._device.store.find(*injection.object).restore()
         elif injection.fault is Fault.EMCY_FLOOD:
             self._device.repeat_emcy(0.0, now)
         elif injection.fault in POWER_FAULTS:
             self._device.switch_on(now, position_kept=injection.position_kept)
+
+    def _begin_in(self, drive: Axis, injection: FaultInjection, now: float) -> None:
+        drive.inject(injection.fault, now, lasting=injection.lasting)
+        if injection.fault is Fault.RATE_UNITS:
+            drive.count_rates_in(injection.velocity, injection.acceleration, now)
+        elif injection.fault is Fault.ENCODER_SHIFTED:
+            drive.count_from(injection.position, now)
 
     def _axes(self, injection: FaultInjection) -> Sequence[Axis]:
         drives = self._device.drives
@@ -202,6 +226,19 @@ class FaultInjector:
                 store.overlay.pop(address, None)
             else:
                 store.overlay[address] = int(value).to_bytes(4, 'little')
+
+    def _keep(self, injection: FaultInjection) -> None:
+        if injection.object is None:
+            raise ValueError(f"{injection.fault.label} needs an 'object'")
+        store = self._device.store
+        variable = store.integer(*injection.object)
+        low, high = variable.low, variable.high
+        if injection.object not in store or not low <= injection.value <= high:
+            raise ValueError(
+                f'{object_address(*injection.object)} of device {self._device.node_id} cannot '
+                f'hold {injection.value}'
+            )
+        store.saved[injection.object] = variable.value = injection.value
 
     def _forget_exhausted(self) -> None:
         self._active = {

@@ -94,6 +94,10 @@ def _whole(text: str) -> int:
     return value
 
 
+def _signed(text: str) -> int:
+    return int(text, 0)
+
+
 def _object(text: str) -> tuple[int, int]:
     match = OBJECT.fullmatch(text)
     if match is None:
@@ -117,6 +121,10 @@ READERS: dict[str, tuple[Callable[[str], object], str]] = {
     'duration': (float, 'a time in [s]'),
     'delay': (float, 'a time in [s]'),
     'probability': (float, 'a number of 0 to 1'),
+    'velocity': (float, 'a number of [inc/s]'),
+    'acceleration': (float, 'a number of [inc/s^2]'),
+    'position': (_signed, 'a whole number of [inc]'),
+    'value': (_signed, 'a whole number, such as -1000 or 0x0A'),
     'object': (_object, "an object, such as 0x6064 or '0x607D:02'"),
     'abort': (_abort, 'an SDO abort code, such as 0x08000000 or general'),
     'position_kept': (_kept, 'true or false'),

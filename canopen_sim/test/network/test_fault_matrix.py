@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 import random
 import re
+from typing import Any
 
 from drive_samples import (
     bus_config,
@@ -29,6 +30,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import Refusal, RefusalCause
 from arm_canopen.can.frame import Frame
+from arm_canopen.cia402.motion import Setpoint
 from arm_canopen.config.model import SdoWrite
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.exceptions import DriveError, SdoError
@@ -87,22 +89,29 @@ def target_of(mode: OperationMode) -> float:
 class Arm:
     """Two drives and their master."""
 
-    def __init__(self, heartbeat_timeout: float = 0.3, *deviations: Deviation) -> None:
+    def __init__(
+        self,
+        heartbeat_timeout: float = 0.3,
+        *deviations: Deviation | FaultInjection,
+        **faulty: Any,
+    ) -> None:
         """Boot them.
 
         Args:
             heartbeat_timeout: Consumer time of both sides in [s].
             *deviations: How the first drive deviates from the standard.
+            **faulty: What its configuration has otherwise, as of drive_config().
         """
-        watching = {
+        watching: dict[str, Any] = {
             'scales': {'position_mode': int(OperationMode.CYCLIC_POSITION)},
             'heartbeat_consumer': True,
             'heartbeat_timeout': heartbeat_timeout,
             'sdo_writes': (*MOTION_WRITES, sdo_write(0x60C2, 1, round(1000 * CYCLE))),
         }
+        faulty['scales'] = watching['scales'] | faulty.get('scales', {})
         self.net = VirtualNetwork(
             bus_config(
-                every_mode(drive_config(FAULTY, 2, **watching)),
+                every_mode(drive_config(FAULTY, 2, **watching | faulty)),
                 every_mode(drive_config(WITNESS, 3, **watching)),
                 heartbeat_producer=0.1,
                 heartbeat_timeout=heartbeat_timeout,
@@ -111,7 +120,10 @@ class Arm:
             )
         )
         for deviation in deviations:
-            injection = FaultInjection(deviation)
+            if isinstance(deviation, FaultInjection):
+                injection = deviation
+            else:
+                injection = FaultInjection(deviation)
             self.net.devices[FAULTY].faults.inject(injection, self.net.now)
         self.net.boot()
         self.coasted = 0.0  # [rad/s] greatest speed without power of the faulty drive
@@ -476,6 +488,158 @@ def test_a_drive_that_deviates_is_used_as_any_other(
     assert arm.state() is DriveState.OPERATION_ENABLED
     warnings = [event.text for event in arm.net.events if event.severity is Severity.WARNING]
     assert len(warnings) == len(set(warnings))
+
+
+def rates(velocity: float, acceleration: float) -> FaultInjection:
+    """Return a drive that counts in units of so many [inc/s] and [inc/s^2]."""
+    return FaultInjection(Deviation.RATE_UNITS, velocity=velocity, acceleration=acceleration)
+
+
+REVOLUTION = 6283.0  # [inc] of a motor
+RPM = REVOLUTION / 60.0  # [inc/s]
+SERVO_CYCLE = 125e-6  # [s]
+FIXED_POINT = 2.0**-16
+SI_UNITS = {(0x60A9, 0): 0xFFB5_0300, (0x60AA, 0): 0x01B5_5700}  # 0.1 inc/s, 10 inc/s^2
+FACTOR_GROUP = {(0x6096, 1): 10, (0x6096, 2): 1, (0x6097, 1): 1, (0x6097, 2): 100}  # the same
+RATES: dict[str, tuple[FaultInjection, dict[tuple[int, int], int]]] = {
+    'rpm and 0.1 rpm/s': (rates(RPM, RPM / 10.0), {}),
+    'inc/s and inc/s in a ms': (rates(1.0, 1000.0), {}),
+    '16.16': (rates(FIXED_POINT / SERVO_CYCLE, FIXED_POINT / SERVO_CYCLE**2), {}),
+    'SI units': (rates(0.1, 10.0), SI_UNITS),
+    'factor group': (rates(0.1, 10.0), FACTOR_GROUP),
+}
+"""Units of velocities and accelerations that differ by more than a second.
+
+With the objects in which the drive says its unit of accelerations; else bus.yml says it.
+"""
+
+
+def in_units(units: FaultInjection, objects: dict[tuple[int, int], int]) -> dict[str, Any]:
+    """Return the configuration of a drive with such units, and with the motion of the others."""
+    assert units.velocity is not None
+    assert units.acceleration is not None
+    velocity, acceleration = units.velocity, units.acceleration
+    scales = {'scale_vel_to_dev': SCALE / velocity, 'scale_vel_from_dev': velocity / SCALE}
+    if not objects:
+        scales |= {'scale_acc_to_dev': SCALE / acceleration}
+        scales |= {'scale_acc_from_dev': acceleration / SCALE}
+    writes = (
+        sdo_write(0x60C2, 1, round(1000 * CYCLE)),
+        sdo_write(0x6081, 0, round(10_000 / velocity)),
+        sdo_write(0x607F, 0, round(30_000 / velocity)),
+        *(sdo_write(ramp, 0, round(50_000 / acceleration)) for ramp in (0x6083, 0x6084)),
+        sdo_write(0x6085, 0, round(100_000 / acceleration)),
+    )
+    known = drive_dictionary().for_node(NODE_ID)
+    added = (
+        ObjectEntry(*address, 'Unit', DataType.UNSIGNED32, default=value)
+        for address, value in objects.items()
+        if known.get(*address) is None
+    )
+    dictionary = ObjectDictionary([*with_defaults(known, objects), *added])
+    return {'scales': scales, 'sdo_writes': writes, 'dictionary': dictionary}
+
+
+def offsets(position_inc: int) -> dict[str, Any]:
+    """Return the configuration of a drive whose 0 is elsewhere than that of its encoder."""
+    scales = {'offset_pos_to_dev': position_inc, 'offset_pos_from_dev': -position_inc / SCALE}
+    return {'scales': scales}
+
+
+UNITS: dict[str, tuple[FaultInjection, dict[str, Any], int]] = {
+    **{name: (units, in_units(units, said), 0) for name, (units, said) in RATES.items()},
+    'position offset': (
+        FaultInjection(Deviation.OBJECT_KEPT, object=(0x60B0, 0), value=1_000),
+        {},
+        0,
+    ),
+    'offset in bus.yml': (
+        FaultInjection(Deviation.ENCODER_SHIFTED, position=7_000),
+        offsets(7_000),
+        7_000,
+    ),
+}
+"""How a drive deviates, how its bus.yml says it, and where its 0 is in [inc]."""
+DECELERATION, QUICK_STOP_DECELERATION = 5.0, 10.0  # [rad/s^2]
+LATE = 4.0 * CYCLE  # [s] between the command and the beginning of the ramp
+
+
+@pytest.mark.parametrize('mode', [*POSITION_MODES, *VELOCITY_MODES[1:]], ids=lambda m: m.name)
+@pytest.mark.parametrize(('deviation', 'faulty', 'zero'), UNITS.values(), ids=UNITS)
+def test_a_stop_is_as_short_as_the_drive_can_whatever_it_counts_in(
+    deviation: FaultInjection, faulty: dict[str, Any], zero: int, mode: OperationMode
+) -> None:
+    """Enabling moves nothing, targets are where they were said, and no stop is cut or long."""
+    arm = Arm(0.3, deviation, **faulty)
+
+    def place() -> float:
+        return (arm.simulated().position - zero) / SCALE
+
+    for stop in ('halt', 'quick_stop', 'disable'):
+        begin = place()
+        arm.net.do(FAULTY, 'init')
+        arm.net.select(FAULTY, mode)
+        arm.net.run(0.3)
+        assert place() == pytest.approx(begin, abs=2e-4)
+        target = SPEED if mode in VELOCITY_MODES else begin + FAR
+        arm.net.commands[FAULTY].set_target(target)
+        arm.net.run(0.5)
+        speed, at = arm.simulated().velocity / SCALE, place()
+        assert speed == pytest.approx(SPEED if mode in VELOCITY_MODES else 1.0, rel=0.1)
+        arm.net.do(FAULTY, stop, preempt=True)
+        ramp = DECELERATION if stop == 'halt' else QUICK_STOP_DECELERATION
+        shortest = speed**2 / 2.0 / ramp
+        if stop == 'disable':
+            longest = speed**2 / 2.0 / DECELERATION + LATE * speed
+        else:
+            longest = shortest + LATE * speed
+        assert 0.9 * shortest < place() - at < longest, (stop, shortest, longest)
+        arm.stands(FAULTY)
+    arm.net.do(FAULTY, 'init')
+    arm.net.select(FAULTY, OperationMode.CYCLIC_POSITION)
+    arm.net.commands[FAULTY].set_target(0.3)
+    arm.net.run(3.0)
+    assert place() == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize('stop', ['halt', 'quick_stop', 'disable'])
+@pytest.mark.parametrize('side', [1, -1])
+def test_a_drive_outside_its_limits_is_led_back_and_stopped(side: int, stop: str) -> None:
+    """Beyond 0x607D enabling moves nothing, further out is refused, a stream leads back in."""
+    limits = (sdo_write(0x607D, 1, -10_000), sdo_write(0x607D, 2, 10_000))
+    timing = sdo_write(0x60C2, 1, round(1000 * CYCLE))
+    outside = FaultInjection(Deviation.ENCODER_SHIFTED, position=side * 13_000)
+    arm = Arm(0.3, outside, sdo_writes=(*MOTION_WRITES, timing, *limits))
+    drive = arm.net.drives[FAULTY]
+
+    def stream(cycles: int, speed: float) -> None:
+        for _ in range(cycles):
+            drive.stream(Setpoint(drive.control.setpoint + side * speed * CYCLE))
+            arm.net.run(CYCLE)
+
+    def enable() -> None:
+        begin = arm.motor(FAULTY)
+        arm.net.do(FAULTY, 'init')
+        arm.net.select(FAULTY, OperationMode.CYCLIC_POSITION)
+        arm.net.run(0.5)
+        assert arm.motor(FAULTY) == pytest.approx(begin, abs=2e-4)
+
+    enable()
+    with pytest.raises(DriveError, match='software limits'):
+        stream(1, 0.1)
+    stream(20, -0.5)
+    at, speed = arm.motor(FAULTY), abs(arm.simulated().velocity) / SCALE
+    assert speed == pytest.approx(0.5, rel=0.1)
+    arm.net.do(FAULTY, stop, preempt=True)
+    assert abs(arm.motor(FAULTY) - at) < speed**2 / 2.0 / DECELERATION + LATE * speed
+    arm.stands(FAULTY)
+    assert abs(arm.motor(FAULTY)) > 1.0
+    enable()
+    stream(40, -0.5)
+    assert abs(arm.motor(FAULTY)) < 0.85
+    with pytest.raises(DriveError, match='software limits'):
+        stream(100, 0.5)
+    assert abs(arm.motor(FAULTY)) < 1.0 + 2e-3
 
 
 TPDOS, RPDOS = (0x180, 0x280, 0x380), (0x200, 0x300, 0x400)
