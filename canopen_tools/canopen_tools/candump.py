@@ -82,7 +82,7 @@ class Screen:
         count: int | None = None,
         quiet: bool = False,
     ) -> None:
-        """Prepare; several buses have a column, count None is never full, and quiet only counts."""
+        """Prepare; several buses have a column, and count None never ends. Quiet only counts."""
         self._describers = defaultdict[str, FrameDescriber](describer)
         self._bus_width = max(map(len, buses), default=0)
         self._filter = chosen

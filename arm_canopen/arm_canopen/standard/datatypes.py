@@ -44,29 +44,11 @@ class DataType(IntEnum):
     UNSIGNED64 = 0x1B
 
 
-SIGNED_BITS: dict[DataType, int] = {
-    DataType.INTEGER8: 8,
-    DataType.INTEGER16: 16,
-    DataType.INTEGER24: 24,
-    DataType.INTEGER32: 32,
-    DataType.INTEGER40: 40,
-    DataType.INTEGER48: 48,
-    DataType.INTEGER56: 56,
-    DataType.INTEGER64: 64,
-}
-UNSIGNED_BITS: dict[DataType, int] = {
-    DataType.UNSIGNED8: 8,
-    DataType.UNSIGNED16: 16,
-    DataType.UNSIGNED24: 24,
-    DataType.UNSIGNED32: 32,
-    DataType.UNSIGNED40: 40,
-    DataType.UNSIGNED48: 48,
-    DataType.UNSIGNED56: 56,
-    DataType.UNSIGNED64: 64,
-}
+_INTEGER_BITS = (8, 16, 24, 32, 40, 48, 56, 64)
+SIGNED_BITS = {DataType[f'INTEGER{bits}']: bits for bits in _INTEGER_BITS}
+UNSIGNED_BITS = {DataType[f'UNSIGNED{bits}']: bits for bits in _INTEGER_BITS}
 TIME_BITS: dict[DataType, int] = {DataType.TIME_OF_DAY: 48, DataType.TIME_DIFFERENCE: 48}
 REAL_FORMATS: dict[DataType, str] = {DataType.REAL32: '<f', DataType.REAL64: '<d'}
-REAL_BITS: dict[DataType, int] = {DataType.REAL32: 32, DataType.REAL64: 64}
 TEXT_ENCODINGS: dict[DataType, str] = {
     DataType.VISIBLE_STRING: 'latin-1',
     DataType.OCTET_STRING: 'latin-1',
@@ -76,7 +58,7 @@ FIXED_BITS: dict[DataType, int] = {
     DataType.BOOLEAN: 1,
     **SIGNED_BITS,
     **UNSIGNED_BITS,
-    **REAL_BITS,
+    **{data_type: 8 * struct.calcsize(code) for data_type, code in REAL_FORMATS.items()},
     **TIME_BITS,
 }
 

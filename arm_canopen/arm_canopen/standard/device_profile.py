@@ -22,9 +22,7 @@ class DeviceProfile(IntEnum):
 
 def profile_number(dictionary: ObjectDictionary) -> int:
     """Return the number of the profile that the EDS names; 0 when it names none."""
-    entry = dictionary.get(Index.DEVICE_TYPE)
-    device_type = entry.default if entry is not None else None
-    return device_type & PROFILE_MASK if isinstance(device_type, int) else 0
+    return (dictionary.number(Index.DEVICE_TYPE) or 0) & PROFILE_MASK
 
 
 def is_drive(dictionary: ObjectDictionary) -> bool:

@@ -113,7 +113,9 @@ class ObjectDictionary:
         self.node_id = node_id  # node id for which its COB-IDs are, None where no file says that
         ordered = sorted(entries, key=lambda entry: entry.address)
         self._entries = {entry.address: entry for entry in ordered}
-        self._indices = frozenset(index for index, _ in self._entries)
+        self._by_index: dict[int, list[ObjectEntry]] = {}
+        for entry in self:
+            self._by_index.setdefault(entry.index, []).append(entry)
 
     def __iter__(self) -> Iterator[ObjectEntry]:
         """Iterate in ascending order of index and sub-index."""
@@ -131,13 +133,18 @@ class ObjectDictionary:
         """Return the entry, or None when the device has no such object."""
         return self._entries.get((index, subindex))
 
+    def number(self, index: int, subindex: int = 0) -> int | None:
+        """Return the default of an object, None where it has none or no whole number."""
+        entry = self.get(index, subindex)
+        return entry.default if entry is not None and isinstance(entry.default, int) else None
+
     def has_index(self, index: int) -> bool:
         """Return whether any sub-index of this index exists."""
-        return index in self._indices
+        return index in self._by_index
 
     def subindices(self, index: int) -> list[ObjectEntry]:
         """Return all entries of one index, ascending."""
-        return [entry for entry in self if entry.index == index]
+        return list(self._by_index.get(index, ()))
 
     def is_configured(self, *indices: int) -> bool:
         """Return whether a DCF gives any writable sub-index of some objects its own value."""

@@ -7,7 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
-from typing import NamedTuple
+from typing import NamedTuple, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 LSS_REQUEST = 0x7E5  # COB-ID from the master
 LSS_RESPONSE = 0x7E4  # COB-ID from the slaves
@@ -38,63 +41,42 @@ ADDRESS_BITS = 32  # of each of the four numbers
 
 
 class LssCommand(IntEnum):
-    """Command specifiers."""
+    """Command specifiers, each with its service in words as ``text``."""
 
-    SWITCH_GLOBAL = 0x04
-    CONFIGURE_NODE_ID = 0x11
-    CONFIGURE_BIT_TIMING = 0x13
-    ACTIVATE_BIT_TIMING = 0x15
-    STORE = 0x17
-    SELECT_VENDOR = 0x40
-    SELECT_PRODUCT = 0x41
-    SELECT_REVISION = 0x42
-    SELECT_SERIAL = 0x43
-    SELECTED = 0x44
-    IDENTIFY_VENDOR = 0x46
-    IDENTIFY_PRODUCT = 0x47
-    IDENTIFY_REVISION_LOW = 0x48
-    IDENTIFY_REVISION_HIGH = 0x49
-    IDENTIFY_SERIAL_LOW = 0x4A
-    IDENTIFY_SERIAL_HIGH = 0x4B
-    IDENTIFY_UNCONFIGURED = 0x4C
-    IDENTIFIED = 0x4F
-    UNCONFIGURED_IDENTIFIED = 0x50
-    FAST_SCAN = 0x51
-    INQUIRE_VENDOR = 0x5A
-    INQUIRE_PRODUCT = 0x5B
-    INQUIRE_REVISION = 0x5C
-    INQUIRE_SERIAL = 0x5D
-    INQUIRE_NODE_ID = 0x5E
+    text: str
 
+    def __new__(cls, code: int, text: str = '') -> Self:
+        """Make a member of a row; a member by its code alone has the text of its row."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.text = text
+        return member
 
-COMMAND_TEXTS: dict[int, str] = {
-    LssCommand.SWITCH_GLOBAL: 'switch state global',
-    LssCommand.CONFIGURE_NODE_ID: 'configure node id',
-    LssCommand.CONFIGURE_BIT_TIMING: 'configure bit timing',
-    LssCommand.ACTIVATE_BIT_TIMING: 'activate bit timing',
-    LssCommand.STORE: 'store configuration',
-    LssCommand.SELECT_VENDOR: 'switch state selective: vendor id',
-    LssCommand.SELECT_PRODUCT: 'switch state selective: product code',
-    LssCommand.SELECT_REVISION: 'switch state selective: revision number',
-    LssCommand.SELECT_SERIAL: 'switch state selective: serial number',
-    LssCommand.SELECTED: 'switch state selective: done',
-    LssCommand.IDENTIFY_VENDOR: 'identify remote slave: vendor id',
-    LssCommand.IDENTIFY_PRODUCT: 'identify remote slave: product code',
-    LssCommand.IDENTIFY_REVISION_LOW: 'identify remote slave: lowest revision number',
-    LssCommand.IDENTIFY_REVISION_HIGH: 'identify remote slave: highest revision number',
-    LssCommand.IDENTIFY_SERIAL_LOW: 'identify remote slave: lowest serial number',
-    LssCommand.IDENTIFY_SERIAL_HIGH: 'identify remote slave: highest serial number',
-    LssCommand.IDENTIFY_UNCONFIGURED: 'identify non-configured remote slave',
-    LssCommand.IDENTIFIED: 'identify slave',
-    LssCommand.UNCONFIGURED_IDENTIFIED: 'identify non-configured slave',
-    LssCommand.FAST_SCAN: 'fastscan',
-    LssCommand.INQUIRE_VENDOR: 'inquire vendor id',
-    LssCommand.INQUIRE_PRODUCT: 'inquire product code',
-    LssCommand.INQUIRE_REVISION: 'inquire revision number',
-    LssCommand.INQUIRE_SERIAL: 'inquire serial number',
-    LssCommand.INQUIRE_NODE_ID: 'inquire node id',
-}
-"""Services in words."""
+    SWITCH_GLOBAL = 0x04, 'switch state global'
+    CONFIGURE_NODE_ID = 0x11, 'configure node id'
+    CONFIGURE_BIT_TIMING = 0x13, 'configure bit timing'
+    ACTIVATE_BIT_TIMING = 0x15, 'activate bit timing'
+    STORE = 0x17, 'store configuration'
+    SELECT_VENDOR = 0x40, 'switch state selective: vendor id'
+    SELECT_PRODUCT = 0x41, 'switch state selective: product code'
+    SELECT_REVISION = 0x42, 'switch state selective: revision number'
+    SELECT_SERIAL = 0x43, 'switch state selective: serial number'
+    SELECTED = 0x44, 'switch state selective: done'
+    IDENTIFY_VENDOR = 0x46, 'identify remote slave: vendor id'
+    IDENTIFY_PRODUCT = 0x47, 'identify remote slave: product code'
+    IDENTIFY_REVISION_LOW = 0x48, 'identify remote slave: lowest revision number'
+    IDENTIFY_REVISION_HIGH = 0x49, 'identify remote slave: highest revision number'
+    IDENTIFY_SERIAL_LOW = 0x4A, 'identify remote slave: lowest serial number'
+    IDENTIFY_SERIAL_HIGH = 0x4B, 'identify remote slave: highest serial number'
+    IDENTIFY_UNCONFIGURED = 0x4C, 'identify non-configured remote slave'
+    IDENTIFIED = 0x4F, 'identify slave'
+    UNCONFIGURED_IDENTIFIED = 0x50, 'identify non-configured slave'
+    FAST_SCAN = 0x51, 'fastscan'
+    INQUIRE_VENDOR = 0x5A, 'inquire vendor id'
+    INQUIRE_PRODUCT = 0x5B, 'inquire product code'
+    INQUIRE_REVISION = 0x5C, 'inquire revision number'
+    INQUIRE_SERIAL = 0x5D, 'inquire serial number'
+    INQUIRE_NODE_ID = 0x5E, 'inquire node id'
 
 
 class LssState(IntEnum):
@@ -137,7 +119,10 @@ class LssMessage:
     @property
     def text(self) -> str:
         """The service in words."""
-        return COMMAND_TEXTS.get(self.command, f'unknown command 0x{self.command:02X}')
+        try:
+            return LssCommand(self.command).text
+        except ValueError:
+            return f'unknown command 0x{self.command:02X}'
 
     def encode(self) -> bytes:
         """Return the 8 bytes of the frame."""

@@ -149,7 +149,6 @@ a write of others starts, only the vendor knows."""
 
 AXIS_OFFSET = 0x800  # between the objects of two axes of a drive (CiA 402-2, 7.2)
 AXES_MAX = 8  # axes of one device (CiA 402-2, 7.2)
-_CONTROLWORDS = frozenset(Index.CONTROLWORD + AXIS_OFFSET * axis for axis in range(AXES_MAX))
 _PROFILE_AREA = 0x6000  # first object of the first axis
 _STATE = frozenset(
     {
@@ -177,10 +176,15 @@ _SIGNED = frozenset(
 )
 
 
+def axis_of(index: int) -> tuple[int, int]:
+    """Return the index of the same object of the first axis, and the number of the axis from 0."""
+    axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
+    return (_PROFILE_AREA + offset, axis) if 0 <= axis < AXES_MAX else (index, 0)
+
+
 def is_signed(index: int, subindex: int) -> bool:
     """Return whether an object of any axis is a position, velocity or torque, which has a sign."""
-    axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
-    return 0 <= axis < AXES_MAX and (_PROFILE_AREA + offset, subindex) in _SIGNED
+    return (axis_of(index)[0], subindex) in _SIGNED
 
 
 def slow_timeout(index: int, usual: float) -> float:
@@ -199,10 +203,9 @@ def is_setting(index: int) -> bool:
 
 def is_state(index: int) -> bool:
     """Return whether an object shows how one of the axes of a drive is, as the cycle reads it."""
-    axis, offset = divmod(index - _PROFILE_AREA, AXIS_OFFSET)
-    return 0 <= axis < AXES_MAX and _PROFILE_AREA + offset in _STATE
+    return axis_of(index)[0] in _STATE
 
 
 def is_controlword(index: int) -> bool:
     """Return whether an object is the controlword of one of the axes of a drive."""
-    return index in _CONTROLWORDS
+    return axis_of(index)[0] == Index.CONTROLWORD

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import struct
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ..exceptions import CodecError
 from .datatypes import byte_length, DataType
@@ -23,15 +23,16 @@ SEGMENT_MAX = 7  # [byte]
 
 
 @dataclass(frozen=True, slots=True)
-class DownloadRequest:
-    """Initiate a write: expedited when ``data`` is given, else segmented."""
+class _Initiate:
+    """Begin of a transfer: expedited when ``data`` is given, else segmented."""
 
     index: int
     subindex: int
     data: bytes | None  # the whole value of an expedited transfer, else None
-    # length of the value in [byte] if the frame has it; without it the server takes from expedited
-    # data as many bytes as its object has
+    # length of the value in [byte] if the frame has it; without it the receiver takes from
+    # expedited data as many bytes as its object has
     size: int | None = None
+    specifier: ClassVar[int]
 
     def encode(self) -> bytes:
         """Return the 8 bytes of the frame.
@@ -39,49 +40,54 @@ class DownloadRequest:
         Raises:
             CodecError: Expedited data have not 1 to 4 bytes.
         """
-        return _encode_initiate(0x20, self.index, self.subindex, self.data, self.size)
+        command, indicated = self.specifier, self.size is not None
+        if self.data is None:
+            command |= indicated
+            return struct.pack('<BHBI', command, self.index, self.subindex, self.size or 0)
+        unused = EXPEDITED_MAX - len(self.data)
+        if not 0 <= unused < EXPEDITED_MAX:
+            raise CodecError(f'an expedited transfer carries 1 to 4 bytes, got {len(self.data)}')
+        command |= 0x02 | (unused << 2 | 0x01 if indicated else 0)
+        return struct.pack('<BHB', command, self.index, self.subindex) + self.data + bytes(unused)
+
+
+class DownloadRequest(_Initiate):
+    """Initiate a write."""
+
+    __slots__ = ()
+    specifier = 0x20
+
+
+class UploadResponse(_Initiate):
+    """Answer to a read."""
+
+    __slots__ = ()
+    specifier = 0x40
 
 
 @dataclass(frozen=True, slots=True)
-class UploadResponse:
-    """Answer to a read: expedited when ``data`` is given, else segmented."""
-
+class _Address:
     index: int
     subindex: int
-    data: bytes | None  # the whole value of an expedited transfer, else None
-    size: int | None = None  # length of the value in [byte] if the frame has it
+    specifier: ClassVar[int]
 
     def encode(self) -> bytes:
-        """Return the 8 bytes of the frame.
-
-        Raises:
-            CodecError: Expedited data have not 1 to 4 bytes.
-        """
-        return _encode_initiate(0x40, self.index, self.subindex, self.data, self.size)
+        """Return the 8 bytes of the frame."""
+        return struct.pack('<BHB4x', self.specifier, self.index, self.subindex)
 
 
-@dataclass(frozen=True, slots=True)
-class DownloadResponse:
+class DownloadResponse(_Address):
     """A write was initiated or, if expedited, done."""
 
-    index: int
-    subindex: int
-
-    def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
-        return struct.pack('<BHB4x', 0x60, self.index, self.subindex)
+    __slots__ = ()
+    specifier = 0x60
 
 
-@dataclass(frozen=True, slots=True)
-class UploadRequest:
+class UploadRequest(_Address):
     """Initiate a read."""
 
-    index: int
-    subindex: int
-
-    def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
-        return struct.pack('<BHB4x', 0x40, self.index, self.subindex)
+    __slots__ = ()
+    specifier = 0x40
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,25 +112,27 @@ class Segment:
 
 
 @dataclass(frozen=True, slots=True)
-class UploadSegmentRequest:
+class _Toggle:
+    toggle: bool
+    specifier: ClassVar[int]
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes of the frame."""
+        return bytes((self.specifier | self.toggle << 4,)) + bytes(7)
+
+
+class UploadSegmentRequest(_Toggle):
     """Request the next segment of a read."""
 
-    toggle: bool
-
-    def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
-        return bytes((0x60 | self.toggle << 4,)) + bytes(7)
+    __slots__ = ()
+    specifier = 0x60
 
 
-@dataclass(frozen=True, slots=True)
-class DownloadSegmentResponse:
+class DownloadSegmentResponse(_Toggle):
     """A segment of a write was taken."""
 
-    toggle: bool
-
-    def encode(self) -> bytes:
-        """Return the 8 bytes of the frame."""
-        return bytes((0x20 | self.toggle << 4,)) + bytes(7)
+    __slots__ = ()
+    specifier = 0x20
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,19 +150,6 @@ class Abort:
 
 Request: TypeAlias = DownloadRequest | UploadRequest | Segment | UploadSegmentRequest | Abort
 Response: TypeAlias = DownloadResponse | UploadResponse | Segment | DownloadSegmentResponse | Abort
-
-
-def _encode_initiate(
-    specifier: int, index: int, subindex: int, data: bytes | None, size: int | None
-) -> bytes:
-    indicated = size is not None
-    if data is None:
-        return struct.pack('<BHBI', specifier | indicated, index, subindex, size or 0)
-    unused = EXPEDITED_MAX - len(data)
-    if not 0 <= unused < EXPEDITED_MAX:
-        raise CodecError(f'an expedited transfer carries 1 to 4 bytes, got {len(data)}')
-    length = unused << 2 | 0x01 if indicated else 0
-    return struct.pack('<BHB', specifier | 0x02 | length, index, subindex) + data + bytes(unused)
 
 
 def _decode_initiate(data: bytes) -> tuple[int, int, bytes | None, int | None]:
