@@ -28,14 +28,10 @@ MORE_ROWS = (
     Row(0x100C, 0, 'Guard time', 6, 'rw', '0'),
     Row(0x100D, 0, 'Life time factor', 5, 'rw', '0'),
     Row(0x1014, 0, 'COB-ID EMCY', 7, 'rw', '$NODEID+0x80'),
-    Row(0x1016, 2, 'Consumer heartbeat time 2', 7, 'rw', '0'),
     Row(0x1019, 0, 'Synchronous counter overflow', 5, 'rw', '0'),
     Row(0x1200, 0, 'Highest sub-index', 5, 'const', '2'),
     Row(0x1200, 1, 'Client to server', 7, 'ro', '$NODEID+0x600'),
     Row(0x1200, 2, 'Server to client', 7, 'ro', '$NODEID+0x580'),
-    Row(0x1201, 0, 'Highest sub-index', 5, 'const', '2'),
-    Row(0x1201, 1, 'Client to server', 7, 'rw', '0x80000000'),
-    Row(0x1201, 2, 'Server to client', 7, 'rw', '0x80000000'),
     Row(0x6502, 0, 'Supported drive modes', 7, 'ro', '0xA5'),
 )
 EDS = eds_text(
@@ -267,20 +263,6 @@ WARNINGS = {
         'the drive does not watch the master',
         'remove',
     ),
-    'consumer of an unknown device': Case(
-        '# sdo',
-        f'- {{index: 0x1016, sub_index: 2, value: 0x090100}} {HERE}',
-        'defaults.sdo[1]',
-        'node 9, which bus.yml does not have',
-        'node id',
-    ),
-    'consumer shorter than the producer': Case(
-        '# sdo',
-        f'- {{index: 0x1016, sub_index: 2, value: 0x03006E}} {HERE}',
-        'defaults.sdo[1]',
-        'waits 110 ms for the heartbeat of node 3, whose heartbeat comes every 100 ms',
-        'time',
-    ),
     'SYNC elsewhere': Case(
         '# sdo',
         f'- {{index: 0x1005, value: 0x81}} {HERE}',
@@ -345,13 +327,6 @@ ERRORS = {
         f'- {{index: 0x1014, value: 0x183}} {HERE}',
         'defaults.sdo[1]',
         'COB-ID 0x183 of EMCY of joint1 is also that of TPDO 1 of joint2',
-        'of its own',
-    ),
-    'two SDO channels with one identifier': Case(
-        '# sdo',
-        f'- {{index: 0x1201, sub_index: 1, value: 0x6A0}} {HERE}',
-        'defaults.sdo[1]',
-        'COB-ID 0x6A0 of SDO channel 2 of joint2 is also that of SDO channel 2 of joint1',
         'of its own',
     ),
 }

@@ -50,7 +50,6 @@ class LoadFigures:
     frames_per_second: float = 0.0  # frames in [1/s]
     # share of the time that the bus was busy, 0 to 1, with the stuffing of random content
     load: float = 0.0
-    load_worst: float = 0.0  # the same with the most stuffing that these frames can have
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,6 @@ class _Sample:
     time: float  # [s]
     frames: int
     bits: float
-    bits_worst: int
 
 
 class BusLoad:
@@ -103,15 +101,13 @@ class BusLoad:
         return LoadFigures(
             (newest.frames - oldest.frames) / span,
             (newest.bits - oldest.bits) / (span * self._bitrate),
-            (newest.bits_worst - oldest.bits_worst) / (span * self._bitrate),
         )
 
     def _sample(self, now: float) -> _Sample:
-        frames, bits, bits_worst = 0, 0.0, 0
+        frames, bits = 0, 0.0
         for is_extended, counts in ((False, self._standard), (True, self._extended)):
             for size, count in enumerate(counts):
                 plain = frame_bits(size, is_extended=is_extended)
                 frames += count
                 bits += count * (plain + stuff_bits_mean(size, is_extended=is_extended))
-                bits_worst += count * (plain + stuff_bits_worst(size, is_extended=is_extended))
-        return _Sample(now, frames, bits, bits_worst)
+        return _Sample(now, frames, bits)

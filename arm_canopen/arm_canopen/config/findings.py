@@ -17,7 +17,6 @@ class Place:
 
     file: Path
     line: int = 0  # line, from 1; 0 for the whole file
-    column: int = 0  # column, from 1; 0 for the whole line
     key: str = ''  # path of the key, such as ``nodes.joint1.tpdo.1.mapping[0]``
 
 
@@ -54,20 +53,17 @@ class Findings:
         problem = Problem(place.file, place.line, place.key, message, remedy)
         self._warnings.setdefault((place, message), problem)
 
-    def extend_errors(self, problems: Iterable[Problem]) -> None:
-        """Add the errors of another file."""
-        for problem in problems:
-            self.error(_place(problem), problem.message, problem.remedy)
-
-    def extend_warnings(self, problems: Iterable[Problem]) -> None:
-        """Add the warnings of another file."""
-        for problem in problems:
-            self.warning(_place(problem), problem.message, problem.remedy)
+    def extend(self, errors: Iterable[Problem] = (), warnings: Iterable[Problem] = ()) -> None:
+        """Add what was found in another file."""
+        for add, problems in ((self.error, errors), (self.warning, warnings)):
+            for problem in problems:
+                place = Place(problem.file, problem.line, problem.key)
+                add(place, problem.message, problem.remedy)
 
     @property
     def errors(self) -> tuple[Problem, ...]:
         """All errors, in the order of the lines."""
-        return tuple(sorted(self._errors.values(), key=_order))
+        return tuple(sorted(self._errors.values(), key=lambda each: (str(each.file), each.line)))
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
@@ -82,11 +78,3 @@ class Findings:
         """
         if self._errors:
             raise ConfigError(self.errors)
-
-
-def _place(problem: Problem) -> Place:
-    return Place(problem.file, problem.line, key=problem.key)
-
-
-def _order(problem: Problem) -> tuple[str, int]:
-    return str(problem.file), problem.line

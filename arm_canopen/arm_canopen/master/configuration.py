@@ -34,7 +34,6 @@ PDO_OBJECTS = frozenset(
     )
     for number in range(PDO_COUNT_MAX)
 )
-LIFE_SIGNS = frozenset(index for index, _, _ in ERROR_CONTROL)
 UNWATCHED = (
     'so it goes on with its last command when the master dies. Give it a time that it takes (the '
     "master's heartbeat_producer times heartbeat_multiplier), or write heartbeat_consumer: false "
@@ -88,7 +87,7 @@ class Configurator:
             SdoError: As with :meth:`apply`.
         """
         for write in await self._writes():
-            if write.index in LIFE_SIGNS or write.key == WATCH_KEY or write.is_own_timer:
+            if write.index in ERROR_CONTROL or write.key == WATCH_KEY or write.is_own_timer:
                 await self._bring(write)
 
     async def differences(self) -> list[str]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from functools import partial
 
 NODE_ID_MIN = 1
 NODE_ID_MAX = 127
@@ -41,22 +42,18 @@ PREDEFINED: dict[tuple[int, int], int] = {
 """Function code of the COB-IDs that devices may change, by index and sub-index."""
 
 
-def tpdo_default(number: int, node_id: int) -> int:
-    """Return the pre-defined COB-ID of TPDO 1 to 4 of a node.
+def _pdo_default(first: CobId, number: int, node_id: int) -> int:
+    """Return the pre-defined COB-ID of PDO 1 to 4 of a node; the first is that of its direction.
 
     Raises:
         ValueError: The number is not 1 to 4; others have no pre-defined identifier.
     """
-    return _pdo_default(CobId.TPDO1, number, node_id)
+    if not 1 <= number <= PREDEFINED_MAX:
+        raise ValueError(f'PDO {number} has no pre-defined COB-ID; only PDOs 1 to 4 have one')
+    return first + 0x100 * (number - 1) + node_id
 
 
-def rpdo_default(number: int, node_id: int) -> int:
-    """Return the pre-defined COB-ID of RPDO 1 to 4 of a node.
-
-    Raises:
-        ValueError: The number is not 1 to 4; others have no pre-defined identifier.
-    """
-    return _pdo_default(CobId.RPDO1, number, node_id)
+tpdo_default, rpdo_default = partial(_pdo_default, CobId.TPDO1), partial(_pdo_default, CobId.RPDO1)
 
 
 def own_cob_id(
@@ -78,9 +75,3 @@ def own_cob_id(
     if offset not in others:
         return cob_id
     return cob_id & ~CAN_ID_MASK | base + node_id
-
-
-def _pdo_default(base: int, number: int, node_id: int) -> int:
-    if not 1 <= number <= PREDEFINED_MAX:
-        raise ValueError(f'PDO {number} has no pre-defined COB-ID; only PDOs 1 to 4 have one')
-    return base + 0x100 * (number - 1) + node_id

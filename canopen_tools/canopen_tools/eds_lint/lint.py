@@ -61,7 +61,7 @@ def lint_eds(path: str | os.PathLike[str]) -> EdsReport:
         ini = read_ini(read_eds_text(path, findings))
     except ConfigError as error:
         return EdsReport(None, error.problems, ())
-    findings.extend_warnings(eds.warnings)
+    findings.extend(warnings=eds.warnings)
     check_info(path, ini, eds.dictionary, findings)
     check_lists(path, ini, findings)
     _Linter(eds, ini, findings).check()
@@ -204,7 +204,7 @@ class _Linter:
         section = self._section(entry)
         line = section.line_of(key) if section is not None else entry.line
         title = section.title if section is not None else f'{entry.index:04X}'
-        return Place(self._path, line, key=f'[{title}]')
+        return Place(self._path, line, f'[{title}]')
 
     def _add_warning(self, entry: ObjectEntry, key: str, message: str, remedy: str) -> None:
         self._findings.warning(self._place(entry, key), _named(entry, message), remedy)

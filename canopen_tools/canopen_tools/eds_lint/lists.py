@@ -60,7 +60,7 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
     rates = [_number(info, f'baudrate_{rate}') for rate in BIT_RATES_KBIT]
     if any(rate is not None for rate in rates) and not any(rates):
         findings.warning(
-            Place(path, info.line, key='[DeviceInfo]'),
+            Place(path, info.line, '[DeviceInfo]'),
             'the device supports no bit rate',
             'write BaudRate_1000=1 and so on for those that it has',
         )
@@ -81,7 +81,7 @@ def check_lists(path: Path, ini: IniFile, findings: Findings) -> None:
             index = _number(section, key)
             if index is None:
                 continue
-            place = Place(path, value.line, key=f'[{title}]')
+            place = Place(path, value.line, f'[{title}]')
             if index in seen:
                 findings.warning(
                     place,

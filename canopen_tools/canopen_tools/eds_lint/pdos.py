@@ -87,4 +87,4 @@ def _check_mapping(eds: Eds, direction: Direction, number: int, findings: Findin
 
 
 def _place(eds: Eds, entry: ObjectEntry) -> Place:
-    return Place(eds.path, entry.line, key=f'[{entry.index:04X}sub{entry.subindex:X}]')
+    return Place(eds.path, entry.line, f'[{entry.index:04X}sub{entry.subindex:X}]')

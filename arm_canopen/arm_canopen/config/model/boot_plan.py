@@ -39,11 +39,8 @@ SERVICES_OFF: dict[tuple[int, int], tuple[int, int]] = {
     (Index.EMCY_COB_ID, 0): (COB_ID_INVALID, COB_ID_INVALID),
 }
 """Bits of a COB-ID, and their value while its identifier may change (CiA 301, 7.5.2)."""
-ERROR_CONTROL = (
-    (Index.PRODUCER_HEARTBEAT, DataType.UNSIGNED16, 'heartbeat_producer'),
-    (Index.GUARD_TIME, DataType.UNSIGNED16, 'guard_time'),
-    (Index.LIFE_TIME_FACTOR, DataType.UNSIGNED8, 'life_time_factor'),
-)
+ERROR_CONTROL = frozenset({Index.PRODUCER_HEARTBEAT, Index.GUARD_TIME, Index.LIFE_TIME_FACTOR})
+"""Objects that are written from keys of their own, or else their defaults."""
 WATCH_KEY = 'heartbeat_consumer'
 TIMER_KEY = 'event_timer'
 HeldConsumers = Mapping[int, int | None]
@@ -117,7 +114,7 @@ def boot_writes(
     What the device holds in 0x1016 is read while :func:`consumer_to_read` names an entry; None
     takes it from its EDS.
     """
-    return list(_Plan(bus, node, consumers).writes())
+    return list(_writes(bus, node, consumers))
 
 
 def held_after_boot(
@@ -160,10 +157,7 @@ def _watch_slots(bus: BusConfig, node: NodeConfig) -> list[int]:
 
 
 def _is_free(held: HeldConsumers, subindex: int, master_id: int) -> bool:
-    """Return whether the master may use an entry of 0x1016 of a device.
-
-    The first entry counts as free where it cannot be read.
-    """
+    """Return whether an entry of 0x1016 is free; the first is where it cannot be read."""
     word = held.get(subindex)
     return subindex == 1 if word is None else _is_free_word(word, master_id)
 
@@ -181,146 +175,143 @@ def watch_word(bus: BusConfig, node: NodeConfig) -> int:
     return ConsumerHeartbeatTime(bus.master.node_id, time).word if watched else 0
 
 
-class _Plan:
-    """Lists the writes for one device."""
+def _writes(
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None
+) -> Iterator[BootWrite]:
+    for write in node.parameter_writes:
+        yield from _written(write)
+    yield from _watch(bus, node, consumers)
+    yield from _error_control(bus, node)
+    leading = 0
+    while leading < len(node.sdo_writes) and node.sdo_writes[leading].index in BEFORE_PDOS:
+        leading += 1
+    for write in node.sdo_writes[:leading]:
+        yield from _written(write, unless_default=True)
+    for direction, pdo in _pdos(node):
+        if pdo.configured:
+            yield from _pdo(bus, node, direction, pdo)
+        elif pdo.event_time is not None:  # of a TPDO that is otherwise left as the device has it
+            for parameter in _parameters(bus, node, direction, pdo):
+                if parameter.subindex == EVENT_TIMER_SUBINDEX:
+                    yield parameter
+    for write in node.sdo_writes[leading:]:
+        yield from _written(write)
 
-    def __init__(self, bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None) -> None:
-        self._bus = bus
-        self._node = node
-        self._consumers = _eds_consumers(bus, node) if consumers is None else consumers
 
-    def writes(self) -> Iterator[BootWrite]:
-        node = self._node
-        for write in node.parameter_writes:
-            yield from _written(write)
-        yield from self._watch()
-        yield from self._error_control()
-        leading = 0
-        while leading < len(node.sdo_writes) and node.sdo_writes[leading].index in BEFORE_PDOS:
-            leading += 1
-        for write in node.sdo_writes[:leading]:
-            yield from _written(write, unless_default=True)
-        for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
-            for pdo in pdos:
-                if pdo.configured:
-                    yield from self._pdo(direction, pdo)
-                elif pdo.event_time is not None:
-                    yield from self._event_timer(direction, pdo)
-        for write in node.sdo_writes[leading:]:
-            yield from _written(write)
+def _pdos(node: NodeConfig) -> Iterator[tuple[Direction, PdoConfig]]:
+    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
+        for pdo in pdos:
+            yield direction, pdo
 
-    def _watch(self) -> Iterator[BootWrite]:
-        """Have the device watch the master, or no longer, in the first entry that is free."""
-        master_id = self._bus.master.node_id
-        entries = {**self._consumers, **_consumers_of_dcf(self._node)}  # which was written before
-        slots = [sub for sub in _watch_slots(self._bus, self._node) if sub in entries]
-        slot = next((sub for sub in slots if _is_free(entries, sub, master_id)), 0)
-        word = watch_word(self._bus, self._node)
-        own = ConsumerHeartbeatTime.parse(entries.get(slot) or 0).node_id == master_id
-        if slot and (word or own):
-            yield _number(
-                (Index.CONSUMER_HEARTBEAT, slot),
-                word,
-                DataType.UNSIGNED32,
-                WATCH_KEY,
-                requested=is_requested(self._bus, self._node, WATCH_KEY),
-            )
 
-    def _error_control(self) -> Iterator[BootWrite]:
-        """Set the heartbeat of the device, and node guarding (CiA 301, 7.2.8)."""
-        node = self._node
-        values = {
-            Index.PRODUCER_HEARTBEAT: round(node.heartbeat_producer * MILLISECONDS),
-            Index.GUARD_TIME: round(node.guard_time * MILLISECONDS),
-            Index.LIFE_TIME_FACTOR: node.life_time_factor,
-        }
-        for index, data_type, key in ERROR_CONTROL:
-            entry = node.dictionary.get(index)
-            if entry is None or not entry.access.writable:
-                continue
-            heartbeat = index is Index.PRODUCER_HEARTBEAT
-            if heartbeat or node.uses_node_guarding or values[index] != (entry.default or 0):
-                yield _number(
-                    (index, 0),
-                    values[index],
-                    data_type,
-                    key,
-                    requested=is_requested(self._bus, node, key),
-                    unless_default=True,
-                )
+def _watch(
+    bus: BusConfig, node: NodeConfig, consumers: HeldConsumers | None
+) -> Iterator[BootWrite]:
+    """Have the device watch the master, or no longer, in the first entry that is free."""
+    master_id, index = bus.master.node_id, Index.CONSUMER_HEARTBEAT
+    slots = _watch_slots(bus, node)
+    if consumers is None:
+        consumers = {slot: node.dictionary.number(index, slot) or 0 for slot in slots}
+    entries = {**consumers, **_consumers_of_dcf(node)}  # which was written before
+    slot = next((sub for sub in slots if sub in entries and _is_free(entries, sub, master_id)), 0)
+    word = watch_word(bus, node)
+    own = ConsumerHeartbeatTime.parse(entries.get(slot) or 0).node_id == master_id
+    if slot and (word or own):
+        requested = is_requested(bus, node, WATCH_KEY)
+        yield BootWrite(index, slot, encode(DataType.UNSIGNED32, word), WATCH_KEY, requested)
 
-    def _pdo(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
-        """Configure a PDO: disable, parameters, mapping, enable (CiA 301, 7.5.2.36)."""
-        cob_id = (direction.communication + pdo.number - 1, 1)
-        key = f'{direction.name}.{pdo.number}'
-        unsigned = DataType.UNSIGNED32
-        is_given = self._is_given(direction, pdo, 'cob_id')
-        yield _number(
-            cob_id,
-            pdo.cob_id | COB_ID_INVALID,
-            unsigned,
-            f'{key}.cob_id' if pdo.enabled else f'{key}.enabled',
-            requested=is_given or not pdo.enabled,
-            mask=COB_ID_INVALID,
-            temporary=pdo.enabled,
-            unless_default=True,
-        )
-        if not pdo.enabled:
-            return
-        yield from self._parameters(direction, pdo)
-        if not pdo.fixed_mapping:
-            yield from self._mapping(direction, pdo)
-        yield _number(
-            cob_id, pdo.cob_id, unsigned, f'{key}.cob_id', requested=is_given, mask=COB_ID_BITS
-        )
 
-    def _event_timer(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
-        """Set the event timer alone of a TPDO that is otherwise left as the device has it."""
-        for write in self._parameters(direction, pdo):
-            if write.subindex == EVENT_TIMER_SUBINDEX:
-                yield write
+def _error_control(bus: BusConfig, node: NodeConfig) -> Iterator[BootWrite]:
+    """Set the heartbeat of the device, and node guarding (CiA 301, 7.2.8)."""
+    period, guard_time = (
+        round(time * MILLISECONDS) for time in (node.heartbeat_producer, node.guard_time)
+    )
+    u16, u8 = DataType.UNSIGNED16, DataType.UNSIGNED8
+    for index, data_type, key, value in (
+        (Index.PRODUCER_HEARTBEAT, u16, 'heartbeat_producer', period),
+        (Index.GUARD_TIME, u16, 'guard_time', guard_time),
+        (Index.LIFE_TIME_FACTOR, u8, 'life_time_factor', node.life_time_factor),
+    ):
+        entry = node.dictionary.get(index)
+        if entry is None or not entry.access.writable:
+            continue
+        heartbeat = index is Index.PRODUCER_HEARTBEAT
+        if heartbeat or node.uses_node_guarding or value != (entry.default or 0):
+            data, requested = encode(data_type, value), is_requested(bus, node, key)
+            yield BootWrite(index, 0, data, key, requested, unless_default=True)
 
-    def _parameters(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
+
+def _pdo(
+    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig
+) -> Iterator[BootWrite]:
+    """Configure a PDO: disable, parameters, mapping, enable (CiA 301, 7.5.2.36)."""
+    index, key = direction.communication + pdo.number - 1, f'{direction.name}.{pdo.number}'
+    is_given = _is_given(bus, node, direction, pdo, 'cob_id')
+    yield BootWrite(
+        index,
+        1,
+        encode(DataType.UNSIGNED32, pdo.cob_id | COB_ID_INVALID),
+        f'{key}.cob_id' if pdo.enabled else f'{key}.enabled',
+        requested=is_given or not pdo.enabled,
+        mask=COB_ID_INVALID,
+        temporary=pdo.enabled,
+        unless_default=True,
+    )
+    if not pdo.enabled:
+        return
+    yield from _parameters(bus, node, direction, pdo)
+    if not pdo.fixed_mapping:
+        given, count = _is_given(bus, node, direction, pdo, 'mapping'), len(pdo.mapping)
+        zero, mapping_key = encode(DataType.UNSIGNED8, 0), f'{key}.mapping'
+        mapping = direction.mapping + pdo.number - 1
+        yield BootWrite(mapping, 0, zero, mapping_key, given, temporary=count > 0)
+        yield from _mapping(direction, pdo, mapping_key, requested=given)
+    data = encode(DataType.UNSIGNED32, pdo.cob_id)
+    yield BootWrite(index, 1, data, f'{key}.cob_id', is_given, mask=COB_ID_BITS)
+
+
+def _parameters(
+    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig
+) -> Iterator[BootWrite]:
+    index = direction.communication + pdo.number - 1
+    deadline = TIMER_KEY if direction is TPDO else 'event_deadline'
+    event_time = _units(pdo.event_time, MILLISECONDS)
+    for subindex, name, data_type, value in (
+        (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
+        (3, 'inhibit_time', DataType.UNSIGNED16, _units(pdo.inhibit_time)),
+        (EVENT_TIMER_SUBINDEX, deadline, DataType.UNSIGNED16, event_time),
+        (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
+    ):
+        if value is not None:
+            key = f'{direction.name}.{pdo.number}.{name}'
+            data, given = encode(data_type, value), _is_given(bus, node, direction, pdo, name)
+            yield BootWrite(index, subindex, data, key, given, unless_default=True)
+
+
+def _mapping(
+    direction: Direction, pdo: PdoConfig, key: str, *, requested: bool = True, fixed: bool = False
+) -> Iterator[BootWrite]:
+    """Yield the mapped objects, and then their number."""
+    index, count = direction.mapping + pdo.number - 1, len(pdo.mapping)
+    for subindex, mapped in enumerate(pdo.mapping, start=1):
+        data = encode(DataType.UNSIGNED32, mapped.word)
+        yield BootWrite(index, subindex, data, key, requested, fixed=fixed)
+    if count:
+        yield BootWrite(index, 0, encode(DataType.UNSIGNED8, count), key, requested, fixed=fixed)
+
+
+def _is_given(
+    bus: BusConfig, node: NodeConfig, direction: Direction, pdo: PdoConfig, key: str
+) -> bool:
+    """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
+    if is_requested(bus, node, direction.name, str(pdo.number), key):
+        return True
+    if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
         index = direction.communication + pdo.number - 1
-        deadline = TIMER_KEY if direction is TPDO else 'event_deadline'
-        event_time = _units(pdo.event_time, MILLISECONDS)
-        for subindex, name, data_type, value in (
-            (2, 'transmission', DataType.UNSIGNED8, pdo.transmission),
-            (3, 'inhibit_time', DataType.UNSIGNED16, _units(pdo.inhibit_time)),
-            (EVENT_TIMER_SUBINDEX, deadline, DataType.UNSIGNED16, event_time),
-            (6, 'sync_start', DataType.UNSIGNED8, pdo.sync_start),
-        ):
-            if value is not None:
-                yield _number(
-                    (index, subindex),
-                    value,
-                    data_type,
-                    f'{direction.name}.{pdo.number}.{name}',
-                    requested=self._is_given(direction, pdo, name),
-                    unless_default=True,
-                )
-
-    def _mapping(self, direction: Direction, pdo: PdoConfig) -> Iterator[BootWrite]:
-        index = direction.mapping + pdo.number - 1
-        key = f'{direction.name}.{pdo.number}.mapping'
-        given = self._is_given(direction, pdo, 'mapping')
-        count, unsigned = len(pdo.mapping), DataType.UNSIGNED32
-        yield _number((index, 0), 0, DataType.UNSIGNED8, key, requested=given, temporary=count > 0)
-        for subindex, mapped in enumerate(pdo.mapping, start=1):
-            yield _number((index, subindex), mapped.word, unsigned, key, requested=given)
-        if count:
-            yield _number((index, 0), count, DataType.UNSIGNED8, key, requested=given)
-
-    def _is_given(self, direction: Direction, pdo: PdoConfig, key: str) -> bool:
-        """Return whether bus.yml gives a key of a PDO, or a DCF the object."""
-        if is_requested(self._bus, self._node, direction.name, str(pdo.number), key):
-            return True
-        if key == TIMER_KEY:  # which a DCF may leave to its default beside other parameters
-            index = direction.communication + pdo.number - 1
-            entry = self._node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
-            return entry is not None and entry.configured
-        objects = direction.mapping if key == 'mapping' else direction.communication
-        return self._node.dictionary.is_configured(objects + pdo.number - 1)
+        entry = node.dictionary.get(index, EVENT_TIMER_SUBINDEX)
+        return entry is not None and entry.configured
+    objects = direction.mapping if key == 'mapping' else direction.communication
+    return node.dictionary.is_configured(objects + pdo.number - 1)
 
 
 def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
@@ -332,43 +323,20 @@ def _consumers_of_dcf(node: NodeConfig) -> dict[int, int]:
     }
 
 
-def _eds_consumers(bus: BusConfig, node: NodeConfig) -> dict[int, int]:
-    entries = {
-        subindex: node.dictionary.get(Index.CONSUMER_HEARTBEAT, subindex)
-        for subindex in _watch_slots(bus, node)
-    }
-    return {
-        subindex: entry.default if entry is not None and isinstance(entry.default, int) else 0
-        for subindex, entry in entries.items()
-    }
-
-
 def _fixed_mappings(node: NodeConfig) -> Iterator[BootWrite]:
     """Yield the mappings that a device has for good, which are not written."""
-    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
-        for pdo in pdos:
-            if pdo.configured and pdo.enabled and pdo.fixed_mapping:
-                index, key = direction.mapping + pdo.number - 1, f'{direction.name}.{pdo.number}'
-                yield _number((index, 0), len(pdo.mapping), DataType.UNSIGNED8, key, fixed=True)
-                for subindex, mapped in enumerate(pdo.mapping, start=1):
-                    address, word = (index, subindex), mapped.word
-                    yield _number(address, word, DataType.UNSIGNED32, key, fixed=True)
+    for direction, pdo in _pdos(node):
+        if pdo.configured and pdo.enabled and pdo.fixed_mapping:
+            yield from _mapping(direction, pdo, f'{direction.name}.{pdo.number}', fixed=True)
 
 
 def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
     """Yield the COB-IDs that the device should have by its node id, though not by its EDS."""
-    for direction, pdos in ((RPDO, node.rpdos), (TPDO, node.tpdos)):
-        for pdo in pdos:
-            if pdo.assumed and pdo.enabled and not pdo.configured:
-                address, key = direction.communication + pdo.number - 1, direction.name
-                yield _number(
-                    (address, 1),
-                    pdo.cob_id,
-                    DataType.UNSIGNED32,
-                    f'{key}.{pdo.number}',
-                    mask=COB_ID_BITS,
-                    fixed=True,
-                )
+    for direction, pdo in _pdos(node):
+        if pdo.assumed and pdo.enabled and not pdo.configured:
+            index, key = direction.communication + pdo.number - 1, f'{direction.name}.{pdo.number}'
+            data = encode(DataType.UNSIGNED32, pdo.cob_id)
+            yield BootWrite(index, 1, data, key, mask=COB_ID_BITS, fixed=True)
 
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:
@@ -378,7 +346,8 @@ def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootW
     mask, off = SERVICES_OFF.get(address, (0, 0))
     if value & mask != off:
         off |= value & ~mask
-        yield _number(address, off, DataType.UNSIGNED32, key, mask=mask, temporary=True)
+        ended = encode(DataType.UNSIGNED32, off)
+        yield BootWrite(*address, ended, key, mask=mask, temporary=True)
         unless_default = False  # or an exported DCF would leave it ended
     yield BootWrite(*address, write.data, key, unless_default=unless_default)
 
@@ -389,19 +358,3 @@ def _key(location: SourceLocation) -> str:
 
 def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:
     return None if time is None else round(time * per_second)
-
-
-def _number(  # the fields of a record
-    address: tuple[int, int],
-    value: int,
-    data_type: DataType,
-    key: str,
-    *,
-    requested: bool = True,
-    mask: int | None = None,
-    temporary: bool = False,
-    unless_default: bool = False,
-    fixed: bool = False,
-) -> BootWrite:
-    data = encode(data_type, value)
-    return BootWrite(*address, data, key, requested, mask, temporary, unless_default, fixed)

@@ -32,10 +32,10 @@ def with_event_timer(pdo: PdoConfig, dictionary: ObjectDictionary) -> PdoConfig:
     chosen = pdo.event_time is not None or pdo.transmission < EVENT_DRIVEN
     if chosen or not _carries_state(pdo) or entry is None or not entry.access.writable:
         return pdo
-    default = _default(dictionary, index, EVENT_TIMER_SUBINDEX) / MILLISECONDS
+    default = (dictionary.number(index, EVENT_TIMER_SUBINDEX) or 0) / MILLISECONDS
     inhibit = pdo.inhibit_time
     if inhibit is None:
-        inhibit = _default(dictionary, index, INHIBIT_TIME_SUBINDEX) / HUNDRED_MICROSECONDS
+        inhibit = (dictionary.number(index, INHIBIT_TIME_SUBINDEX) or 0) / HUNDRED_MICROSECONDS
     time = min(default or EVENT_TIME_MAX, EVENT_TIME_MAX)
     return replace(pdo, event_time=max(time, INHIBIT_FACTOR * inhibit))
 
@@ -59,8 +59,3 @@ def loss_unnoticed(pdo: PdoConfig, silence: float) -> bool:
 
 def _carries_state(pdo: PdoConfig) -> bool:
     return pdo.enabled and any(is_state(mapped.index) for mapped in pdo.mapping)
-
-
-def _default(dictionary: ObjectDictionary, index: int, subindex: int) -> int:
-    entry = dictionary.get(index, subindex)
-    return entry.default if entry is not None and isinstance(entry.default, int) else 0

@@ -117,7 +117,7 @@ def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
         findings.error(Place(file), 'nested too deeply', f'a {kind.name} needs five levels')
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        place = Place(file, mark.line + 1, mark.column + 1) if mark else Place(file)
+        place = Place(file, mark.line + 1) if mark else Place(file)
         said = ', '.join(text for text in (error.context, error.problem) if text)
         findings.error(
             place, f'not YAML: {said}', 'check indentation, colons, brackets and quotes'
@@ -240,7 +240,7 @@ class _Converter:
 
     def _place(self, node: yaml.Node, key: str) -> Place:
         mark = node.start_mark
-        return Place(self._file, mark.line + 1, mark.column + 1, key)
+        return Place(self._file, mark.line + 1, key)
 
 
 def reindent(

@@ -54,7 +54,7 @@ def load_eds(path: str | os.PathLike[str]) -> Eds:
     for line, message in ini.oddities:
         findings.warning(Place(path, line), message, TOLERATED)
     for line, key, message in objects.oddities:
-        findings.warning(Place(path, line, key=key), message, TOLERATED)
+        findings.warning(Place(path, line, key), message, TOLERATED)
     return Eds(path, dictionary, node_id, _dummy_types(ini), findings.warnings, _numbers(ini))
 
 

@@ -111,17 +111,12 @@ def _identity(settings: DeviceSettings, dictionary: ObjectDictionary) -> Identit
     the firmware at hand, and the device would not boot although it fits.
     """
     return Identity(
-        device_type=_default(dictionary, Index.DEVICE_TYPE, 0),
-        vendor_id=_default(dictionary, Index.IDENTITY, 1),
-        product_code=_default(dictionary, Index.IDENTITY, 2),
+        device_type=dictionary.number(Index.DEVICE_TYPE) or 0,
+        vendor_id=dictionary.number(Index.IDENTITY, 1) or 0,
+        product_code=dictionary.number(Index.IDENTITY, 2) or 0,
         revision_number=settings.revision_number,
         serial_number=settings.serial_number,
     )
-
-
-def _default(dictionary: ObjectDictionary, index: int, subindex: int) -> int:
-    entry = dictionary.get(index, subindex)
-    return entry.default if entry is not None and isinstance(entry.default, int) else 0
 
 
 def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> None:

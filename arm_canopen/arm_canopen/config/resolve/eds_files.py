@@ -69,11 +69,11 @@ class EdsFiles:
             try:
                 self._read[path] = load_eds(path)
             except ConfigError as error:
-                findings.extend_errors(error.problems)
+                findings.extend(errors=error.problems)
                 self._read[path] = None
         eds = self._read[path]
         if eds is not None:
-            findings.extend_warnings(eds.warnings)
+            findings.extend(warnings=eds.warnings)
         return eds
 
 

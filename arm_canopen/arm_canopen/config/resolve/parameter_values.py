@@ -12,18 +12,16 @@ from ...exceptions import CodecError
 from ...standard.datatypes import encode
 from ...standard.device_profile import is_drive
 from ...standard.dictionary import ObjectEntry
-from ...standard.objects import AXIS_OFFSET, COMMANDS, Index
+from ...standard.objects import axis_of, COMMANDS, Index
 from ..findings import Findings, Place
+from ..model.boot_plan import ERROR_CONTROL
 from ..model.bus import SdoWrite, SourceLocation
 from ..read.eds import Eds
 
 ACTIONS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
 """Objects that do something when they are written."""
-ERROR_CONTROL = frozenset({Index.GUARD_TIME, Index.LIFE_TIME_FACTOR, Index.PRODUCER_HEARTBEAT})
-"""Objects that the master writes from their keys, for which these values are the defaults."""
 PDOS = range(Index.RPDO_COMMUNICATION, 0x1C00)
 PROGRAMS_AND_NMT = range(0x1F50, 0x1FA0)  # CiA 302-2 and -3
-AXES = range(0x6000, 0xA000)  # CiA 402-2, 7.2
 
 
 def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
@@ -47,8 +45,8 @@ def _is_setting(entry: ObjectEntry) -> bool:
 
 
 def _data(entry: ObjectEntry, eds: Eds, findings: Findings) -> bytes | None:
-    place = Place(eds.path, entry.line, key=f'[{entry.index:04X}]')
-    if is_drive(eds.dictionary) and _is_command(entry.index):
+    place = Place(eds.path, entry.line, f'[{entry.index:04X}]')
+    if is_drive(eds.dictionary) and axis_of(entry.index)[0] in COMMANDS:
         what = f'the ParameterValue of {entry} is a command, which is not written at boot'
         findings.warning(place, what, 'remove it; the drive gets its commands at run time')
         return None
@@ -59,8 +57,3 @@ def _data(entry: ObjectEntry, eds: Eds, findings: Findings) -> bytes | None:
     except CodecError as error:
         findings.warning(place, f'the ParameterValue of {entry}: {error}', 'correct it')
         return None
-
-
-def _is_command(index: int) -> bool:
-    first_axis = (index - AXES.start) % AXIS_OFFSET + AXES.start
-    return index in AXES and first_axis in COMMANDS

@@ -62,7 +62,7 @@ def eds_mapping(
     for entry in used:
         if not isinstance(entry.default, int) or entry.default == 0:
             continue
-        place = Place(eds.path, entry.line, key=f'[{entry.index:04X}sub{entry.subindex:X}]')
+        place = Place(eds.path, entry.line, f'[{entry.index:04X}sub{entry.subindex:X}]')
         mapped = _from_word(entry.default, eds.dictionary, place, findings)
         if mapped is None:
             return ()
@@ -74,12 +74,12 @@ def eds_mapping(
     ]
     if flagged:
         findings.warning(
-            Place(eds.path, entries[0].line, key=f'[{entries[0].index:04X}]'),
+            Place(eds.path, entries[0].line, f'[{entries[0].index:04X}]'),
             f'bit 7 of the length is set in 0x{flagged[0]:08X}; it is ignored, also in others',
             EDS_REMEDY,
         )
     if sum(mapped.bits for mapped in mapping) > PDO_BITS_MAX:
-        place = Place(eds.path, entries[0].line, key=f'[{entries[0].index:04X}]')
+        place = Place(eds.path, entries[0].line, f'[{entries[0].index:04X}]')
         findings.warning(place, 'the default mapping is longer than 64 bits', EDS_REMEDY)
         return ()
     return tuple(mapping)

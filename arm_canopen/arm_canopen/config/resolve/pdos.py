@@ -82,7 +82,7 @@ class PdoReader:
         entry = self._eds.dictionary.get(draft.direction.communication + config.number - 1, 1)
         if entry is not None and entry.literal is not None and config.mapping:
             self._findings.warning(
-                Place(self._eds.path, entry.line, key=f'[{entry.index:04X}sub1]'),
+                Place(self._eds.path, entry.line, f'[{entry.index:04X}sub1]'),
                 f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {draft.title} is not that of node '
                 f'{self._node_id}; it is taken to have 0x{config.cob_id:03X}, which is compared '
                 'at boot',

@@ -4,22 +4,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 import math
 
 from ....standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, SYNC_PRODUCER
 from ....standard.dictionary import object_address
-from ....standard.nmt import ConsumerHeartbeatTime
 from ....standard.objects import Index
 from ...findings import Findings, Place
-from ...units import MICROSECONDS, MILLISECONDS
+from ...units import MICROSECONDS
 from ..boot_plan import boot_writes, WATCH_KEY
 from ..bus import BusConfig
 from .subject import Subject
 
 LATE_FACTOR = 1.5  # heartbeat periods that a consumer has to wait at least
-CONSUMER_ENTRIES = range(1, 128)
-SDO_CHANNELS = range(1, 128)  # further SDO servers, 0x1201 to 0x127F
 
 
 def check_master(config: BusConfig, findings: Findings) -> None:
@@ -69,7 +66,6 @@ def check_heartbeats(subject: Subject) -> None:
     _check_watches_master(subject)
     _check_first_boot(subject)
     _check_consumer_limit(subject)
-    _check_consumers(subject)
 
 
 def _check_watches_master(subject: Subject) -> None:
@@ -127,38 +123,6 @@ def _check_consumer_limit(subject: Subject) -> None:
             )
 
 
-def _check_consumers(subject: Subject) -> None:
-    """Check the entries of 0x1016 beside the first, which the master writes."""
-    bus = subject.bus
-    producers = {node.node_id: node.heartbeat_producer for node in bus.nodes}
-    producers[bus.master.node_id] = bus.master.heartbeat_producer
-    for subindex in CONSUMER_ENTRIES:
-        entry = subject.value(Index.CONSUMER_HEARTBEAT, subindex)
-        if not entry or (
-            subindex == 1 and subject.node.write_of(Index.CONSUMER_HEARTBEAT, 1) is None
-        ):
-            continue
-        consumer = ConsumerHeartbeatTime.parse(entry)
-        if not consumer.used:
-            continue
-        node_id, time = consumer.node_id, consumer.time_ms / MILLISECONDS
-        period = producers.get(node_id, 0.0)
-        if time >= LATE_FACTOR * period > 0:
-            continue
-        if node_id not in producers:
-            what = f'node {node_id}, which bus.yml does not have'
-        elif not period:
-            what = f'node {node_id}, which sends no heartbeat'
-        else:
-            what = f'node {node_id}, whose heartbeat comes every {period * 1e3:g} ms'
-        subject.findings.warning(
-            subject.object_place(Index.CONSUMER_HEARTBEAT, subindex),
-            f'the device waits {time * 1e3:g} ms for the heartbeat of {what}: it will take it for '
-            'lost',
-            'correct node id (bits 16 to 23) and time (bits 0 to 15, in ms), or remove the entry',
-        )
-
-
 def check_sync(subject: Subject) -> None:
     """Check that device and master mean the same SYNC."""
     master = subject.bus.master
@@ -209,7 +173,7 @@ def check_writes(subject: Subject) -> None:
         kept = last[write.index, write.subindex]
         if write.data != kept.data and write.location.line:
             subject.findings.warning(
-                Place(subject.bus.file, write.location.line, key=write.location.key),
+                Place(subject.bus.file, write.location.line, write.location.key),
                 f'{object_address(write.index, write.subindex)} is written again in line '
                 f'{kept.location.line} with another value',
                 'keep one of them, unless the device needs both in this order',
@@ -226,32 +190,19 @@ def check_identifiers(subjects: Sequence[Subject]) -> None:
     for subject in subjects:
         _check_emergency(subject)
         _check_sdo_server(subject)
-        for cob_id, title, place in _services(subject):
-            other, where = owners.setdefault(cob_id, (title, place))
-            if other != title:
-                subject.findings.error(
-                    place,
-                    f'COB-ID 0x{cob_id:03X} of {title} is also that of {other} '
-                    f'(line {where.line})',
-                    'give each an identifier of its own',
-                )
-
-
-def _services(subject: Subject) -> Iterator[tuple[int, str, Place]]:
-    """Yield the services beside PDOs that bus.yml gives an identifier."""
-    name = subject.node.name
-    for index, subindex, title in (
-        (Index.EMCY_COB_ID, 0, f'EMCY of {name}'),
-        *(
-            (Index.SDO_SERVER + channel, part, f'SDO channel {channel + 1} of {name}')
-            for channel in SDO_CHANNELS
-            for part in (1, 2)
-        ),
-    ):
-        write = subject.node.write_of(index, subindex)
-        value = subject.value(index, subindex)
-        if write is not None and value is not None and not value & COB_ID_INVALID:
-            yield value & CAN_ID_MASK, title, subject.object_place(index, subindex)
+        value = subject.value(Index.EMCY_COB_ID)
+        is_written = subject.node.write_of(Index.EMCY_COB_ID, 0) is not None
+        if not is_written or value is None or value & COB_ID_INVALID:
+            continue
+        cob_id, title = value & CAN_ID_MASK, f'EMCY of {subject.node.name}'
+        place = subject.object_place(Index.EMCY_COB_ID, 0)
+        other, where = owners.setdefault(cob_id, (title, place))
+        if other != title:
+            subject.findings.error(
+                place,
+                f'COB-ID 0x{cob_id:03X} of {title} is also that of {other} (line {where.line})',
+                'give each an identifier of its own',
+            )
 
 
 def _check_emergency(subject: Subject) -> None:
@@ -286,4 +237,4 @@ def _check_sdo_server(subject: Subject) -> None:
 
 def _master_place(config: BusConfig, key: str) -> Place:
     location = config.place_of('master', key)
-    return Place(config.file, location.line, key=location.key)
+    return Place(config.file, location.line, location.key)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ....standard.objects import AXIS_OFFSET, Index
+from ....standard.objects import axis_of, Index
 from ....standard.pdo import SYNCHRONOUS_MAX
 from ..bus import PdoConfig
 from ..pdo_direction import Direction, TPDO
@@ -101,7 +101,7 @@ def _check_events(subject: Subject, direction: Direction, pdo: PdoConfig) -> Non
             f'inhibit_time {inhibit * 1e3:g} ms is longer than event_timer {timer * 1e3:g} ms',
             'make inhibit_time (unit 0.1 ms) the shorter one',
         )
-    restless = [m for m in pdo.mapping if m.index >= 0x6000 and _first_axis(m.index) in RESTLESS]
+    restless = [m for m in pdo.mapping if axis_of(m.index)[0] in RESTLESS]
     if restless and not inhibit:
         names = ' and '.join(object_name(mapped.index) for mapped in restless)
         subject.findings.warning(
@@ -110,7 +110,3 @@ def _check_events(subject: Subject, direction: Direction, pdo: PdoConfig) -> Non
             'never stands still: it may flood the bus',
             "write 'transmission: 1', or an inhibit_time",
         )
-
-
-def _first_axis(index: int) -> int:
-    return 0x6000 + (index - 0x6000) % AXIS_OFFSET

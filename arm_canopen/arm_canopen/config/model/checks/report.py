@@ -81,7 +81,7 @@ def _check_load(config: BusConfig, load: LoadEstimate, findings: Findings) -> No
     if load.load <= HIGH_LOAD:
         return
     written = config.place_of('master', 'sync_period')
-    place = Place(config.file, written.line, key=written.key)
+    place = Place(config.file, written.line, written.key)
     at = f'{load.frames_per_second:.0f} frames/s at {load.bitrate / 1000:g} kbit/s'
     remedy = 'make sync_period longer, map fewer or shorter PDOs, or raise the bit rate'
     if load.load > 1:

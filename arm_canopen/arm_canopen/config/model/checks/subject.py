@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ....standard.dictionary import object_address
 from ....standard.drive import OperationMode
-from ....standard.objects import AXIS_OFFSET, Index
+from ....standard.objects import axis_of, AXIS_OFFSET, Index
 from ...findings import Findings, Place
 from ...units import HUNDRED_MICROSECONDS, MILLISECONDS
 from ..bus import BusConfig, NodeConfig, PdoConfig
@@ -41,7 +41,7 @@ class Subject:
     def place(self, *names: str) -> Place:
         """Return the place of a key of the device, or of the nearest thing around it."""
         location = self.bus.place_of(self.node.name, *names)
-        return Place(self.bus.file, location.line or self.node.line, key=location.key)
+        return Place(self.bus.file, location.line or self.node.line, location.key)
 
     def pdo_place(self, direction: Direction, pdo: PdoConfig, key: str = '') -> Place:
         """Return the place of a PDO, or of one of its keys."""
@@ -51,10 +51,10 @@ class Subject:
         """Return the place of the value of an object: the sdo list, or else the EDS."""
         write = self.node.write_of(index, subindex)
         if write is not None:
-            return Place(self.bus.file, write.location.line, key=write.location.key)
+            return Place(self.bus.file, write.location.line, write.location.key)
         entry = self.node.dictionary.get(index, subindex)
         line = entry.line if entry is not None else 0
-        return Place(self.node.eds, line, key=f'[{index:04X}sub{subindex:X}]')
+        return Place(self.node.eds, line, f'[{index:04X}sub{subindex:X}]')
 
     def value(self, index: int, subindex: int = 0) -> int | None:
         """Return the number that an object holds after boot, None when no file has it."""
@@ -103,5 +103,5 @@ class Subject:
 
 def object_name(index: int) -> str:
     """Name an object of the standards, for messages: ``0x607A (target position)``."""
-    first = 0x6000 + (index - 0x6000) % AXIS_OFFSET if index >= 0x6000 else index
-    return f'{object_address(index)} ({Index(first).name.lower().replace("_", " ")})'
+    name = Index(axis_of(index)[0]).name.lower().replace('_', ' ')
+    return f'{object_address(index)} ({name})'
