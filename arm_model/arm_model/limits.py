@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -102,6 +102,21 @@ class JointLimits:
             seed: Positions in [rad].
         """
         return np.where(self.continuous, seed + self.error(positions, seed), positions)
+
+    def scaled(
+        self, velocity: float, acceleration: float = 1.0, fastest: float = math.inf
+    ) -> JointLimits:
+        """Return the limits with factors of velocities, and of accelerations and jerks.
+
+        Args:
+            fastest: Greatest speed of any joint in [rad/s], before the factor is taken.
+        """
+        return replace(
+            self,
+            velocity=frozen(np.minimum(self.velocity, fastest) * velocity),
+            acceleration=frozen(self.acceleration * acceleration),
+            jerk=frozen(self.jerk * acceleration),
+        )
 
     @property
     def continuous(self) -> Mask:

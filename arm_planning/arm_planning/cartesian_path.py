@@ -26,7 +26,7 @@ from arm_model import (
     Pose,
     RobotModel,
 )
-from arm_trajectory import Path, quintics, Segment
+from arm_trajectory import Path, quintics
 
 from .curves import Line
 from .exceptions import PlanningCode, PlanningError
@@ -145,11 +145,7 @@ def timed_rows(rows: Array, limits: JointLimits) -> Path:
     velocity = np.concatenate((velocity, slopes[-1:]))
     acceleration = np.zeros_like(velocity)
     acceleration[1:-1] = 2.0 * np.diff(slopes, axis=0) / around
-    starts = np.concatenate(((0.0,), np.cumsum(lasts)[:-1]))
-    pieces = quintics(lasts, rows, velocity, acceleration)
-    path = Path(
-        [Segment(*each) for each in zip(starts.tolist(), lasts.tolist(), pieces, strict=True)]
-    )
+    path = Path.of(lasts, quintics(lasts, rows, velocity, acceleration))
     most = float((limits.acceleration / limits.velocity).min())
     jerk = float((limits.jerk / limits.velocity).min())
     return timed(FullSpeedPath(path, most, jerk), limits)[0]

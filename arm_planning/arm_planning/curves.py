@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -19,27 +18,6 @@ MAX_RADIUS_DIFFERENCE = 1e-2
 
 COLLINEAR_TOLERANCE = 1e-5
 """Length of the cross product below which points are on a line, as in Pilz' planner."""
-
-
-class Curve(Protocol):
-    """A way of a link, by a parameter from 0 to 1."""
-
-    @property
-    def length(self) -> float:
-        """Length of the way of its origin in [m]."""
-
-    @property
-    def angle(self) -> float:
-        """Angle by which it turns in [rad]."""
-
-    def at(self, share: float) -> Pose:
-        """Return the pose at a share of the way, in the root link."""
-
-    def twist(self, share: float) -> Array:
-        """Return the derivative by the share (6), linear before angular, in the root link."""
-
-    def nearest(self, position: Array) -> float:
-        """Return the share of the way that is nearest to a position."""
 
 
 class _Turning:
@@ -127,6 +105,9 @@ class Arc:
         turn = math.atan2(float(off @ self._second), float(off @ self._first))
         middle = 0.5 * self._sweep  # the turn that is nearest to the middle of the arc
         return (turn + 2.0 * math.pi * round((middle - turn) / (2.0 * math.pi))) / self._sweep
+
+
+Curve = Line | Arc  # a way of a link in the root link, by a parameter from 0 to 1
 
 
 def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 
 import numpy as np
@@ -55,17 +54,7 @@ def slower(path: Path, factor: float) -> Path:
         factor: How many times the time.
     """
     powers = (factor ** -np.arange(6.0))[:, None]
-    return Path(
-        [
-            replace(
-                each,
-                start=each.start * factor,
-                duration=each.duration * factor,
-                coefficients=each.coefficients * powers,
-            )
-            for each in path.segments
-        ]
-    )
+    return Path.of(path.durations * factor, path.coefficients * powers)
 
 
 def _greatest_speed(path: Path, link: LinkKinematics) -> float:

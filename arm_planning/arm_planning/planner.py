@@ -25,7 +25,6 @@ from arm_model import (
 from .constraints import ConstraintCheck
 from .exceptions import PlanningCode, PlanningError
 from .free.free_motion import FreeMotion
-from .free.timing import scaled_limits
 from .ik.solver import DEFAULT_TIMEOUT, IkSolver
 from .industrial.limits import CartesianLimits
 from .industrial.planner import IndustrialPlanner, PLANNER_IDS
@@ -205,9 +204,7 @@ class Planner:
             constraints = ConstraintCheck(self._model, request.constraints)
             _require_start(constraints, start)
         goals = self._goals(request, start, check, constraints, left)
-        limits = scaled_limits(
-            self._model.limits, request.velocity_scaling, request.acceleration_scaling
-        )
+        limits = self._model.limits.scaled(request.velocity_scaling, request.acceleration_scaling)
         free = FreeMotion(limits, check, self._draw, constraints)
         further = self._further(request.goals, start, check, constraints)
         paths = [free.plan(start, goals, expired, further)]

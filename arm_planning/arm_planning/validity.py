@@ -115,7 +115,7 @@ class ValidityCheck:
 
     def path(self, path: Path) -> Violation | None:
         """Return what is wrong with a path, of its positions; None for nothing."""
-        control = _control_values(path)
+        control = path.control_values
         lower, upper = control.min(axis=1), control.max(axis=1)
         outside = (lower < self._limits.lower - LIMIT_TOLERANCE) | (
             upper > self._limits.upper + LIMIT_TOLERANCE
@@ -127,7 +127,7 @@ class ValidityCheck:
 
     def contact(self, path: Path) -> Violation | None:
         """Return where a pair comes nearer on a path than it may; None for nowhere."""
-        found = self._near_time(path, _control_values(path))
+        found = self._near_time(path, path.control_values)
         return None if found is None else self._near(path.at(found).position, found)
 
     def refuse_start(self, start: Array) -> None:
@@ -262,20 +262,3 @@ def _interpolated(rows: Array, places: Array) -> Array:
     share = (places - before)[..., None]
     found: Array = rows[before] + share * (rows[before + 1] - rows[before])
     return found
-
-
-def _control_values(path: Path) -> Array:
-    """Return the control values of the segments' positions (k, 6, n), in whose hull they lie."""
-    powers = np.arange(DEGREE + 1.0)
-    scaled = path.coefficients * (path.durations[:, None] ** powers)[:, :, None]
-    control: Array = np.einsum('cp,kpn->kcn', _BERNSTEIN, scaled)
-    return control
-
-
-# control values of a polynomial on 0..1 by its coefficients: Farin, "Curves and Surfaces for CAGD"
-_BERNSTEIN = np.array(
-    [
-        [math.comb(row, power) / math.comb(DEGREE, power) for power in range(DEGREE + 1)]
-        for row in range(DEGREE + 1)
-    ]
-)

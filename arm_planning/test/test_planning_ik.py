@@ -28,7 +28,7 @@ from arm_model import (
 from arm_planning import PlanningCode, PlanningError
 from arm_planning.ik.link_kinematics import pose_error
 from arm_planning.ik.numeric import random_start
-from arm_planning.ik.solver import ik, IkSolver
+from arm_planning.ik.solver import IkSolver
 
 pytestmark = pytest.mark.slow
 
@@ -161,7 +161,7 @@ def test_panda_is_solved_from_anywhere(seed: int) -> None:
 @pytest.mark.parametrize('name', ROBOTS)
 def test_the_seed_is_its_own_solution(name: str) -> None:
     """From the joints that made it, a pose has these joints."""
-    found = ik(robot(name), solver(name).link.pose(ready(name)), seed=ready(name))
+    found = solver(name).solve(solver(name).link.pose(ready(name)), ready(name))
     assert found[0] == pytest.approx(ready(name), abs=1e-9)
 
 
@@ -197,7 +197,7 @@ def test_limits_are_named(name: str) -> None:
     pose, narrowed = solver(name).link.pose(moved), RobotModel(*texts(name), limits)
     joints = '|'.join(narrowed.joints)
     with pytest.raises(PlanningError, match=rf'beyond the limits.*({joints}) at') as refused:
-        ik(narrowed, pose, seed=here)
+        IkSolver(narrowed).solve(pose, here)
     assert refused.value.code is PlanningCode.NO_IK_SOLUTION
 
 

@@ -23,7 +23,7 @@ from .goal import GoalPoint, GoalRules, JointTolerance, TrajectoryGoal
 from .otg import brakeable, brakeable_velocity, hard_brake, OnlineTrajectoryGenerator, Plan
 from .paths.bounds import Excess, farthest_beyond
 from .paths.goal_path import build_path
-from .paths.path import Path, PathPoint, quintics, Segment
+from .paths.path import Path, quintics, Segment
 from .paths.path_check import PathCheck, PathContact
 from .paths.time_scaling import Demand, Timing
 
@@ -40,7 +40,6 @@ __all__ = [
     'Path',
     'PathCheck',
     'PathContact',
-    'PathPoint',
     'Plan',
     'Segment',
     'StateMovedError',

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import ruckig
 
-from arm_model import Array, frozen, JointLimits, Native, RobotState
+from arm_model import Array, JointLimits, Native, RobotState
 
 CONTINUOUS_DISTANCE = 1e6  # what counts for the way of a joint without end in [rad]
 
@@ -79,7 +79,7 @@ class OnlineTrajectoryGenerator:
 
     def __init__(self, limits: JointLimits) -> None:
         count = len(limits)
-        self._limits = limits
+        self.limits = limits
         self._otg = ruckig.Ruckig(count)
         velocity, apart = ruckig.ControlInterface.Velocity, ruckig.Synchronization.No
         self._to_velocity = self._input(velocity, apart)
@@ -97,7 +97,7 @@ class OnlineTrajectoryGenerator:
         change of the joint that needs longest. Other than ruckig's own synchronisation this holds
         when the target changes in every cycle.
         """
-        limits, demand = self._limits, self._to_velocity
+        limits, demand = self.limits, self._to_velocity
         present = np.abs(state.acceleration) / limits.acceleration
         share = _shares(velocity - state.velocity, limits.acceleration)
         jerk = limits.jerk * np.maximum(share, present)  # what is there is taken back in time
@@ -138,36 +138,17 @@ class OnlineTrajectoryGenerator:
         demand.minimum_duration = shortest
         return self._plan(demand)
 
-    def slowed(self, share: float, fastest: float = np.inf) -> OnlineTrajectoryGenerator:
-        """Return a generator with a share of the velocities.
-
-        Args:
-            share: Above 0, at most 1.
-            fastest: Greatest speed of any joint in [rad/s], before the share is taken.
-        """
-        limits = self._limits
-        return OnlineTrajectoryGenerator(
-            JointLimits(
-                limits.names,
-                limits.lower,
-                limits.upper,
-                frozen(np.minimum(limits.velocity, fastest) * share),
-                limits.acceleration,
-                limits.jerk,
-            )
-        )
-
     def _input(self, interface: Native, synchronization: Native) -> Native:
-        demand = ruckig.InputParameter(len(self._limits))
+        demand = ruckig.InputParameter(len(self.limits))
         demand.control_interface = interface
         demand.synchronization = synchronization
-        demand.max_velocity = self._limits.velocity
-        demand.max_acceleration = self._limits.acceleration
-        demand.max_jerk = self._limits.jerk
+        demand.max_velocity = self.limits.velocity
+        demand.max_acceleration = self.limits.acceleration
+        demand.max_jerk = self.limits.jerk
         return demand
 
     def _plan(self, demand: Native, begin: Array | None = None) -> Plan | None:
-        trajectory = ruckig.Trajectory(len(self._limits))
+        trajectory = ruckig.Trajectory(len(self.limits))
         try:
             result = self._otg.calculate(demand, trajectory)
         except ruckig.RuckigError:

@@ -12,8 +12,9 @@ from model_robots import robot
 import numpy as np
 import pytest
 
+from arm_model import RobotState
 from arm_trajectory import JointTolerance, merge_tolerances, Path
-from arm_trajectory.paths.path import cubic, linear, PathPoint, quintic
+from arm_trajectory.paths.path import cubic, linear, quintic
 from arm_trajectory.paths.rounding import rounded
 from arm_trajectory.paths.time_scaling import Timing
 
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.slow
 def test_segments_meet_their_ends(seed: int, duration: float) -> None:
     """A line meets positions, a cubic velocities too, a quintic accelerations too."""
     rng = np.random.default_rng(seed)
-    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    begin, end = (RobotState(*rng.normal(size=(3, 4))) for _ in range(2))
     straight = linear(1.0, duration, begin.position, end.position)
     third, fifth = cubic(1.0, duration, begin, end), quintic(1.0, duration, begin, end)
     for segment in (straight, third, fifth):
@@ -43,7 +44,7 @@ def test_segments_meet_their_ends(seed: int, duration: float) -> None:
 def test_derivatives_of_segments_are_differences(seed: int, share: float) -> None:
     """Velocity and acceleration are the difference quotients of what they derive."""
     rng, step = np.random.default_rng(seed), 1e-6
-    begin, end = (PathPoint(*rng.normal(size=(3, 4))) for _ in range(2))
+    begin, end = (RobotState(*rng.normal(size=(3, 4))) for _ in range(2))
     segment = quintic(0.0, 1.0, begin, end)
     before, here, after = (segment.at(share + shift) for shift in (-step, 0.0, step))
     assert here.velocity == pytest.approx(

@@ -9,7 +9,6 @@ every corner follows the straight motions exactly. The quickest that is valid co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,21 +24,6 @@ MAX_ITERATIONS = 30  # how often the times of the motions are improved
 STEP_UP = 1.01  # factor of a time that is improved, so that the search for it ends
 MIN_SEGMENT = 1e-3  # least time of a part of a path in [s]
 MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
-
-
-def scaled_limits(limits: JointLimits, velocity: float, acceleration: float) -> JointLimits:
-    """Return limits with the factors of a request; jerk goes with the acceleration.
-
-    Args:
-        velocity: Factor of the velocities.
-        acceleration: Factor of the accelerations and jerks.
-    """
-    return replace(
-        limits,
-        velocity=limits.velocity * velocity,
-        acceleration=limits.acceleration * acceleration,
-        jerk=limits.jerk * acceleration,
-    )
 
 
 def timed_path(places: Array, limits: JointLimits, check: ConstrainedCheck) -> Path | None:

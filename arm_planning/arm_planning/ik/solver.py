@@ -239,24 +239,6 @@ class IkSolver:
         )
 
 
-def ik(
-    model: RobotModel,
-    pose: Pose,
-    *,
-    link: str = '',
-    seed: Sequence[float] | Array,
-    scene: PlanningScene | None = None,
-    timeout: float = DEFAULT_TIMEOUT,
-    count: int = 1,
-    clock: Callable[[], float] = time.monotonic,
-) -> list[Array]:
-    """Return joint positions for a pose, the nearest to the seed first.
-
-    Who asks often keeps an :class:`IkSolver`, whose arguments and errors these are.
-    """
-    return IkSolver(model, link, clock).solve(pose, seed, scene, timeout, count)
-
-
 def check_pose(pose: Pose) -> None:
     """Refuse a pose that is none.
 

@@ -22,8 +22,6 @@ from dataclasses import dataclass, fields
 import math
 from typing import Any
 
-from arm_model import frozen, JointLimits
-
 from ..exceptions import PlanningCode, PlanningError
 
 MIN_SCALING = 1e-4  # least factor of velocity and acceleration, as in Pilz' planner
@@ -71,23 +69,6 @@ class CartesianLimits:
     def radius(self) -> float:
         """Way in [m] that takes as long as a rotation of 1 rad."""
         return self.max_trans_vel / self.max_rot_vel
-
-
-def scaled(limits: JointLimits, velocity: float, acceleration: float) -> JointLimits:
-    """Return limits of joints with the factors of a request; jerk goes with the acceleration.
-
-    Args:
-        velocity: Factor of the velocities.
-        acceleration: Factor of the accelerations.
-    """
-    return JointLimits(
-        limits.names,
-        limits.lower,
-        limits.upper,
-        frozen(limits.velocity * velocity),
-        frozen(limits.acceleration * acceleration),
-        frozen(limits.jerk * acceleration),
-    )
 
 
 def check_scaling(velocity: float, acceleration: float) -> None:

@@ -29,7 +29,7 @@ from ..requests import (
 )
 from ..validity import ValidityCheck
 from .following import curve_path
-from .limits import CartesianLimits, check_scaling, scaled
+from .limits import CartesianLimits, check_scaling
 from .ptp import ptp_path
 from .sequence import check_overlap, check_radii, joined, SequenceItem
 from .timing import FullSpeedPath, timed
@@ -182,7 +182,7 @@ class IndustrialPlanner:
         factors = request.velocity_scaling, request.acceleration_scaling
         check_scaling(*factors)
         limits = self._model.limits
-        joints = scaled(limits, *factors)
+        joints = limits.scaled(*factors)
         if isinstance(goal, JointGoal):
             there = limits.in_nearest_turn(self._checked(goal.positions, 'goal'), start)
             goal = JointGoal(frozen(there), goal.tolerance)
@@ -260,8 +260,7 @@ class IndustrialPlanner:
         check: ValidityCheck | None,
     ) -> MotionPlan:
         """Return the motion with its times, checked."""
-        limits = scaled(
-            self._model.limits,
+        limits = self._model.limits.scaled(
             min(each.velocity_scaling for each in requests),
             min(each.acceleration_scaling for each in requests),
         )

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from arm_model import Array, JointLimits
-from arm_trajectory import brakeable, Path, Segment
+from arm_trajectory import brakeable, Path
 
 from .timing import FullSpeedPath
 
@@ -41,7 +41,7 @@ def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
     speed = min(speed, peak)
     coefficients = np.zeros((6, len(way)))
     coefficients[0], coefficients[1] = start, way * speed
-    path = Path([Segment(0.0, 1.0 / speed, coefficients)])
+    path = Path.of(np.array([1.0 / speed]), coefficients[None])
     return FullSpeedPath(path, acceleration / speed, jerk / speed, straight=True)
 
 
@@ -50,5 +50,5 @@ def standstill(positions: Array) -> FullSpeedPath:
     coefficients = np.zeros((6, len(positions)))
     coefficients[0] = positions
     return FullSpeedPath(
-        Path([Segment(0.0, STANDSTILL, coefficients)]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
+        Path.of(np.array([STANDSTILL]), coefficients[None]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
     )

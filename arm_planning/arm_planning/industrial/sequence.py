@@ -125,12 +125,9 @@ def joined(
         if number < len(blends):
             segments.append(blends[number].segment)
             begin = blends[number].join
-    starts = np.concatenate(((0.0,), np.cumsum([each.duration for each in segments])[:-1]))
-    path = Path(
-        [
-            Segment(float(start), each.duration, each.coefficients)
-            for start, each in zip(starts, segments, strict=True)
-        ]
+    path = Path.of(
+        np.array([each.duration for each in segments]),
+        np.array([each.coefficients for each in segments]),
     )
     notes = tuple(note for part in parts for note in part.notes)
     return FullSpeedPath(
@@ -178,7 +175,7 @@ class _Blend:
 
     def farthest(self, corner: Array, link: LinkKinematics) -> float:
         """Return the greatest distance of the link from the corner on it in [m]."""
-        path = Path([Segment(0.0, self.segment.duration, self.segment.coefficients)])
+        path = Path([self.segment])
         rows = path.positions(np.linspace(0.0, path.duration, SAMPLES))
         return max(float(np.linalg.norm(link.pose(row).position - corner)) for row in rows)
 

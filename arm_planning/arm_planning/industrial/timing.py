@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from arm_model import Array, frozen, JointLimits, RobotState
-from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Segment, Timing
+from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Timing
 
 from ..link_speed import slower
 
@@ -111,13 +111,7 @@ def _from_rest_to_rest(full: FullSpeedPath) -> Path:
     velocity = first * rate[:, None]
     acceleration = second * (rate**2)[:, None] + first * bend[:, None]
     lengths = np.diff(times)
-    pieces = quintics(lengths, q, velocity, acceleration)
-    return Path(
-        [
-            Segment(*each)
-            for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
-        ]
-    )
+    return Path.of(lengths, quintics(lengths, q, velocity, acceleration))
 
 
 def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Array) -> Path:
@@ -126,15 +120,12 @@ def _straight(line: Path, profile: tuple[Array, Array, Array, Array], lasts: Arr
     A phase may be as short as rounding, so that no polynomial could be fitted to its ends.
     """
     base, slope = line.coefficients[0, :2]
-    segments, start = [], 0.0
-    for place, rate, bend, jerk, last in zip(*profile, lasts, strict=True):
-        coefficients = np.zeros((6, len(base)))
-        shares = np.array([[place], [rate], [bend / 2.0], [jerk / 6.0]])
-        coefficients[:4] = shares * slope
-        coefficients[0] += base
-        segments.append(Segment(start, float(last), coefficients))
-        start += float(last)
-    return Path(segments)
+    place, rate, bend, jerk = profile
+    coefficients = np.zeros((len(lasts), 6, len(base)))
+    shares = np.stack((place, rate, bend / 2.0, jerk / 6.0), axis=1)
+    coefficients[:, :4] = shares[:, :, None] * slope
+    coefficients[:, 0] += base
+    return Path.of(lasts, coefficients)
 
 
 def _profile(

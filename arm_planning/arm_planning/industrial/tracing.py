@@ -21,7 +21,7 @@ from typing import NoReturn
 import numpy as np
 
 from arm_model import Array, frozen, JointLimits
-from arm_trajectory import Path, quintics, Segment
+from arm_trajectory import Path, quintics
 
 from ..curves import Curve
 from ..exceptions import PlanningCode, PlanningError
@@ -144,9 +144,7 @@ class _Tracer:
         durations, pieces = self._pieces(places)
         ratio = np.abs([each.first for each in places]) / self._speed
         joint = int(ratio.max(axis=0).argmax())
-        starts = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
-        rows = zip(starts.tolist(), durations.tolist(), pieces[:, :, :-1], strict=True)
-        return Trace(Path([Segment(*each) for each in rows]), float(ratio.max()), joint)
+        return Trace(Path.of(durations, pieces[:, :, :-1]), float(ratio.max()), joint)
 
     def _pieces(self, places: Sequence[_Place]) -> tuple[Array, Array]:
         """Return the polynomials from place to place: of the joints and, last, of the share.

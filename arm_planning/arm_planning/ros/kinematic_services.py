@@ -21,7 +21,6 @@ from ..constraints import ConstraintCheck
 from ..exceptions import PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
 from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
-from ..industrial.limits import scaled
 from ..link_speed import speed_limited
 from ..moveit_config.settings import MoveItSettings
 from ..validity import ValidityCheck
@@ -203,8 +202,7 @@ class GroupKinematics:
         Raises:
             PlanningError: A factor or speed is refused.
         """
-        limits = scaled(
-            model.limits,
+        limits = model.limits.scaled(
             scaling_factor(
                 'velocity', request.max_velocity_scaling_factor, self._settings.velocity_scaling
             ),

@@ -12,7 +12,7 @@ import numpy as np
 
 from arm_model import Array, PlanningScene
 from arm_model.ros import seconds
-from arm_trajectory import Path, PathCheck, quintics, Segment
+from arm_trajectory import Path, PathCheck, quintics
 
 from .background import as_refusal, Background
 from .execution import Execution, INVALIDATED, TrajectoryExecution
@@ -147,8 +147,7 @@ def path_of(trajectory: Any) -> Path:  # noqa: ANN401
         pieces = _cubics(lasts, q, v)
     else:
         pieces = _lines(lasts, q)
-    starts = (times[:-1] - times[0]).tolist()
-    return Path([Segment(*each) for each in zip(starts, lasts.tolist(), pieces, strict=True)])
+    return Path.of(lasts, pieces)
 
 
 def _cubics(lasts: Array, q: Array, v: Array) -> Array:

@@ -46,7 +46,9 @@ class SingleTarget:
         speed_scaling = max(speed_scaling, MIN_SPEED_FACTOR)
         if speed_scaling != self._planned_for:
             self._planned_for = speed_scaling
-            self._planner = self._generator.slowed(speed_scaling, self._max_speed)
+            self._planner = OnlineTrajectoryGenerator(
+                self._generator.limits.scaled(speed_scaling, fastest=self._max_speed)
+            )
         return self._planner.to_state(state, RobotState.at_rest(self.target))
 
     def step(self, state: RobotState, speed_scaling: float, period: float) -> RobotState | None:

@@ -16,14 +16,14 @@ from arm_model import JointLimits, RobotState
 
 from ..otg import OnlineTrajectoryGenerator, Plan
 from .bounds import farthest_beyond
-from .path import Path, PathPoint, quintic, Segment
+from .path import Path, quintic
 from .time_scaling import Timing
 
 MIN_PHASE = 1e-7  # least length of a segment with one jerk in [s]; shorter ones are left out
 
 
 def approach_path(
-    state: RobotState, begin: PathPoint, duration: float, limits: JointLimits
+    state: RobotState, begin: RobotState, duration: float, limits: JointLimits
 ) -> Path | None:
     """Return the path from a motion to the begin of another path; None where there is none.
 
@@ -41,39 +41,36 @@ def approach_path(
 
 
 def _candidates(
-    state: RobotState, begin: PathPoint, duration: float, limits: JointLimits
+    state: RobotState, begin: RobotState, duration: float, limits: JointLimits
 ) -> Iterator[Path]:
     if duration > 0.0:
-        here = PathPoint(state.position, state.velocity, state.acceleration)
-        smooth = Path([quintic(0.0, duration, here, begin)])
+        smooth = Path([quintic(0.0, duration, state, begin)])
         if Timing(smooth, limits).demand.time_factor <= 1.0:
             yield smooth
     generator = OnlineTrajectoryGenerator(limits)
-    there = RobotState(begin.position, begin.velocity, begin.acceleration)
-    plan = generator.to_state(state, there, duration or None)
-    plan = plan or generator.to_state(state, there)  # ruckig may refuse a least duration
+    plan = generator.to_state(state, begin, duration or None)
+    plan = plan or generator.to_state(state, begin)  # ruckig may refuse a least duration
     if plan is not None:
-        yield Path(_phases(plan))
+        yield _phases(plan)
 
 
 def stop_path(state: RobotState, limits: JointLimits) -> Path | None:
     """Return the shortest path from a motion to rest; None where ruckig has no answer."""
     stop = OnlineTrajectoryGenerator(limits).brake(state)
-    return None if stop is None else Path(_phases(stop))
+    return None if stop is None else _phases(stop)
 
 
-def _phases(plan: Plan) -> list[Segment]:
+def _phases(plan: Plan) -> Path:
     """Return a plan as segments with one jerk each."""
     ends = plan.switches
     times = ends[np.diff(ends, prepend=0.0) > MIN_PHASE]
     times = np.concatenate(((0.0,), times[:-1], (plan.duration,)))
     states = [plan.at(time) for time in times.tolist()]
-    segments = []
-    for time, length, before, after in zip(
-        times.tolist(), np.diff(times).tolist(), states, states[1:], strict=False
+    lengths = np.diff(times)
+    coefficients = np.zeros((len(lengths), 6, len(states[0].position)))
+    for piece, length, before, after in zip(
+        coefficients, lengths, states, states[1:], strict=False
     ):
-        coefficients = np.zeros((6, len(before.position)))
         jerk = (after.acceleration - before.acceleration) / length
-        coefficients[:4] = before.position, before.velocity, before.acceleration / 2.0, jerk / 6.0
-        segments.append(Segment(time, length, coefficients))
-    return segments
+        piece[:4] = before.position, before.velocity, before.acceleration / 2.0, jerk / 6.0
+    return Path.of(lengths, coefficients)

@@ -5,19 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-import math
 
 import numpy as np
 
 from arm_model import Array
 
 from .path import Path
-
-# control values of a polynomial of fifth degree on 0..1, in whose hull it lies, by its
-# coefficients: Farin, "Curves and Surfaces for CAGD", Bernstein form
-_CONTROL = np.array(
-    [[math.comb(row, power) / math.comb(5, power) for power in range(6)] for row in range(6)]
-)
 
 ROUNDING_TOLERANCE = 1e-6  # rounding that is let pass in [rad]
 
@@ -39,7 +32,7 @@ def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
         upper: Greatest positions in [rad].
     """
     scaled = path.coefficients * (path.durations[:, None] ** np.arange(6.0))[:, :, None]
-    control = np.einsum('cp,kpn->kcn', _CONTROL, scaled)
+    control = path.control_values
     too_low = (control < lower - ROUNDING_TOLERANCE).any(axis=1)
     too_high = (control > upper + ROUNDING_TOLERANCE).any(axis=1)
     outside = too_low | too_high

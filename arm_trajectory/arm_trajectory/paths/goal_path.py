@@ -17,7 +17,7 @@ from ..exceptions import GoalError
 from ..goal import GoalRules, TrajectoryGoal
 from .approach import approach_path, stop_path
 from .bounds import farthest_beyond
-from .path import cubic, linear, Path, PathPoint, quintic, Segment
+from .path import cubic, linear, Path, quintic, Segment
 from .points import Points, refuse, upcoming_points
 from .rounding import rounded, run_out
 from .time_scaling import Demand, Timing
@@ -292,9 +292,8 @@ def _first(points: Points, state: RobotState) -> list[Segment]:
         if points.velocities is None and len(points.times) > 1:  # run into the line that follows
             step = points.times[1] - points.times[0]
             line = (points.positions[1] - points.positions[0]) / step
-            toward = PathPoint(toward.position, line, toward.acceleration)
-        here = PathPoint(state.position, state.velocity, state.acceleration)
-        return [quintic(0.0, float(points.times[0]), here, toward)]
+            toward = RobotState(toward.position, line, toward.acceleration)
+        return [quintic(0.0, float(points.times[0]), state, toward)]
     return []
 
 

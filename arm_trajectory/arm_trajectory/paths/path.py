@@ -3,7 +3,8 @@
 """Paths in joint space: polynomials over the time of a trajectory.
 
 The time of the trajectory is not that of the clock: :class:`TrajectoryTimer` follows a path
-slower, stops on it and goes on. Derivatives here are by the path's own time.
+slower, stops on it and goes on. Velocities and accelerations of a place on a path are derivatives
+by the path's own time.
 """
 
 from __future__ import annotations
@@ -15,22 +16,18 @@ import math
 
 import numpy as np
 
-from arm_model import Array, Places
+from arm_model import Array, Places, RobotState
 
 # d^k/dt^k of the powers 0 to 5, as factors and exponents
 _POWERS = np.arange(6.0)
 
+# control values of a polynomial on 0..1 by its coefficients: Farin, "Curves and Surfaces for CAGD"
+_BERNSTEIN = np.array(
+    [[math.comb(row, p) / math.comb(5, p) for p in range(6)] for row in range(6)]
+)
+
 # how often the power of the row comes out of that of the column when a polynomial is moved
 _BINOMIAL = np.array([[math.comb(column, row) for column in range(6)] for row in range(6)])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PathPoint:
-    """A place on a path."""
-
-    position: Array  # positions in [rad]
-    velocity: Array  # first derivative by the path's time in [rad/s]
-    acceleration: Array  # second derivative by the path's time in [rad/s2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,14 +38,14 @@ class Segment:
     duration: float  # how long it lasts in [s]
     coefficients: Array  # of the powers 0 to 5 of the time since its start (6, n)
 
-    def at(self, time: float) -> PathPoint:
+    def at(self, time: float) -> RobotState:
         """Return the place at a time of the path in [s]."""
         t = time - self.start
         powers = t**_POWERS
         first = np.concatenate(((0.0,), _POWERS[1:] * powers[:-1]))
         second = np.concatenate(((0.0, 0.0), _POWERS[2:] * _POWERS[1:-1] * powers[:-2]))
         c = self.coefficients
-        return PathPoint(powers @ c, first @ c, second @ c)
+        return RobotState(powers @ c, first @ c, second @ c)
 
 
 def shifted(coefficients: Array, by: Array) -> Array:
@@ -75,7 +72,7 @@ def linear(start: float, duration: float, begin: Array, end: Array) -> Segment:
     return Segment(start, duration, coefficients)
 
 
-def cubic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Segment:
+def cubic(start: float, duration: float, begin: RobotState, end: RobotState) -> Segment:
     """Return the cubic that meets positions and velocities at both ends.
 
     Args:
@@ -89,7 +86,7 @@ def cubic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Se
     return Segment(start, duration, coefficients)
 
 
-def quintic(start: float, duration: float, begin: PathPoint, end: PathPoint) -> Segment:
+def quintic(start: float, duration: float, begin: RobotState, end: RobotState) -> Segment:
     """Return the quintic that meets positions, velocities and accelerations at both ends."""
     ends = (np.array(pair) for pair in zip(_fields(begin), _fields(end), strict=True))
     return Segment(start, duration, quintics(np.array([duration]), *ends)[0])
@@ -119,7 +116,7 @@ def quintics(durations: Array, positions: Array, velocities: Array, acceleration
     return np.stack(rows, axis=1)
 
 
-def _fields(point: PathPoint) -> tuple[Array, Array, Array]:
+def _fields(point: RobotState) -> tuple[Array, Array, Array]:
     return point.position, point.velocity, point.acceleration
 
 
@@ -148,16 +145,30 @@ class Path:
         self.duration = last.start + last.duration
         self.end = last.at(self.duration)
 
+    @classmethod
+    def of(cls, durations: Array, coefficients: Array) -> Path:
+        """Return polynomials (k, 6, n) one after the other, of durations in [s] (k)."""
+        starts = np.concatenate(((0.0,), np.cumsum(durations)[:-1]))
+        rows = zip(starts.tolist(), durations.tolist(), coefficients, strict=True)
+        return cls([Segment(*each) for each in rows])
+
+    @property
+    def control_values(self) -> Array:
+        """Control values of the segments' positions (k, 6, n), in whose hull they lie."""
+        scaled = self.coefficients * (self.durations[:, None] ** _POWERS)[:, :, None]
+        control: Array = np.einsum('cp,kpn->kcn', _BERNSTEIN, scaled)
+        return control
+
     def followed_by(self, segments: Sequence[Segment]) -> Path:
         """Return it with the segments of another path, which begins at 0, behind its end."""
         later = (replace(each, start=self.duration + each.start) for each in segments)
         return Path([*self.segments, *later])
 
-    def at(self, time: float) -> PathPoint:
+    def at(self, time: float) -> RobotState:
         """Return the place at a time of the path in [s]; beyond its end it rests there."""
         if time > self.duration:
             rest = np.zeros(len(self.end.position))
-            return PathPoint(self.end.position, rest, rest)
+            return RobotState(self.end.position, rest, rest)
         place = max(0, bisect_right(self._starts, time) - 1)
         return self.segments[place].at(max(time, 0.0))
 

@@ -15,7 +15,6 @@ from arm_model import Array, JointLimits, RobotState
 
 from ..exceptions import GoalCode, GoalError
 from ..goal import GoalPoint, GoalRules, TrajectoryGoal
-from .path import PathPoint
 
 MAX_POINTS = 5000
 """Points of a trajectory at most: they take a second to plan, for which others wait."""
@@ -38,10 +37,10 @@ class Points:
     accelerations: Array | None
     requested_duration: float
 
-    def at(self, place: int) -> PathPoint:
+    def at(self, place: int) -> RobotState:
         """Return the place that a point is; at rest where it does not say."""
         still = np.zeros(self.positions.shape[1])
-        return PathPoint(
+        return RobotState(
             self.positions[place],
             still if self.velocities is None else self.velocities[place],
             still if self.accelerations is None else self.accelerations[place],

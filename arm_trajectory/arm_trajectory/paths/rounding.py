@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from arm_model import Array, JointLimits
+from arm_model import Array, JointLimits, RobotState
 
-from .path import Path, PathPoint, quintic, Segment, shifted
+from .path import Path, quintic, Segment, shifted
 
 DURATION_FACTOR = 1.25
 """How much longer than its peaks need the rounding of a corner takes: segments bend too."""
@@ -63,15 +63,10 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
     pieces = _cut(base, starts)
     for corner in np.flatnonzero(halves):
         _round(pieces, starts, corners, int(corner), float(halves[corner]))
-    return Path(
-        [
-            Segment(float(start) + lead, float(end - start), piece)
-            for start, end, piece in zip(starts[:-1], starts[1:], pieces, strict=True)
-        ]
-    )
+    return Path.of(np.diff(starts), pieces)
 
 
-def run_out(start: float, end: PathPoint, limits: JointLimits) -> list[Segment]:
+def run_out(start: float, end: RobotState, limits: JointLimits) -> list[Segment]:
     """Return how a path that ends with a velocity comes to rest behind its end.
 
     Args:
@@ -81,8 +76,8 @@ def run_out(start: float, end: PathPoint, limits: JointLimits) -> list[Segment]:
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
     if duration == 0.0:
         return []
-    behind = PathPoint(end.position + 0.5 * duration * end.velocity, still, still)
-    return [quintic(start, duration, PathPoint(end.position, end.velocity, still), behind)]
+    behind = RobotState(end.position + 0.5 * duration * end.velocity, still, still)
+    return [quintic(start, duration, RobotState(end.position, end.velocity, still), behind)]
 
 
 def _corners(path: Path, *, from_rest: bool) -> _Corners:

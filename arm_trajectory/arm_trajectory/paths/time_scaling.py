@@ -27,7 +27,7 @@ import numpy as np
 
 from arm_model import Array, JointLimits, Places
 
-from .path import Path, quintics, Segment
+from .path import Path, quintics
 
 MAX_SPACING = 0.01  # greatest distance of the places that are looked at in [s]
 MAX_SAMPLES = 4000  # places in about a path: long ones are looked at less densely
@@ -237,12 +237,5 @@ def _scaled_path(path: Path, scaling: TimeScaling) -> Path:
     q, speed, bend = (path.derived(order, places, offsets) for order in range(3))
     velocity = speed / r[:, None]
     acceleration = bend / (r**2)[:, None] - speed * (slope / r**3)[:, None]
-    times = scaling.times(given)
-    lengths = np.diff(times)
-    pieces = quintics(lengths, q, velocity, acceleration)
-    return Path(
-        [
-            Segment(*each)
-            for each in zip(times[:-1].tolist(), lengths.tolist(), pieces, strict=True)
-        ]
-    )
+    lengths = np.diff(scaling.times(given))
+    return Path.of(lengths, quintics(lengths, q, velocity, acceleration))
