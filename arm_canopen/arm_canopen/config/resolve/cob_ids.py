@@ -64,12 +64,9 @@ def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
         cob_id = draft.config.cob_id
         if not draft.config.enabled or not cob_id:
             continue
-        if purpose := reserved_for(cob_id):
-            _report(
-                findings,
-                [draft],
-                f'COB-ID 0x{cob_id:03X} of {draft.title} is not for PDOs ({purpose})',
-            )
+        for purpose in (purpose for ids, purpose in RESERVED if cob_id in ids):
+            message = f'COB-ID 0x{cob_id:03X} of {draft.title} is not for PDOs ({purpose})'
+            _report(findings, [draft], message)
         owner = owners.setdefault(cob_id, draft)
         both_command = False
         if draft.direction is RPDO and draft.config.mapping:
@@ -84,11 +81,6 @@ def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
                 f'(line {owner.place.line})',
                 certain=both_command,
             )
-
-
-def reserved_for(cob_id: int) -> str:
-    """Say what an identifier is reserved for, empty when a PDO may have it."""
-    return next((purpose for ids, purpose in RESERVED if cob_id in ids), '')
 
 
 def _report(

@@ -20,7 +20,7 @@ from ..read.section import texts
 from .eds_files import EdsFiles
 from .parameter_values import parameter_writes
 from .pdos import PdoDraft, PdoReader
-from .sdo_list import SdoReader
+from .sdo_list import read_writes
 from .settings import DeviceSettings, Options, read_device_settings
 
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
@@ -73,7 +73,7 @@ def read_device(
         sdo_timeout=settings.sdo_timeout,
         boot_timeout=settings.boot_timeout,
         poll_period=settings.poll_period,
-        sdo_writes=SdoReader(eds.dictionary, findings).read(section),
+        sdo_writes=read_writes(section, eds.dictionary, findings),
         parameter_writes=parameter_writes(eds, findings),
         axes=_placed(axes, eds.dictionary),
         line=section.place.line,

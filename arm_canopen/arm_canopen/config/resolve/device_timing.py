@@ -46,13 +46,16 @@ def finish_device(
         _check_drive_pdos(draft, config, findings)
         check_drive_types(draft.pdos, findings)
     producer = _heartbeat_producer(draft, config.dictionary, findings)
+    life_time_factor = draft.settings.life_time_factor
+    if life_time_factor is None:
+        life_time_factor = config.dictionary.number(Index.LIFE_TIME_FACTOR) or 0
     multiplier = draft.settings.heartbeat_multiplier or context.options.heartbeat_multiplier
     return replace(
         config,
         heartbeat_producer=producer,
         heartbeat_timeout=producer * multiplier if context.settings.watch_devices else 0.0,
         guard_time=_guard_time(draft, config.dictionary, producer, findings),
-        life_time_factor=_life_time_factor(draft, config.dictionary),
+        life_time_factor=life_time_factor,
         heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),
         tpdos=_tpdos(draft, config),
         rpdos=tuple(pdo.config for pdo in draft.pdos if pdo.direction is RPDO),
@@ -80,7 +83,7 @@ def _heartbeat_producer(
                 'remove the key, or use the EDS that fits the device',
             )
         return 0.0
-    given = entry.default / MILLISECONDS if isinstance(entry.default, int) else 0.0
+    given = (dictionary.number(Index.PRODUCER_HEARTBEAT) or 0) / MILLISECONDS
     if wanted is None or wanted == given:
         return given
     if not entry.access.writable:
@@ -111,16 +114,9 @@ def _guard_time(
             'the device cannot be guarded: no writable 0x100C in its EDS',
             'remove the key, and set heartbeat_producer',
         )
-    if wanted is None and entry is not None and isinstance(entry.default, int) and not producer:
-        return entry.default / MILLISECONDS
+    if wanted is None and not producer:
+        return (dictionary.number(Index.GUARD_TIME) or 0) / MILLISECONDS
     return wanted or 0.0
-
-
-def _life_time_factor(draft: DeviceDraft, dictionary: ObjectDictionary) -> int:
-    entry = dictionary.get(Index.LIFE_TIME_FACTOR)
-    given = entry.default if entry is not None and isinstance(entry.default, int) else 0
-    wanted = draft.settings.life_time_factor
-    return given if wanted is None else wanted
 
 
 def _heartbeat_consumer(

@@ -27,7 +27,12 @@ class EdsFiles:
 
     def find(self, dcf: str, dcf_path: str, item: Item, findings: Findings) -> Eds | None:
         """Find and read a file by its name and folder in bus.yml, and report what is wrong."""
-        candidates = self._candidates(dcf, dcf_path)
+        name, folder = (
+            os.path.expandvars(text.replace(PATH_VARIABLE, str(self.folder)))
+            for text in (dcf, dcf_path)
+        )
+        beside = self.beside / name
+        candidates = [self.beside / folder / name, beside] if folder else [beside]
         for path in candidates:
             if _exists(path):
                 if path != candidates[0] and path not in self._read:
@@ -54,15 +59,6 @@ class EdsFiles:
             'write dcf: with the EDS of the drive',
         )
         return self._load(DEFAULT_DRIVE, findings)
-
-    def _candidates(self, dcf: str, dcf_path: str) -> list[Path]:
-        name = self._expand(dcf)
-        folder = self._expand(dcf_path)
-        beside = self.beside / name
-        return [self.beside / folder / name, beside] if folder else [beside]
-
-    def _expand(self, text: str) -> str:
-        return os.path.expandvars(text.replace(PATH_VARIABLE, str(self.folder)))
 
     def _load(self, path: Path, findings: Findings) -> Eds | None:
         if path not in self._read:

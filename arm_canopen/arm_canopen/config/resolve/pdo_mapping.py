@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from ...standard.datatypes import bit_length, DataType, SIGNED_BITS
+from ...standard.datatypes import bit_length, DataType, SIGNED_BITS, UNSIGNED_BITS
 from ...standard.device_profile import is_drive
 from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ...standard.objects import is_signed, PDO_BITS_MAX
@@ -14,22 +12,12 @@ from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
 from ..findings import Findings, Place, RefusedError
 from ..model.pdo_direction import Direction, RPDO
 from ..read.device_keys import MAPPING_KEYS
-from ..read.document import YamlList
+from ..read.document import Item, YamlList
 from ..read.eds import DUMMY_TYPES, Eds
 from .sdo_list import find_entry, read_object
 
 SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}
-UNSIGNED_BY_BITS = {
-    1: DataType.BOOLEAN,
-    8: DataType.UNSIGNED8,
-    16: DataType.UNSIGNED16,
-    24: DataType.UNSIGNED24,
-    32: DataType.UNSIGNED32,
-    40: DataType.UNSIGNED40,
-    48: DataType.UNSIGNED48,
-    56: DataType.UNSIGNED56,
-    64: DataType.UNSIGNED64,
-}
+UNSIGNED_BY_BITS = {1: DataType.BOOLEAN} | {bits: kind for kind, bits in UNSIGNED_BITS.items()}
 """How bits are read whose object the EDS does not describe."""
 
 EDS_REMEDY = 'name its mapping in bus.yml, or correct the EDS'
@@ -108,7 +96,8 @@ def read_mapping(
     direction: Direction, number: int, entries: YamlList, eds: Eds, findings: Findings
 ) -> tuple[MappedObject, ...]:
     """Read the list ``mapping`` that bus.yml gives a PDO; report what cannot be mapped."""
-    mapping = tuple(_mapped_objects(direction, entries, eds, findings))
+    objects = (_mapped_object(direction, item, eds, findings) for item in entries.items)
+    mapping = tuple(mapped for mapped in objects if mapped is not None)
     bits = sum(mapped.bits for mapped in mapping)
     slots = mapping_slots(direction, number, eds.dictionary)
     if bits > PDO_BITS_MAX:
@@ -127,33 +116,21 @@ def read_mapping(
     return mapping
 
 
-def _mapped_objects(
-    direction: Direction, entries: YamlList, eds: Eds, findings: Findings
-) -> Iterator[MappedObject]:
-    for item in entries.items:
-        values = read_object(item, MAPPING_KEYS, findings)
-        if values is not None:
-            address = values['index'], values['subindex']
-            mapped = _checked(direction, address, eds, item.place, findings)
-            if mapped is not None:
-                yield mapped
-
-
-def _checked(
-    direction: Direction, address: tuple[int, int], eds: Eds, place: Place, findings: Findings
+def _mapped_object(
+    direction: Direction, item: Item, eds: Eds, findings: Findings
 ) -> MappedObject | None:
-    try:
-        return _mapped_object(direction, *address, eds)
-    except RefusedError as reason:
-        findings.refuse(place, reason)
+    values = read_object(item, MAPPING_KEYS, findings)
+    if values is None:
         return None
-
-
-def _mapped_object(direction: Direction, index: int, subindex: int, eds: Eds) -> MappedObject:
-    if index in DUMMY_TYPES and subindex == 0:
-        return _dummy(direction, index, eds)
-    entry = find_entry(eds.dictionary, index, subindex)
-    _check_mappable(direction, entry)
+    index, subindex = values['index'], values['subindex']
+    try:
+        if index in DUMMY_TYPES and subindex == 0:
+            return _dummy(direction, index, eds)
+        entry = find_entry(eds.dictionary, index, subindex)
+        _check_mappable(direction, entry)
+    except RefusedError as reason:
+        findings.refuse(item.place, reason)
+        return None
     return MappedObject(index, subindex, entry.data_type)
 
 

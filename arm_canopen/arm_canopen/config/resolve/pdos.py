@@ -106,13 +106,13 @@ class PdoReader:
 
     def _default(self, direction: Direction, number: int) -> PdoDraft:
         """Describe a PDO as its EDS does."""
-        cob_id = self._parameter(direction, number, 1)
-        transmission = self._parameter(direction, number, 2)
+        communication = direction.communication + number - 1
+        mapping = direction.mapping + number - 1
+        entry = self._eds.dictionary.get(communication, 1)
+        cob_id, transmission = (self._eds.dictionary.number(communication, sub) for sub in (1, 2))
         if cob_id is None:
             cob_id = COB_ID_INVALID
         enabled = not cob_id & (COB_ID_INVALID | COB_ID_EXTENDED) and bool(cob_id & CAN_ID_MASK)
-        communication = direction.communication + number - 1
-        mapping = direction.mapping + number - 1
         config = PdoConfig(
             number,
             enabled,
@@ -121,14 +121,10 @@ class PdoReader:
             mapping=eds_mapping(direction, number, self._eds, Findings()),
             configured=self._eds.dictionary.is_configured(communication, mapping),
             fixed_mapping=is_fixed(direction, number, self._eds.dictionary),
-            assumed=self._is_assumed(communication),
+            assumed=entry is not None and entry.literal is not None,
             **self._times(direction, communication),
         )
         return PdoDraft(config, direction, self._name, self._device.place)
-
-    def _is_assumed(self, communication: int) -> bool:
-        entry = self._eds.dictionary.get(communication, 1)
-        return entry is not None and entry.literal is not None
 
     def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
         """Return the times that a DCF gives a PDO; others are left to the device."""
@@ -139,10 +135,6 @@ class PdoReader:
             if entry is not None and entry.configured and isinstance(entry.default, int):
                 found[key.field] = key.to_model(entry.default)
         return found
-
-    def _parameter(self, direction: Direction, number: int, subindex: int) -> int | None:
-        entry = self._eds.dictionary.get(direction.communication + number - 1, subindex)
-        return entry.default if entry is not None and isinstance(entry.default, int) else None
 
     def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
         """Lay the values of bus.yml over a PDO of the EDS."""

@@ -42,67 +42,54 @@ OWN_KEYS: dict[tuple[int, int], str] = {
 """Objects that the master writes, with the key of their value."""
 
 
-class SdoReader:
-    """Reads what a device's section wants written at boot."""
-
-    def __init__(self, dictionary: ObjectDictionary, findings: Findings) -> None:
-        self._dictionary = dictionary
-        self._findings = findings
-
-    def read(self, device: YamlMap) -> tuple[SdoWrite, ...]:
-        """Return the writes of a section (defaults merged) in their order."""
-        writes = [
-            *self._time_cob_id(device),
-            *self._error_behaviour(device),
-            *self._sdo_list(device),
-        ]
-        return tuple(write for write in writes if write is not None)
-
-    def _time_cob_id(self, device: YamlMap) -> Iterator[SdoWrite | None]:
-        item = device.entries.get('time_cob_id')
-        if item is not None:
-            yield self._write((Index.TIME_COB_ID, 0), item, item.place)
-
-    def _error_behaviour(self, device: YamlMap) -> Iterator[SdoWrite | None]:
-        section = block(device, 'error_behavior', self._findings)
-        for name, item in section.entries.items() if section else ():
-            subindex = scalars.key_number(name, U8_MAX)
-            if subindex is None:
-                self._findings.error(
-                    item.place, f'{name!r} is no sub-index', "write '1: 0' and the like"
-                )
-            else:
-                yield self._write((Index.ERROR_BEHAVIOUR, subindex), item, item.place)
-
-    def _sdo_list(self, device: YamlMap) -> Iterator[SdoWrite | None]:
-        entries = listing(device, 'sdo', self._findings)
-        for item in entries.items if entries else ():
-            values = read_object(item, SDO_KEYS, self._findings)
-            if values is not None and isinstance(item, YamlMap):
-                zero = Scalar(item.place, '0', ScalarKind.INTEGER)
-                value = item.entries.get('value', zero)
-                address = values['index'], values['subindex']
-                yield self._write(address, value, item.place, values.get('timeout'))
-
-    def _write(
-        self,
-        address: tuple[int, int],
-        value: Item,
-        place: Place,
-        timeout: float | None = None,
-    ) -> SdoWrite | None:
+def read_writes(
+    device: YamlMap, dictionary: ObjectDictionary, findings: Findings
+) -> tuple[SdoWrite, ...]:
+    """Return what a section (defaults merged) wants written at boot, in the order of writing."""
+    writes = []
+    for address, value, place, timeout in _wanted(device, findings):
         try:
-            entry = _writable_entry(self._dictionary, *address)
+            entry = _writable_entry(dictionary, *address)
         except RefusedError as reason:
-            self._findings.refuse(place, reason)
-            return None
+            findings.refuse(place, reason)
+            continue
         try:
             data = encode_value(entry, value)
             _check_emergency(entry, data)
         except RefusedError as reason:
-            self._findings.refuse(value.place, reason)
-            return None
-        return SdoWrite(*address, data, timeout, SourceLocation(place.line, place.key))
+            findings.refuse(value.place, reason)
+            continue
+        writes.append(SdoWrite(*address, data, timeout, SourceLocation(place.line, place.key)))
+    return tuple(writes)
+
+
+def _wanted(
+    device: YamlMap, findings: Findings
+) -> Iterator[tuple[tuple[int, int], Item, Place, float | None]]:
+    """Yield the address, value, place and time-out of each write."""
+    item = device.entries.get('time_cob_id')
+    if item is not None:
+        yield (Index.TIME_COB_ID, 0), item, item.place, None
+    for subindex, item in error_behaviours(device, findings):
+        yield (Index.ERROR_BEHAVIOUR, subindex), item, item.place, None
+    entries = listing(device, 'sdo', findings)
+    for item in entries.items if entries else ():
+        values = read_object(item, SDO_KEYS, findings)
+        if values is not None and isinstance(item, YamlMap):
+            value = item.entries.get('value', Scalar(item.place, '0', ScalarKind.INTEGER))
+            address = values['index'], values['subindex']
+            yield address, value, item.place, values.get('timeout')
+
+
+def error_behaviours(section: YamlMap, findings: Findings) -> Iterator[tuple[int, Item]]:
+    """Yield what ``error_behavior`` has for 0x1029, by sub-index (CiA 301, 7.5.2.28)."""
+    given = block(section, 'error_behavior', findings)
+    for name, item in given.entries.items() if given else ():
+        subindex = scalars.key_number(name, U8_MAX)
+        if subindex is None:
+            findings.error(item.place, f'{name!r} is no sub-index', "write '1: 0' and the like")
+        else:
+            yield subindex, item
 
 
 def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[str, Any] | None:
@@ -207,10 +194,6 @@ def _value(data_type: DataType, item: Item) -> Value:
         return scalars.integer(item)
     if data_type in (DataType.VISIBLE_STRING, DataType.UNICODE_STRING):
         return scalars.text(item)
-    return _hexadecimal(item)
-
-
-def _hexadecimal(item: Item) -> bytes:
     digits = scalars.text(item)
     try:
         return bytes.fromhex(digits)
