@@ -149,7 +149,9 @@ class AdapterBus(Bus):
             gone = isinstance(error, (can.CanError, OSError))
             if gone and not isinstance(error.__cause__, UnicodeDecodeError):
                 raise
-            self._forget_line()
+            line = getattr(self._bus, '_buffer', None)
+            if isinstance(line, bytearray):  # that is no text; slcan keeps it, and fails for ever
+                line.clear()
             self.counters.malformed += 1
             self._damaged += 1
             if self._damaged < _DAMAGED_MAX:
@@ -161,12 +163,6 @@ class AdapterBus(Bus):
         if message is not None:
             self._damaged = 0
         return message
-
-    def _forget_line(self) -> None:
-        """Drop a line that is no text; python-can's slcan keeps it, and fails for ever."""
-        line = getattr(self._bus, '_buffer', None)
-        if isinstance(line, bytearray):
-            line.clear()
 
     def _accept(self, message: can.Message) -> Frame | None:
         if not message.is_rx:
@@ -239,7 +235,14 @@ def _open_driver(name: str, interface: str, channel: str, bitrate: int | None) -
     try:
         return can.Bus(channel=channel, interface=interface, receive_own_messages=False, **options)
     except (can.CanError, NotImplementedError, OSError, ValueError, TypeError) as error:
-        raise BusError(_not_opened(name, interface, error)) from error
+        message = f'cannot open {name}: {error}; is it plugged in, and is its driver installed?'
+        if interface not in can.VALID_INTERFACES:
+            known = ', '.join(sorted(can.VALID_INTERFACES))
+            message = (
+                f'no bus is called {name!r}: python-can has no interface {interface}; it has '
+                f'{known}'
+            )
+        raise BusError(message) from error
 
 
 def _is_unplugged(error: BaseException | None) -> bool:
@@ -249,12 +252,3 @@ def _is_unplugged(error: BaseException | None) -> bool:
             return True
         error = error.__cause__
     return False
-
-
-def _not_opened(name: str, interface: str, error: Exception) -> str:
-    if interface not in can.VALID_INTERFACES:
-        known = ', '.join(sorted(can.VALID_INTERFACES))
-        return (
-            f'no bus is called {name!r}: python-can has no interface {interface}; it has {known}'
-        )
-    return f'cannot open {name}: {error}; is it plugged in, and is its driver installed?'

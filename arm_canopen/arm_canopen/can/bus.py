@@ -4,14 +4,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from time import monotonic, time
-from types import TracebackType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
 
 from .frame import Frame
 
@@ -29,7 +25,7 @@ class BusCounters:
     malformed: int = 0  # received messages that are no classic CAN frame, and were dropped
 
 
-class Bus(ABC):
+class Bus(AbstractContextManager['Bus']):
     """A CAN bus. Send from any thread; receive from one thread only.
 
     Frames that this object sent are never received by it.
@@ -48,7 +44,7 @@ class Bus(ABC):
             BusError: The interface refuses it (down, transmit queue full).
         """
 
-    def limit_queue(self, frames: int) -> None:  # noqa: B027  # most cannot do it
+    def limit_queue(self, frames: int) -> None:  # most cannot do it
         """Limit the frames that wait for the bus to about so many, where the interface can do it.
 
         Those beyond are refused. What waits while the cable is off leaves when it is on again.
@@ -72,17 +68,7 @@ class Bus(ABC):
     def close(self) -> None:
         """Release the interface; closing twice is no error."""
 
-    def __enter__(self) -> Self:
-        """Use it in a with statement."""
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Close it."""
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -62,23 +62,6 @@ def _with_milliseconds(text: str) -> str:
     return _ASC_TIME.sub(lambda match: f'{match[1]}.{int(match[2]):03d}', text)
 
 
-class CandumpWriter:
-    """Writes lines of candump."""
-
-    def __init__(self, path: Path, channel: str) -> None:
-        self.file = path.open('w', encoding='ascii')
-        self._channel = channel
-
-    def on_message_received(self, message: can.Message) -> None:
-        """Write a classic CAN frame."""
-        frame = from_message(message, message.timestamp)
-        self.file.write(format_line(frame, message.timestamp, self._channel))
-
-    def stop(self) -> None:
-        """Close the file."""
-        self.file.close()
-
-
 class LogWriter:
     """Writes frames to a log.
 
@@ -89,7 +72,8 @@ class LogWriter:
     def __init__(self, path: Path, bus_name: str, wall_offset: float) -> None:
         """Open a file, its format by its suffix; wall_offset is wall minus steady clock in [s]."""
         suffix = path.suffix.lower()
-        self._writer: CandumpWriter | can.ASCWriter | can.BLFWriter
+        self._writer: can.ASCWriter | can.BLFWriter | None = None
+        self._channel, self._offset = log_channel(bus_name), wall_offset
         if suffix == '.asc':
             self._writer = can.ASCWriter(AscFile(path.open('wb'), encoding='utf-8'))
         elif suffix == '.blf':
@@ -97,18 +81,24 @@ class LogWriter:
         elif suffix in {'.pcap', '.cap', '.pcapng'}:
             raise CodecError(f'{path}: no capture is written; name it .log, Wireshark opens those')
         else:
-            self._writer = CandumpWriter(path, log_channel(bus_name))
-        self._offset = wall_offset
+            self._text = path.open('w', encoding='ascii')
 
     def write(self, frames: Iterable[Frame]) -> None:
         """Write frames with their own time stamps."""
         for frame in frames:
-            self._writer.on_message_received(to_message(frame, frame.timestamp + self._offset))
-        self._writer.file.flush()
+            stamp = frame.timestamp + self._offset
+            if self._writer is None:
+                self._text.write(format_line(frame, stamp, self._channel))
+            else:
+                self._writer.on_message_received(to_message(frame, stamp))
+        (self._text if self._writer is None else self._writer.file).flush()
 
     def close(self) -> None:
         """Write what is left, and close the file."""
-        self._writer.stop()
+        if self._writer is None:
+            self._text.close()
+        else:
+            self._writer.stop()
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from functools import lru_cache
 import ipaddress
 import random
 import socket
-from threading import Lock
 
 from ..exceptions import BusError, CodecError
 from .frame import Frame
@@ -46,26 +45,11 @@ class MulticastBus(SocketBus):
         except OSError as error:
             sender.close()
             raise _not_opened(name, error) from error
-        super().__init__(name, receiver)
-        self._sender = sender
+        super().__init__(name, receiver, sender)
         self._own_address = sender.getsockname()
-        self._send_lock = Lock()
 
-    def send(self, frame: Frame) -> None:
-        """Send the frame to all others in the group.
-
-        Raises:
-            BusError: The kernel refuses it.
-            ValueError: It is no classic CAN frame.
-        """
-        datagram = encode(frame)
-        try:
-            with self._send_lock:
-                self._sender.send(datagram)
-                self.counters.sent += 1
-        except OSError as error:
-            self.counters.send_errors += 1
-            raise self._explain(error) from error
+    def _encode(self, frame: Frame) -> bytes:
+        return encode(frame)
 
     def _read_one(self) -> Frame | None:
         datagram, ancillary, _, source = self._receiver.recvmsg(_DATAGRAM_MAX, ANCILLARY_SIZE)
@@ -79,8 +63,6 @@ class MulticastBus(SocketBus):
             return None
 
     def _explain(self, error: OSError) -> BusError:
-        if self._closed:
-            return BusError(f'{self.name} is closed')
         return BusError(f'{self.name}: {error.strerror or error}')
 
     def close(self) -> None:

@@ -99,13 +99,18 @@ class TimestampReader:
 class SocketBus(Bus):
     """A bus that reads datagrams from a socket; subclasses define their content."""
 
-    def __init__(self, name: str, receiver: socket.socket) -> None:
+    def __init__(self, name: str, receiver: socket.socket, sender: socket.socket) -> None:
         super().__init__(name)
-        self._receiver = receiver
+        self._receiver, self._sender = receiver, sender
+        self._send_lock = Lock()
         self._stamps = TimestampReader()
         self._wake_fd = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._wake_lock = Lock()  # a closed descriptor may be somebody else's by the next moment
         self._closed = False
+
+    @abstractmethod
+    def _encode(self, frame: Frame) -> bytes:
+        """Return the datagram of a frame."""
 
     @abstractmethod
     def _read_one(self) -> Frame | None:
@@ -123,6 +128,27 @@ class SocketBus(Bus):
     def fileno(self) -> int:
         """Return the descriptor that is readable when there are frames."""
         return self._receiver.fileno()
+
+    def send(self, frame: Frame) -> None:
+        """Hand the frame to the kernel.
+
+        A full queue is reported and not waited for: a cyclic frame is outdated by its successor,
+        and a request is repeated by who waits for the answer.
+
+        Raises:
+            BusError: The kernel refuses it.
+            ValueError: It is no classic CAN frame.
+        """
+        datagram = self._encode(frame)
+        try:
+            with self._send_lock:
+                self._sender.send(datagram)
+                self.counters.sent += 1
+        except OSError as error:
+            self.counters.send_errors += 1
+            if self._closed:
+                raise BusError(f'{self.name} is closed') from error
+            raise self._explain(error) from error
 
     def receive(self, timeout: float) -> list[Frame]:
         """Wait for frames; see :meth:`Bus.receive`."""

@@ -11,7 +11,6 @@ import errno
 import logging
 import socket
 import struct
-from threading import Lock
 
 from ..exceptions import BusError
 from .frame import checked, EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
@@ -48,8 +47,7 @@ class SocketCanBus(SocketBus):
             BusError: The kernel has no CAN, or the interface is missing or down.
         """
         receiver = _open_socket(name)
-        super().__init__(name, receiver)
-        self._send_lock = Lock()
+        super().__init__(name, receiver, receiver)
         self._queue_limit = 0
         self._gone = False
 
@@ -63,24 +61,8 @@ class SocketCanBus(SocketBus):
             self._reopen()
         return super().receive(timeout)
 
-    def send(self, frame: Frame) -> None:
-        """Put the frame into the interface's transmit queue.
-
-        A full queue is reported and not waited for: a cyclic frame is outdated by its successor,
-        and a request is repeated by who waits for the answer.
-
-        Raises:
-            BusError: The queue is full, or the interface is down or gone.
-            ValueError: It is no classic CAN frame.
-        """
-        packed = pack(frame)
-        try:
-            with self._send_lock:
-                self._receiver.send(packed)
-                self.counters.sent += 1
-        except OSError as error:
-            self.counters.send_errors += 1
-            raise self._explain(error) from error
+    def _encode(self, frame: Frame) -> bytes:
+        return pack(frame)
 
     def limit_queue(self, frames: int) -> None:
         """Let no more frames wait in the transmit queue; see :meth:`Bus.limit_queue`."""
@@ -101,15 +83,13 @@ class SocketCanBus(SocketBus):
         with self._send_lock:
             if self._queue_limit:
                 _limit_sending(receiver, self._queue_limit)
-            old, self._receiver = self._receiver, receiver
+            old, self._receiver, self._sender = self._receiver, receiver, receiver
             self._gone = False
         old.close()
         self._stamps.reopened()
         _log.warning('%s is back', self.name)  # as loud as its going was
 
     def _explain(self, error: OSError) -> BusError:
-        if self._closed:
-            return BusError(f'{self.name} is closed')
         # the socket of an interface that was removed stays deaf when another of its name comes
         self._gone = self._gone or error.errno in {errno.ENODEV, errno.ENXIO}
         return BusError(failure_text(self.name, error))

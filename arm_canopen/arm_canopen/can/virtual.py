@@ -63,7 +63,10 @@ class VirtualBus(Bus):
     def receive(self, timeout: float) -> list[Frame]:
         """Wait for frames; see :meth:`Bus.receive`."""
         with self._arrived:
-            self._arrived.wait_for(self._is_ready, min(max(0.0, timeout), TIMEOUT_MAX))
+            self._arrived.wait_for(
+                lambda: self._queue or self._woken or self._closed,
+                min(max(0.0, timeout), TIMEOUT_MAX),
+            )
             if self._closed:
                 raise BusError(f'{self.name} is closed')
             self._woken = False
@@ -71,9 +74,6 @@ class VirtualBus(Bus):
             self._queue.clear()
         self.counters.received += len(frames)
         return frames
-
-    def _is_ready(self) -> bool:
-        return bool(self._queue) or self._woken or self._closed
 
     def wake(self) -> None:
         """Let a waiting :meth:`receive` return at once."""
@@ -91,9 +91,7 @@ class VirtualBus(Bus):
             self._arrived.notify()
 
 
-_wires: WeakValueDictionary[str, VirtualWire] = (
-    WeakValueDictionary()
-)  # the name is the meeting point
+_wires = WeakValueDictionary[str, VirtualWire]()  # the name is the meeting point
 _wires_lock = Lock()
 
 
