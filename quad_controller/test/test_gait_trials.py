@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
+import io
 import math
 from pathlib import Path
 import re
 import time
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -28,7 +29,6 @@ from quad_controller.policy_check.arenas import (
     SerialArena,
     servo_response,
 )
-from quad_controller.policy_check.chart import Line, line_chart
 from quad_controller.policy_check.conditions import Conditions, SWEEPS
 from quad_controller.policy_check.course import (
     course_for,
@@ -43,8 +43,8 @@ from quad_controller.policy_check.findings import (
     Swept,
     text_of,
     tracking_table,
+    write_csv,
 )
-from quad_controller.policy_check.html_report import html_report
 from quad_controller.policy_check.judgement import against_gait, is_too_late, timing_notes
 from quad_controller.policy_check.main import ExitCode, run
 from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
@@ -298,48 +298,35 @@ def test_a_latency_of_the_servos_counts_by_the_period() -> None:
 # --- the report
 
 
-def elements_of(page: str) -> list[ET.Element]:
-    """Return the elements of a page that is well-formed."""
-    return list(ET.fromstring(page).iter())  # noqa: S314  # it is ours
-
-
-def findings(**changes: Any) -> Findings:
+def findings() -> Findings:
     """What may be found."""
     turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
     pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
-    sweep = SWEEPS[0]
     one = Compared('80', course(replace(FAIR, falls=3)), course())
-    swept = Swept(sweep, (one,) * len(sweep.values))
-    found = Findings('<walk>', 'lite', courses=(pair,), sweeps=(swept,), refusal='a & b')
-    return replace(found, **changes)
+    swept = Swept(SWEEPS[0], (one,) * len(SWEEPS[0].values))
+    walk = Velocity(0.3), Velocity(0.25), 0.2
+    return Findings(courses=[pair], sweeps=[swept], walks=[walk], reasons=['it fell'])
 
 
-def test_the_report_is_whole_and_needs_nothing_else() -> None:
-    """Every element is closed, nothing comes from elsewhere, text is text."""
-    page = html_report(findings(reasons=('it fell',), notes=('slow',)))
-    elements = elements_of(page)
-    assert not any({'src', 'href'} & element.attrib.keys() for element in elements)
-    assert 'http' not in page
-    assert '<walk>' not in page
-    assert 'a &amp; b' in page
-    assert 'does not stand up' in page
-    tags = [element.tag for element in elements]
-    assert tags.count('svg') == 2 + 2
-    assert tags.count('table') == 2 + 1
-    for words in ('falls in a minute', 'cost of transport', 'mass of the trunk'):
-        assert words in page
+def rows_of(text: str) -> list[dict[str, str]]:
+    """Return the rows of a report by their headings."""
+    return list(csv.DictReader(text.splitlines()))
 
 
-def test_a_chart_draws_what_is_finite() -> None:
-    """As SVG that a reader of XML takes; nothing at all without a point."""
-    lines = [Line('a', [(0.0, 1.0), (1.0, math.inf), (2.0, -3.0)]), Line('b', [(1.0, 2.0)])]
-    chart = ET.fromstring(line_chart('t < u', 'x', 'y', lines))  # noqa: S314  # it is ours
-    (drawn, _) = chart.iter('polyline')
-    assert len(drawn.get('points', '').split()) == 2
-    low, high = 0.0, 230.0
-    for circle in chart.iter('circle'):
-        assert low < float(circle.get('cy', 'nan')) < high
-    assert line_chart('t', 'x', 'y', [Line('a', [(0.0, math.nan)])]) == ''
+def test_the_report_has_a_row_for_each_command_of_each_walker() -> None:
+    """With what was tried, commanded and measured; what was not measured is empty."""
+    file = io.StringIO()
+    write_csv(file, findings())
+    walk, forward, turn, *others = rows_of(file.getvalue())
+    assert walk['tried'] == 'walk'
+    assert float(walk['went x [m/s]']) == 0.25
+    assert walk['falls'] == forward['latency p50 [s]'] == ''
+    assert (forward['walker'], forward['axis'], turn['axis']) == ('policy', 'forward', 'turn')
+    assert float(turn['commanded yaw [rad/s]']) == 1.0
+    assert float(forward['cost of transport']) == FAIR.cost_of_transport
+    assert len(others) == 2 + 2 * len(SWEEPS[0].values)
+    assert others[-2]['tried'] == 'mass of the trunk 80 %'
+    assert others[-2]['falls'] == '3'
 
 
 def test_tables_have_a_row_for_each_thing() -> None:
@@ -367,34 +354,33 @@ def make_still(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_policy_that_walks_nowhere_does_not_stand_up_beside_the_gait(
     still: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The report alone means a course in virtual time; it has the contract and the verdict."""
-    report = tmp_path / 'report.html'
+    """The report alone means a course in virtual time."""
+    report = tmp_path / 'report.csv'
     assert run([str(still), '--duration', '1', '--report', str(report)]) == ExitCode.DOES_NOT
     output = capsys.readouterr().out
     assert 'does not stand up:\n' in output
     assert 'too slow' in output
-    page = report.read_text(encoding='utf-8')
-    assert elements_of(page)
-    assert 'It does not stand up.' in page
-    assert 'not stated' in page, 'the gains'
-    assert page.count('<svg') == 3
+    assert 'not stated' in output, 'the gains'
+    rows = rows_of(report.read_text(encoding='utf-8'))
+    assert len(rows) == 2 * len(course_for(None))
+    slow = next(row for row in rows if row['walker'] == 'policy' and row['axis'] == 'forward')
+    assert abs(float(slow['went x [m/s]'])) < 0.05
 
 
-def test_a_policy_that_is_refused_has_a_report(tmp_path: Path) -> None:
-    """With the reason and the table, and nothing that was walked."""
+def test_a_policy_that_is_refused_has_an_empty_report(tmp_path: Path) -> None:
+    """Headings, and nothing that was walked."""
     names = joined(['hip', *ROBOT.names[1:]])
     path = write_policy(tmp_path / 'other.onnx', metadata(joint_names=names))
-    report = tmp_path / 'report.html'
+    report = tmp_path / 'report.csv'
     assert run([str(path), '--report', str(report)]) == ExitCode.DOES_NOT
-    page = report.read_text(encoding='utf-8')
-    assert 'REFUSE' in page
-    assert '<svg' not in page
+    assert report.read_text(encoding='utf-8').startswith('tried,walker,axis,')
+    assert rows_of(report.read_text(encoding='utf-8')) == []
 
 
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        (['--report', '/nowhere/at/all.html'], 'No such file'),
+        (['--report', '/nowhere/at/all.csv'], 'No such file'),
         (['--minutes', '0.1'], 'must be 0.7 to 120'),
         (['--minutes', 'nan'], 'not a finite number'),
         (['--servo', 'soft'], 'invalid choice'),

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class Velocity:
+class Velocity(NamedTuple):
     """A velocity of the body over ground, in the body's level frame.
 
     Attributes:
@@ -29,7 +29,7 @@ class Velocity:
     @property
     def finite(self) -> bool:
         """Whether all parts are numbers."""
-        return math.isfinite(self.x) and math.isfinite(self.y) and math.isfinite(self.yaw)
+        return all(map(math.isfinite, self))
 
     @property
     def at_rest(self) -> bool:
@@ -84,13 +84,7 @@ class VelocityLimits:
         return Velocity(velocity.x, velocity.y, yaw)
 
     def approach(self, velocity: Velocity, target: Velocity, dt: float) -> Velocity:
-        """Return the velocity after a step of acceleration towards a target.
-
-        Args:
-            velocity: The present one.
-            target: The one to reach.
-            dt: Duration of the step in [s].
-        """
+        """Return the velocity after a step of ``dt`` [s] of acceleration towards a target."""
         change_x, change_y = target.x - velocity.x, target.y - velocity.y
         change, most = math.hypot(change_x, change_y), self.acceleration * dt
         yaw = approach(velocity.yaw, target.yaw, self.yaw_acceleration * dt)

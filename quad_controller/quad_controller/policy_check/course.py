@@ -72,6 +72,12 @@ class Arena(Protocol):
         ...
 
 
+def axis_of(command: Velocity) -> str:
+    """Return along which axis a command goes mainly: a key of :data:`AXES`."""
+    shares = [abs(part) / top for part, top in zip(command, TOP, strict=True)]
+    return list(AXES)[shares.index(max(shares))]
+
+
 @dataclass(frozen=True, slots=True)
 class Passage:
     """What came of one command.
@@ -103,11 +109,7 @@ class Passage:
     @property
     def axis(self) -> str:
         """Along which axis it goes mainly: a key of :data:`AXES`."""
-        shares = {
-            name: abs(getattr(self.commanded, each)) / getattr(TOP, each)
-            for name, each in AXES.items()
-        }
-        return max(shares, key=lambda name: shares[name])
+        return axis_of(self.commanded)
 
     @property
     def error(self) -> float:

@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""All that was found of a policy, and its tables for people: on the terminal and in the report."""
+"""All that was found of a policy, as tables for people and as a file of figures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import csv
+from dataclasses import dataclass, field
 import math
+from typing import TextIO
 
 from ..gait.velocity import Velocity
-from ..policy.load import LoadedPolicy
 from .conditions import Sweep
-from .course import AXES, CourseFigures, Passage
+from .course import AXES, axis_of, CourseFigures, Passage
 
 POLICY, GAIT = 'policy', 'gait'
 
@@ -44,36 +44,23 @@ class Swept:
     results: tuple[Compared, ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Findings:
-    """All that was found.
+    """All that was found of a policy.
 
     Attributes:
-        name: Of the policy.
-        setting: Which robot with which servos.
-        loaded: The policy with the table of its contract; None when that refused it.
-        refusal: Why it was refused.
         courses: Courses that policy and gait walked.
         sweeps: What was tried besides.
-        walks: What single walks came to, in words.
+        walks: Single walks: commanded, went in [m/s] and [rad/s], largest tilt in [rad].
         reasons: Why it does not stand up.
         notes: What else is to be known.
     """
 
-    name: str
-    setting: str
-    loaded: LoadedPolicy | None = None
-    refusal: str = ''
-    courses: tuple[Compared, ...] = ()
-    sweeps: tuple[Swept, ...] = ()
-    walks: tuple[str, ...] = ()
-    reasons: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-
-    @property
-    def stands_up(self) -> bool:
-        """Whether the policy may be followed, by all that was tried."""
-        return self.loaded is not None and not self.reasons
+    courses: list[Compared] = field(default_factory=list)
+    sweeps: list[Swept] = field(default_factory=list)
+    walks: list[tuple[Velocity, Velocity, float]] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 Table = list[tuple[str, ...]]
@@ -152,13 +139,45 @@ def text_of(table: Table) -> str:
     )
 
 
-def speeds_of(passages: Sequence[Passage], axis: str) -> list[tuple[float, float]]:
-    """Return what was commanded along an axis, and what went, for those that walked."""
-    return [
-        (_along(axis, each.commanded), _along(axis, each.went))
-        for each in passages
-        if each.axis == axis and each.time
+CSV_COLUMNS = (
+    *('tried', 'walker', 'axis', 'commanded x [m/s]', 'commanded y [m/s]'),
+    *('commanded yaw [rad/s]', 'went x [m/s]', 'went y [m/s]', 'went yaw [rad/s]'),
+    *('tilt [rad]', 'time [s]', 'falls', 'torque saturation', 'speed saturation'),
+    *('smoothness [rad]', 'cost of transport', 'latency p50 [s]', 'latency p99 [s]'),
+    'jitter p99 [s]',
+)
+
+
+def write_csv(file: TextIO, findings: Findings) -> None:
+    """Write a row for each command that policy or gait walked; what was not measured is empty."""
+    writer = csv.writer(file, lineterminator='\n')
+    writer.writerow(CSV_COLUMNS)
+    for commanded, went, tilt in findings.walks:
+        row = 'walk', POLICY, axis_of(commanded), *commanded, *went, tilt
+        writer.writerow([*row, *[''] * (len(CSV_COLUMNS) - len(row))])
+    named = [(each.title, each) for each in findings.courses]
+    named += [
+        (f'{swept.sweep.title} {each.title} {swept.sweep.unit}'.rstrip(), each)
+        for swept in findings.sweeps
+        for each in swept.results
     ]
+    for title, compared in named:
+        for who, course in ((POLICY, compared.policy), (GAIT, compared.gait)):
+            writer.writerows(_csv_row(title, who, each) for each in course.passages)
+
+
+def _csv_row(title: str, who: str, passage: Passage) -> list[str | float]:
+    timing = passage.timing
+    times = () if timing is None else (
+        timing.latency(0.5), timing.latency(0.99), timing.jitter(0.99)
+    )  # fmt: skip
+    figures = (
+        *(passage.tilt, passage.time, passage.falls, passage.torque_saturation),
+        *(passage.speed_saturation, passage.smoothness, passage.cost_of_transport),
+    )
+    values = *passage.commanded, *passage.went, *figures, *times
+    row = [title, who, passage.axis, *('' if math.isnan(value) else value for value in values)]
+    return row + [''] * (len(CSV_COLUMNS) - len(row))
 
 
 def _along(axis: str, velocity: Velocity) -> float:

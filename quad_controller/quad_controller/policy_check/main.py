@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from enum import IntEnum
 import logging
 import math
@@ -35,8 +35,8 @@ from .findings import (
     Swept,
     text_of,
     tracking_table,
+    write_csv,
 )
-from .html_report import html_report
 from .judgement import (
     against_gait,
     astray,
@@ -68,33 +68,10 @@ class ExitCode(IntEnum):
     NOT_TRIED = 3
 
 
-@dataclass(slots=True)
-class _Found:
-    """What comes together while a policy is tried."""
-
-    courses: list[Compared] = field(default_factory=list)
-    sweeps: list[Swept] = field(default_factory=list)
-    walks: list[str] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    def add_course(self, compared: Compared) -> None:
-        """Take and print what policy and gait came to on a course."""
-        self.courses.append(compared)
-        reasons = list(against_gait(compared.policy, compared.gait))
-        self.notes += timing_notes(compared.policy)
-        _print(f'\nbeside the gait, {compared.title}')
-        _print(f'{text_of(tracking_table(compared))}\n\n{text_of(figures_table(compared))}')
-        if reasons and is_too_late(compared.policy, StateParameters().period):
-            late = '; '.join(timing_notes(compared.policy))
-            raise CheckError(f'{late}; try again when the machine has less to do')
-        self.reasons += reasons
-
-
 def run(arguments: Sequence[str]) -> int:
     """Check a policy and print what was found; return an :class:`ExitCode`."""
     options = _parser().parse_args(arguments)
-    found, loaded, refusal = _Found(), None, ''
+    found = Findings()
     try:
         loaded = _load(options)
         _print(str(loaded))
@@ -103,28 +80,17 @@ def run(arguments: Sequence[str]) -> int:
         _print(f'it could not be tried: {error}')
         return ExitCode.NOT_TRIED
     except (QuadControllerError, DescriptionError) as error:
-        refusal = str(error)
-        found.reasons.append(error.reason if isinstance(error, PolicyError) else refusal)
-        _print(refusal)
-    findings = Findings(
-        name=str(options.policy),
-        setting=f'{options.preset}{" with arm" if options.arm else ""}, servos {options.servo}',
-        loaded=loaded,
-        refusal=refusal,
-        courses=tuple(found.courses),
-        sweeps=tuple(found.sweeps),
-        walks=tuple(found.walks),
-        reasons=tuple(found.reasons),
-        notes=tuple(found.notes),
-    )
+        found.reasons.append(error.reason if isinstance(error, PolicyError) else str(error))
+        _print(str(error))
     for note in found.notes:
         _print(f'note: {note}')
     if found.courses or found.sweeps:
-        _print(_verdict(findings))
+        _print(_verdict(options.policy, found.reasons))
     if options.report is not None:
-        options.report.write_text(html_report(findings), encoding='utf-8')
+        with options.report.open('w', encoding='utf-8', newline='') as file:
+            write_csv(file, found)
         _print(f'report: {options.report}')
-    return ExitCode.STANDS_UP if findings.stands_up else ExitCode.DOES_NOT
+    return ExitCode.DOES_NOT if found.reasons else ExitCode.STANDS_UP
 
 
 def main() -> None:
@@ -165,7 +131,7 @@ def _policy_options(options: argparse.Namespace) -> PolicyOptions:
     return replace(plain, servo=servo_response(options.servo))
 
 
-def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: _Found) -> None:
+def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings) -> None:
     """Let a policy walk in all ways that the command line asks for."""
     compare = options.compare or (options.report and not (options.walk or options.chain))
     if not (options.walk or compare or options.chain or options.sweep):
@@ -179,13 +145,12 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: _Found) -
     policy = Candidate(find_policy(options.policy), _policy_options(options), choice)
     both = policy, Candidate(robot=choice)
     if options.walk is not None:
-        backend = PhysicsArena(choice).backend
-        _walk(options, loaded, backend, found)
+        _walk(options, loaded, PhysicsArena(choice).backend, found)
     commands = course_for(loaded.contract.commands)
     if compare:
         duration = options.duration or COMPARE_DURATION
         mine, other = run_trials([Trial(who, commands, duration) for who in both])
-        found.add_course(Compared('in physics with ideal sensors, in virtual time', mine, other))
+        _add_course(found, Compared('in physics with ideal sensors, in virtual time', mine, other))
     if options.sweep:
         trials = [
             Trial(who, SWEEP_COMMANDS, options.duration or SWEEP_DURATION, sweep.conditions(value))
@@ -207,21 +172,38 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: _Found) -
             'line, estimator, clocks'
         )
         mine, other = run_chain(both, commands, duration)
-        found.add_course(Compared(title, mine, other))
+        _add_course(found, Compared(title, mine, other))
+
+
+def _add_course(found: Findings, compared: Compared) -> None:
+    """Take and print what policy and gait came to on a course.
+
+    Raises:
+        CheckError: The policy failed where the machine was too late.
+    """
+    found.courses.append(compared)
+    reasons = list(against_gait(compared.policy, compared.gait))
+    late = list(timing_notes(compared.policy))
+    found.notes += late
+    _print(f'\nbeside the gait, {compared.title}')
+    _print(f'{text_of(tracking_table(compared))}\n\n{text_of(figures_table(compared))}')
+    if reasons and is_too_late(compared.policy, StateParameters().period):
+        raise CheckError(f'{"; ".join(late)}; try again when the machine has less to do')
+    found.reasons += reasons
 
 
 def _walk(
-    options: argparse.Namespace, loaded: LoadedPolicy, backend: Backend, found: _Found
+    options: argparse.Namespace, loaded: LoadedPolicy, backend: Backend, found: Findings
 ) -> None:
     velocity, duration = Velocity(*options.walk), options.duration or WALK_DURATION
     robot = quadruped(robot_urdf(options.preset, arm=options.arm))
     walked = walk(backend, robot, loaded.runner, velocity, duration)
-    found.walks.append(
+    found.walks.append((velocity, walked.velocity, walked.tilt))
+    _print(
         f'walked with {options.servo} servos for {duration:g} s: commanded '
         f'{velocity_text(velocity)}, went {velocity_text(walked.velocity)}, '
         f'tilt at most {math.degrees(walked.tilt):.1f} deg'
     )
-    _print(found.walks[-1])
     if trouble := walked.trouble or '; '.join(astray(walked.velocity, velocity)):
         found.reasons.append(trouble)
         _print(f'it did not go well: {trouble}')
@@ -241,11 +223,10 @@ def _weaker(swept: Swept) -> list[str]:
     )
 
 
-def _verdict(findings: Findings) -> str:
-    if findings.stands_up:
-        return f'\n{findings.name} stands up'
-    reasons = '\n'.join(f'  - {reason}' for reason in findings.reasons)
-    return f'\n{findings.name} does not stand up:\n{reasons}'
+def _verdict(name: str, reasons: Sequence[str]) -> str:
+    if not reasons:
+        return f'\n{name} stands up'
+    return '\n'.join([f'\n{name} does not stand up:', *(f'  - {reason}' for reason in reasons)])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -263,7 +244,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help='contract of the policy: YAML, deploy.yaml, env.yaml, config.yaml, config.json',
     )
-    parser.add_argument('--phase-period', type=_time, default=0.0, help='[s]; 0: that of the file')
+    parser.add_argument(
+        '--phase-period',
+        type=_number('time in [s]', 0.0),
+        default=0.0,
+        help='[s]; 0: that of the file',
+    )
     parser.add_argument(
         '--imu-frame',
         choices=[each.value for each in ImuFrame],
@@ -281,11 +267,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--servo', choices=SERVOS, default=SERVOS[0], help='of the simulation')
     ways = parser.add_argument_group('ways to try it, beside the gait but for the first')
     ways.add_argument(
-        '--walk', nargs=3, type=_finite, metavar=('X', 'Y', 'YAW'), help='[m/s], [m/s], [rad/s]'
+        '--walk',
+        nargs=3,
+        type=_number('velocity'),
+        metavar=('X', 'Y', 'YAW'),
+        help='[m/s], [m/s], [rad/s]',
     )
     ways.add_argument(
         '--duration',
-        type=_duration,
+        type=_number('duration [s]', MIN_DURATION, MAX_DURATION),
         help=f'of --walk ({WALK_DURATION:g}), of each command of --compare '
         f'({COMPARE_DURATION:g}) and of --sweep ({SWEEP_DURATION:g}) [s]',
     )
@@ -298,7 +288,10 @@ def _parser() -> argparse.ArgumentParser:
         help='the same through servos, board, serial line and estimator, in real time',
     )
     ways.add_argument(
-        '--minutes', type=_minutes, default=MINUTES, help='of --chain (default: %(default)g)'
+        '--minutes',
+        type=_number('time [min]', MIN_MINUTES, MAX_MINUTES),
+        default=MINUTES,
+        help='of --chain (default: %(default)g)',
     )
     ways.add_argument(
         '--sweep',
@@ -309,7 +302,7 @@ def _parser() -> argparse.ArgumentParser:
         '--report',
         type=_report_file,
         metavar='FILE',
-        help='write what was found as HTML with plots; alone, it means --compare, too',
+        help='write the figures of all that walked as CSV; alone, it means --compare, too',
     )
     return parser
 
@@ -324,36 +317,19 @@ def _report_file(text: str) -> Path:
         raise argparse.ArgumentTypeError(f'{text}: {error.strerror}') from error
 
 
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text} is not a finite number')
-    return value
+def _number(what: str, low: float = -math.inf, high: float = math.inf) -> Callable[[str], float]:
+    """Return a reader of a number in a range, for argparse."""
+    limits = f'{low:g} or more' if high == math.inf else f'{low:g} to {high:g}'
 
+    def read(text: str) -> float:
+        value = float(text)
+        if not math.isfinite(value):
+            raise argparse.ArgumentTypeError(f'{text} is not a finite number')
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f'{text} is not a {what}: it must be {limits}')
+        return value
 
-def _time(text: str) -> float:
-    value = _finite(text)
-    if value < 0.0:
-        raise argparse.ArgumentTypeError(f'{text} is not a time in [s]: it must be 0 or more')
-    return value
-
-
-def _duration(text: str) -> float:
-    value = _finite(text)
-    if not MIN_DURATION <= value <= MAX_DURATION:
-        raise argparse.ArgumentTypeError(
-            f'{text} is not a duration [s]: it must be {MIN_DURATION:g} to {MAX_DURATION:g}'
-        )
-    return value
-
-
-def _minutes(text: str) -> float:
-    value = _finite(text)
-    if not MIN_MINUTES <= value <= MAX_MINUTES:
-        raise argparse.ArgumentTypeError(
-            f'{text} is not a time [min]: it must be {MIN_MINUTES:g} to {MAX_MINUTES:g}'
-        )
-    return value
+    return read
 
 
 def _print(text: str) -> None:
