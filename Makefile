@@ -15,8 +15,7 @@ NO_VIEW ?=
 export NO_VIEW
 # compilers at the same time; without it one a core, and one for each GiB of memory at most
 JOBS ?=
-# of the training: what is learned, and for how long
-TASK ?= walk
+# of the training
 MINUTES ?= 30
 # what pytest gets besides: make test ARGS='-k sync -x'; one after another: ARGS=-n0
 ARGS ?=
@@ -42,7 +41,7 @@ help:
 	@echo 'make docs       build the manual as a site in build/site, to be read without a network'
 	@echo 'make bench      print the figures'
 	@echo 'make findings   see whether the surprises of other software are as we found them (installs each anew; minutes)'
-	@echo 'make train      train a policy, check it and compare it: that walks, or gets up after a fall (TASK=walk or getup, MINUTES=30, SEED=1)'
+	@echo 'make train      train a policy that walks, check it and compare it (MINUTES=30, SEED=1)'
 	@echo 'make chaos      disturb arm and quadruped in motion at random (DURATION=600, SEED=1)'
 	@echo 'make soak       run both for long, and check that nothing is lost or grows (DURATION=3600)'
 	@echo 'make setup      make the environment only'
@@ -92,7 +91,7 @@ findings:
 
 train: system
 	@$(BUILD) --with training quad_controller
-	@$(IN_ENVIRONMENT) nice python quad_controller/training/train.py --task $(TASK) --minutes $(MINUTES) \
+	@$(IN_ENVIRONMENT) nice python quad_controller/training/train.py --minutes $(MINUTES) \
 	  $(if $(SEED),--seed $(SEED))
 
 chaos: system

@@ -11,8 +11,6 @@ from setuptools import find_packages, setup
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
-    # the simulated robot's, under the name that it is printed by; quad_sim has it
-    'fake_xgo = quad_hardware.aliases:fake_xgo',
     'calibrate = quad_hardware.calibration.main:main',
     'doctor = quad_hardware.doctor.main:main',
     'hardware_node = quad_hardware.nodes.hardware_node:main',

@@ -25,7 +25,7 @@ from process_supervisor import (
 )
 from process_supervisor.arguments import add_network, add_timeout, apply_network
 from quad_description import movable_joints, PRESETS, robot_urdf
-from quad_hardware.protocol import protocol_argument, V1, V2
+from quad_hardware.protocol import V1, V2
 
 from .exceptions import ArgumentError
 from .stack import quad_processes, Stack
@@ -98,7 +98,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--protocol',
-        type=protocol_argument,
         choices=PROTOCOLS,
         default=AUTO,
         help='protocol of the serial line; auto detects it on a real robot, and is v2 with a '

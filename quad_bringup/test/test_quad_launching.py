@@ -68,9 +68,3 @@ def test_commands_that_the_tools_of_quad_hardware_print_are_accepted() -> None:
     command = re.compile(r'ros2 run quad_bringup bringup((?: --?\S+ [/\w]+)*)')
     commands = [match[1].split() for text in printed for match in command.finditer(text)]
     assert [parse(words)[0].port for words in commands] == ['/dev/ttyAMA0', '/dev/x', '/dev/x']
-
-
-def test_former_names_of_protocols_are_accepted(capsys: pytest.CaptureFixture[str]) -> None:
-    """With a warning that has the present one."""
-    assert parse(['--simulate', '--protocol', 'old'])[0].protocol == 'v1'
-    assert "protocol 'old' is called 'v1' now" in capsys.readouterr().err

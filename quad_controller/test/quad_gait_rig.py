@@ -36,7 +36,6 @@ class StillPolicy:
     name = 'still'
     needs_linear_velocity = False
     needs_foot_contacts = False
-    memory = 0.0  # [s]
     digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:

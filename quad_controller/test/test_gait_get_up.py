@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
-from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES, POLICY_DEADLINE
+from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES
 from quad_controller.states.get_up_poses import RECOVERIES, Stage
 from quad_controller.states.lying import Lying, lying_on
 from quad_controller.states.modes import State
@@ -23,7 +22,7 @@ from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
 from quad_description.rotations import about, from_roll_pitch_yaw, Quaternion, rotate
 from quad_gait_policies import STAND
-from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
+from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, tilted, UPRIGHT
 
 QUARTER = math.pi / 2
 ATTITUDES: dict[Lying, Quaternion] = {
@@ -346,49 +345,6 @@ def test_there_is_a_way_down(mode: str) -> None:
     rig.run(1.2)
     rig.ask(mode)
     rig.until(State(mode))
-
-
-def policy_rig(policy: StillPolicy) -> Rig:
-    """Return a robot whose get_up follows a policy, on its back."""
-    controller = Controller(ROBOT, GaitParameters(), SWINGING, get_up_policy=policy)
-    return fallen(Lying.BACK, controller)
-
-
-def test_a_policy_may_bring_it_to_its_feet() -> None:
-    """From the back, too; upright and at rest, the gait takes over and it stands."""
-    policy = StillPolicy(FOLDED)
-    rig = policy_rig(policy)
-    rig.ask('get_up')
-    rig.run(4.0, Velocity(0.2))
-    assert rig.is_in(State.GET_UP)
-    assert policy.resets == 1
-    assert rig.positions == pytest.approx(FOLDED)
-    assert all(velocity.at_rest for velocity in policy.velocities)
-    rig.imu = UPRIGHT
-    rig.until(State.STAND)
-    rig.run(3.0)
-    assert rig.controller.status.title == 'stand'
-    assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
-
-
-def test_a_policy_that_does_not_succeed_is_followed_by_poses() -> None:
-    """After its deadline, or when it fails; both are said."""
-    policy = StillPolicy(FOLDED)
-    rig = policy_rig(policy)
-    rig.ask('get_up')
-    assert f'({Lying.BACK.value} {MAX_TRIES})' in gives_up(rig)
-    given_up = f'the policy still is given up: it lies on its back after {POLICY_DEADLINE:g} s'
-    assert any(given_up in line for line in rig.log)
-    policy.targets = None
-    rig.ask('get_up')
-    while not any('given up: broken on purpose' in line for line in rig.log):
-        rig.step()
-        assert rig.is_in(State.GET_UP), rig.log[-6:]
-    rig.imu = lying(Lying.LEFT)
-    rig.run(3.0)
-    assert any('lies on its left side; turns over' in line for line in rig.log)
-    rig.imu = UPRIGHT
-    rig.until(State.STAND)
 
 
 sides = st.sampled_from([*Lying, None])

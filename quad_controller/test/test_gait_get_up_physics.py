@@ -4,22 +4,47 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 from bench_get_up import fallen, get_up, MODEL, Outcome, URDF
+import mujoco
 import numpy as np
+import numpy.typing as npt
 import pytest
-from search_get_up import clearance
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.states.controller import Controller
 from quad_controller.states.get_up_poses import RECOVERIES, Stage
 from quad_controller.states.lying import Lying
 from quad_controller.states.parameters import StateParameters
+from quad_description import LEGS
 from quad_sim.physics import Robot
 
 pytestmark = pytest.mark.slow
 
 DROPS = 5  # on each side
 MIN_STOOD = 0.8  # of the robots; the bench has what it is with more of them
+
+
+FAR = 0.05  # [m] a greater distance is of no interest
+
+
+def clearance(model: mujoco.MjModel, pose: npt.NDArray[np.float64]) -> float:
+    """Return the least distance of links of different legs, and of shanks from the trunk [m]."""
+    data, points = mujoco.MjData(model), np.empty(6)
+    for name, position in zip(MODEL.names, pose, strict=True):
+        data.joint(name).qpos = position
+    mujoco.mj_kinematics(model, data)
+    links = {
+        f'{leg}_{part}': int(model.body(f'{leg}_{part}').geomadr[0])
+        for leg in LEGS
+        for part in ('thigh', 'calf', 'foot')
+    }
+    trunk = int(model.body('base_link').geomadr[0])
+    pairs = [
+        (links[one], links[other]) for one, other in combinations(links, 2) if one[:2] != other[:2]
+    ] + [(geom, trunk) for link, geom in links.items() if not link.endswith('thigh')]
+    return min(float(mujoco.mj_geomDistance(model, data, *pair, FAR, points)) for pair in pairs)
 
 
 def outcomes(side: Lying) -> list[Outcome]:

@@ -170,27 +170,6 @@ def test_a_robot_that_fell_gets_up(robot: Robot) -> None:
     assert 'allow that by the parameter get_up_swings' in refused.message
 
 
-def test_a_policy_gets_it_up_where_a_parameter_names_one(
-    isolation: Isolation, tmp_path: Path
-) -> None:
-    """From its back; it is loaded and checked at the start as every policy is."""
-    path = write_policy(tmp_path / 'rise.onnx', metadata())
-    words = [*NODE, '-p', f'get_up_policy:={path}']
-    with ExitStack() as stack:
-        process = stack.enter_context(RunningProcess(words, isolation.env))
-        client = stack.enter_context(RosClient(isolation.domain_id))
-        process.wait_for('policy rise.onnx')
-        process.wait_for('waiting for joint_states')
-        robot = Robot(client, process)
-        robot.orientation = (1.0, 0.0, 0.0, 0.0)
-        robot.begin()
-        robot.until_ready()
-        assert robot.mode('get_up').success
-        robot.until_logged('follows the policy rise.onnx')
-        robot.orientation = IDENTITY
-        robot.until_state('stand')
-
-
 def test_from_lying_to_walking_and_back(robot: Robot) -> None:
     """Services and topics lead through the modes; commands do not jump."""
     answer = robot.mode('walk')
@@ -292,15 +271,12 @@ def test_another_policy_is_loaded_while_it_walks(robot: Robot, tmp_path: Path) -
     assert 'not in the robot: fl_hip' in robot.load(str(renamed)).message
     answer = robot.load('trot_imitation')
     assert answer.success, answer.message
-    assert 'from the gait to trot_imitation.onnx' in answer.message
-    refused = robot.load('gait')
-    assert not refused.success
-    assert 'trot_imitation.onnx: ' in refused.message
-    robot.until_state('policy')  # the blend is over
+    assert 'stands, then follows trot_imitation.onnx; sha256 ' in answer.message
+    robot.until_state('policy')
+    robot.client.spin_until(lambda: bool(reports), 20.0, 'the report')
     assert answer.message.rpartition(' ')[2] in reports[-1].data
-    assert robot.mode('walk').success
+    assert robot.load('gait').message == 'stands, then follows the gait'
     robot.until_state('walk')
-    assert robot.load('').success
     robot.client.spin_until(lambda: 'no policy' in reports[-1].data, 20.0, 'the report')
     assert 'no policy is loaded' in robot.mode('policy').message
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from importlib.util import find_spec
 import io
 import math
@@ -15,30 +14,17 @@ import sys
 
 from comparison import best, compare, table
 from contract_env import (
-    get_up_contract,
-    get_up_env,
     TaughtEnv,
     walking_contract,
     walking_env,
     walking_teacher,
 )
 from gait_teacher import GaitTeacher
-from get_up_teacher import GetUpTeacher
-from get_up_trials import (
-    drop_table,
-    Dropped,
-    DropTrial,
-    is_better,
-    is_gentle,
-    RANDOMIZATION,
-    try_drops,
-)
 import numpy as np
 from policy_export import export
 from progress import Progress
 import pytest
-from tasks import TASKS
-from trained_contract import contract_of, metadata_of, PERIOD, Values
+from trained_contract import contract_of, metadata_of, PERIOD
 
 from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
@@ -48,22 +34,18 @@ from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.declared import read_declared
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
-from quad_controller.policy.load import load_policy
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy.shipped import find_policy
 from quad_controller.policy_check.conditions import Conditions
 from quad_controller.policy_check.course import CourseFigures, Passage
-from quad_controller.policy_check.trial import Candidate, shipped_walkers
+from quad_controller.policy_check.trial import Candidate
 from quad_controller.states.controller import Controller
-from quad_controller.states.lying import Lying, lying_on
 from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
-from quad_description.rotations import down_in_body
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, random_layers
-from quad_sim.env import GetUpEnv, NO_RANDOMIZATION, WalkingEnv
+from quad_sim.env import NO_RANDOMIZATION, WalkingEnv
 
 pytestmark = pytest.mark.slow
 TRAINING = Path(__file__).parents[1] / 'training'
@@ -75,7 +57,6 @@ class Lesson:
     name = 'teacher'
     needs_linear_velocity = False
     needs_foot_contacts = False
-    memory = 0.0  # [s]
     digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:
@@ -157,31 +138,6 @@ def test_what_is_trained_is_what_runs() -> None:
         runner.advance(PERIOD)
 
 
-def test_what_gets_up_is_what_runs() -> None:
-    """With what a policy may see where no velocity is commanded, from where it lies."""
-    env = get_up_env(NO_RANDOMIZATION)
-    seen, _ = env.reset(seed=3)
-    start = env.simulation.robot.joint_targets
-    assert np.abs(start - env.simulation.stand).max() > 0.3
-    runner = PolicyRunner(
-        'run', FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
-    )
-    runner.reset(tuple(start.tolist()))
-    random = np.random.default_rng(2)
-    for _ in range(20):
-        action = random.normal(0.0, 0.3, 12).astype(np.float32)
-        assert env.inputs.velocity.at_rest
-        assert seen == pytest.approx(runner.observe(env.inputs)[0], abs=1e-5)
-        targets = runner.act(action, PERIOD)
-        before = env.simulation.robot.joint_targets
-        seen, _, terminated, *_ = env.step(action)
-        sent = env.simulation.robot.joint_targets
-        assert np.abs(sent - before).max() < 0.31  # what the limiter of speeds lets pass
-        slow = np.abs(np.array(targets) - before) < 0.19
-        assert sent[slow] == pytest.approx(np.array(targets)[slow], abs=1e-6)
-        assert not terminated
-
-
 def test_the_teacher_beside_the_robot_walks_it() -> None:
     """Its answers, as actions of the contract, go as commanded and do not fall."""
     practice = walking_env(NO_RANDOMIZATION)
@@ -194,64 +150,10 @@ def test_the_teacher_beside_the_robot_walks_it() -> None:
     assert robot.base_pose.position[0] == pytest.approx(0.2 * 4.0, abs=0.1)
 
 
-def test_the_teacher_of_getting_up_gets_up_from_sides_nose_and_tail() -> None:
-    """Not from its back: there it goes to the stand pose, and lies."""
-    practice = get_up_env(NO_RANDOMIZATION)
-    teacher = GetUpTeacher(MODEL)
-    env = TaughtEnv(practice, lambda inputs, _: teacher.targets(inputs.imu.down))
-    robot, stood = practice.simulation.robot, Counter[bool]()
-    for seed in range(60):
-        seen, _ = env.reset(seed=seed)
-        lying = lying_on(down_in_body(robot.base_pose.orientation))
-        if lying in {Lying.BELLY, Lying.BACK}:
-            continue
-        for _ in range(200):
-            seen, *_ = env.step(seen[-12:])
-        stood[robot.base_pose.tilt < 0.3] += 1
-    assert stood.total() > 8
-    assert stood[True] > 0.8 * stood.total()
-
-
-def test_the_teacher_of_getting_up_does_the_same_on_either_side() -> None:
-    """Left for right, as the robot is its own mirror image."""
-    teacher = GetUpTeacher(MODEL)
-    for x, y, z in ((0.0, 1.0, 0.0), (0.1, 0.8, -0.6), (0.9, 0.2, 0.2), (-0.9, 0.2, 0.2)):
-        left, right = teacher.targets((x, y, z)), teacher.targets((x, -y, z))
-        for one, other in ((0, 1), (2, 3)):
-            for mine, mirrored in zip(
-                MODEL.leg_indices[one], MODEL.leg_indices[other], strict=True
-            ):
-                assert left[mine] == right[mirrored]
-                assert left[mirrored] == right[mine]
-    assert teacher.targets((0.1, 0.1, 0.98)) == teacher.stand
-
-
-def test_the_shipped_policy_gets_up_from_its_side() -> None:
-    """Where who goes to the stand pose straight stays on it; and it is none of those that walk."""
-    env = GetUpEnv(randomization=RANDOMIZATION)
-    seeds = []
-    for seed in range(100):
-        env.reset(seed=seed)
-        down = down_in_body(env.robot.base_pose.orientation)
-        if lying_on(down) in {Lying.LEFT, Lying.RIGHT}:
-            seeds.append(seed)
-    chosen = tuple(seeds[:5])
-    assert len(chosen) == 5
-    shipped = DropTrial(find_policy('getup_imitation'), chosen).run()
-    assert sum(each.stands for each in shipped) >= 4
-    assert is_gentle(shipped)
-    assert not any(each.stands for each in DropTrial(None, chosen[:2]).run())
-    assert set(shipped_walkers()) == {'trot_imitation', 'trot_ppo'}
-
-
-@pytest.mark.parametrize(
-    ('values', 'width'),
-    [(walking_contract(MODEL, 'a test'), 47), (get_up_contract(MODEL, 'a test'), 42)],
-)
-def test_the_contract_is_in_the_file(tmp_path: Path, values: Values, width: int) -> None:
+def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
     """What is written fits the robot in all that it says, and nothing is left open."""
-    path = tmp_path / 'random.onnx'
-    export(random_layers((width, 8, 12), np.random.default_rng(0)), path, metadata_of(values))
+    path, values = tmp_path / 'random.onnx', walking_contract(MODEL, 'a test')
+    export(random_layers((47, 8, 12), np.random.default_rng(0)), path, metadata_of(values))
     network = OnnxNetwork(path)
     document = read_metadata(network.metadata)
     contract = build_contract(document)
@@ -289,30 +191,6 @@ def figures(off: float, falls: int) -> CourseFigures:
     """What somebody came to in two minutes."""
     passage = Passage(Velocity(0.2), Velocity(0.2 + off), 120.0, falls, 0.1, 0.0, 0.0, 0.0, 1.0)
     return CourseFigures((passage,))
-
-
-def test_drops_are_the_same_for_all_and_are_grouped_by_how_a_robot_lay() -> None:
-    """Who goes to the stand pose straight stands after some, and the table says after which."""
-    tried = try_drops({'one': None, 'other': None}, 6)
-    assert tried['one'] == tried['other']
-    assert any(each.stands for each in tried['one'])
-    upright = [each for each in tried['one'] if each.lying is Lying.BELLY]
-    counts = drop_table(tried).splitlines()[1].split()
-    assert counts[1] == str(len(upright))
-    assert counts[-1] == '6'
-
-
-def test_who_stands_more_often_must_do_so_by_more_than_chance() -> None:
-    """Of the same drops; and servos that are at their limits for long are not gentle."""
-
-    def drops(stood: int, saturated: float = 0.0) -> list[Dropped]:
-        return [Dropped(Lying.LEFT, number < stood, saturated, 0.0) for number in range(20)]
-
-    assert is_better(drops(15), drops(8))
-    assert not is_better(drops(10), drops(8))
-    assert not is_better(drops(8), drops(15))
-    assert is_gentle(drops(1, 0.05))
-    assert not is_gentle(drops(1, 0.2))
 
 
 def test_progress_is_seen_in_a_log_and_in_a_terminal() -> None:
@@ -368,30 +246,6 @@ def test_a_short_training_ends_with_a_policy_that_is_checked(tmp_path: Path) -> 
     assert list((tmp_path / 'curves').glob('events.out.tfevents.*'))
     figures = (tmp_path / 'figures.txt').read_text()
     assert {'gait', 'imitation', 'practice'} <= {line.split()[0] for line in figures.splitlines()}
-
-
-@pytest.mark.skipif(
-    find_spec('skrl') is None, reason='`make train` installs what a training needs'
-)
-def test_a_short_training_of_getting_up_is_judged(tmp_path: Path) -> None:
-    """By the same drops for all; what it writes can be loaded, and a standing robot stands."""
-    command = [
-        *(sys.executable, str(TRAINING / 'train.py'), '--task', 'getup', '--minutes', '0.3'),
-        *('--environments', '8', '--rounds', '2', '--drops', '8', '--output', str(tmp_path)),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    figures = (tmp_path / 'figures.txt').read_text()
-    assert figures in done.stdout, done.stdout + done.stderr
-    assert {'drops', 'to', 'imitation', 'practice'} <= {
-        line.split()[0] for line in figures.splitlines()
-    }
-    assert (done.returncode == 0) == ('accepted' in done.stdout.splitlines()[-1])
-    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
-    loaded = load_policy(tmp_path / 'getup.onnx', MODEL, stand, PolicyOptions(), PERIOD)
-    assert loaded.contract == contract_of(get_up_contract(MODEL, loaded.contract.kind))
-    assert loaded.contract.kind in {TASKS['getup'].kind, TASKS['getup'].teaching.kind}
-    assert 'observation_statistics' in loaded.metadata
-    assert list((tmp_path / 'curves').glob('events.out.tfevents.*'))
 
 
 def test_without_the_library_it_is_said_what_installs_it(tmp_path: Path) -> None:

@@ -1,17 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Policies and the gait on the same ways in physics, with figures that can be compared."""
+"""Policies and the gait on the same ways in physics: figures, and which policy is better."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
+import shutil
 
+from progress import Progress
+
+from quad_controller.gait.parameters import LOW_AND_WIDE
 from quad_controller.gait.velocity import Velocity
 from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
-from quad_controller.policy_check.course import CourseFigures
-from quad_controller.policy_check.trial import Candidate, run_trials, Trial
+from quad_controller.policy_check.course import CourseFigures, Passage
+from quad_controller.policy_check.main import run as check_policy
+from quad_controller.policy_check.trial import Candidate, run_trials, shipped_walkers, Trial
 
 CHANCE = 0.25  # share of the falls that may be chance
+
+GAIT, LOW_GAIT = 'gait', 'gait, low and wide'
+CHECKED_WALKS = ((0.2, 0.0, 0.3), (0.0, 0.1, 0.0), (-0.15, 0.0, -0.5))
+"""Velocities with which check_policy lets it walk: x, y in [m/s], yaw in [rad/s]."""
 
 COMMANDS = (
     Velocity(0.1),
@@ -43,14 +53,9 @@ def compare(
     grounds: Mapping[str, Conditions] = GROUNDS,
     commands: tuple[Velocity, ...] = COMMANDS,
 ) -> dict[str, dict[str, CourseFigures]]:
-    """Let walkers walk, on all cores.
+    """Let walkers walk each way for some time [s] on all grounds, on all cores.
 
-    Args:
-        walkers: Who walks, by their names.
-        duration: Of each way in [s].
-        seeds: Of the pushes; the same for all. Where nobody is pushed, the first one is enough.
-        grounds: What differs, by a title for people.
-        commands: One after the other.
+    Where nobody is pushed, the first of the seeds is enough.
 
     Raises:
         CheckError: The physics failed.
@@ -63,21 +68,15 @@ def compare(
         for seed in (seeds if ground.push else seeds[:1])
     }
     found = dict(zip(ways, run_trials(list(ways.values())), strict=True))
-    return {name: {title: _all(found, name, title) for title in grounds} for name in walkers}
-
-
-def _all(
-    found: Mapping[tuple[str, str, int], CourseFigures], name: str, title: str
-) -> CourseFigures:
-    """Return what came of a walker on a ground with all seeds."""
-    return CourseFigures(
-        tuple(
-            passage
-            for (who, where, _), figures in found.items()
-            if (who, where) == (name, title)
-            for passage in figures.passages
-        )
-    )
+    passages: dict[str, dict[str, tuple[Passage, ...]]] = {
+        name: dict.fromkeys(grounds, ()) for name in walkers
+    }
+    for (name, title, _), figures in found.items():
+        passages[name][title] += figures.passages
+    return {
+        name: {title: CourseFigures(each) for title, each in ways.items()}
+        for name, ways in passages.items()
+    }
 
 
 def best(compared: Results) -> str:
@@ -105,3 +104,34 @@ def table(compared: Results) -> str:
             for title, each in grounds.items()
         ]
     return '\n'.join(lines)
+
+
+def judge(folder: Path, policies: Mapping[str, Path], progress: Progress, duration: float) -> int:
+    """Compare what was made with the gait and what is shipped; check the better one.
+
+    Args:
+        folder: For figures, and the policy that is better.
+        policies: Files of those that were made, by their names.
+        progress: Says what is found.
+        duration: Of each way in [s].
+
+    Returns:
+        What check_policy returns.
+    """
+    progress.say('comparing ...')
+    walkers = {GAIT: Candidate(), LOW_GAIT: Candidate(gait=LOW_AND_WIDE)}
+    walkers |= shipped_walkers() | {name: Candidate(path) for name, path in policies.items()}
+    compared = compare(walkers, duration)
+    text = table(compared)
+    (folder / 'figures.txt').write_text(f'{text}\n', encoding='utf-8')
+    chosen = best({name: compared[name] for name in policies})
+    path = folder / 'walk.onnx'
+    shutil.copyfile(policies[chosen], path)
+    code = 0
+    for walk in CHECKED_WALKS:
+        progress.say(f'check_policy {path} --walk {" ".join(map(str, walk))}')
+        code = max(code, check_policy([str(path), '--walk', *map(str, walk)]))
+    progress.say(text)
+    verdict = 'accepted' if code == 0 else 'refused'
+    progress.say(f'{path} is what {chosen} made; check_policy: {verdict}')
+    return code

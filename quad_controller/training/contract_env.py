@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The environments as a policy with a contract sees them: what is trained is what runs later.
+"""The environment as a policy with a contract sees it: what is trained is what runs later.
 
 Observations and targets are made by the runner that the controller has, and the targets pass its
 limiter of speeds.
@@ -13,20 +13,18 @@ import math
 from typing import Any
 
 from gait_teacher import GaitTeacher
-from get_up_teacher import GetUpTeacher
 import gymnasium
 from gymnasium import spaces
 import numpy as np
 from trained_contract import (
     contract_of,
-    get_up_values,
     PERIOD,
     Values,
     walking_values,
 )
 
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.contract.model import PolicyContract, RecurrentState, Source
 from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.network import Floats, Port
@@ -34,7 +32,7 @@ from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.limiter import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets
-from quad_sim.env import Drop, GetUpEnv, Randomization, WalkingEnv
+from quad_sim.env import Randomization, WalkingEnv
 
 
 def teacher_of(robot: Quadruped) -> GaitTeacher:
@@ -42,31 +40,10 @@ def teacher_of(robot: Quadruped) -> GaitTeacher:
     return GaitTeacher(robot, LOW_AND_WIDE)
 
 
-DROP = Drop(tilt=(0.5, 2.2))
-"""Fewer robots on their backs than after any drop, and more on their sides."""
-SHORTEST, LONGEST = 3.0, 8.0
-"""Times of an episode of getting up in [s]; different ones keep environments out of step."""
-
-
 def walking_contract(robot: Quadruped, kind: str = '') -> Values:
-    """Return the contract of a policy that walks.
-
-    Args:
-        robot: The robot.
-        kind: How the policy is made, for people.
-    """
+    """Return the contract of a policy that walks; ``kind`` says how it is made, for people."""
     teacher = teacher_of(robot)
     return walking_values(robot.names, teacher.stand, teacher.schedule.period, kind)
-
-
-def get_up_contract(robot: Quadruped, kind: str = '') -> Values:
-    """Return the contract of a policy that gets up.
-
-    Args:
-        robot: The robot.
-        kind: How the policy is made, for people.
-    """
-    return get_up_values(robot.names, GetUpTeacher(robot).stand, kind)
 
 
 class NoNetwork:
@@ -94,28 +71,17 @@ class NoNetwork:
 
 
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
-    """A task with the observations and actions of a contract.
+    """Walking with the observations and actions of a contract.
 
     Attributes:
         contract: The contract.
         simulation: The environment below.
     """
 
-    def __init__(
-        self,
-        env: WalkingEnv | GetUpEnv,
-        values: Values,
-        commanded: Callable[[], Velocity] = lambda: REST,
-    ) -> None:
-        """Wrap an environment.
-
-        Args:
-            env: The environment.
-            values: The contract.
-            commanded: Returns the velocity that is commanded now.
-        """
+    def __init__(self, env: WalkingEnv, values: Values) -> None:
+        """Wrap an environment by the values of a contract."""
         super().__init__(env)
-        self.simulation, self._commanded = env, commanded
+        self.simulation = env
         robot = quadruped(robot_urdf())
         self.contract = contract_of(values)
         self._runner = PolicyRunner(
@@ -155,7 +121,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         joints, imu = self.simulation.state.joints, self.simulation.state.imu
         if joints is None or imu is None:
             raise ValueError('a robot in physics measures joints and attitude')
-        return PolicyInputs(joints, imu, self._commanded())
+        return PolicyInputs(joints, imu, Velocity(*self.simulation.command))
 
     def _observe(self) -> Floats:
         seen: Floats = self._runner.observe(self.inputs)[0].copy()
@@ -206,25 +172,10 @@ def walking_teacher(contract: PolicyContract) -> Teacher:
 def walking_env(randomization: Randomization) -> ContractEnv:
     """Make an environment to practise walking in."""
     env = WalkingEnv(randomization=randomization, period=PERIOD)
-    values = walking_contract(quadruped(robot_urdf()))
-    return ContractEnv(env, values, lambda: Velocity(*env.command))
+    return ContractEnv(env, walking_contract(quadruped(robot_urdf())))
 
 
 def taught_walking_env(randomization: Randomization) -> TaughtEnv:
     """Make an environment in which the teacher of walking is beside the robot."""
     env = walking_env(randomization)
     return TaughtEnv(env, walking_teacher(env.contract))
-
-
-def get_up_env(randomization: Randomization) -> ContractEnv:
-    """Make an environment to practise getting up in."""
-    env = GetUpEnv(
-        randomization=randomization, drop=DROP, period=PERIOD, shortest=SHORTEST, duration=LONGEST
-    )
-    return ContractEnv(env, get_up_contract(quadruped(robot_urdf())))
-
-
-def taught_get_up_env(randomization: Randomization) -> TaughtEnv:
-    """Make an environment in which the teacher of getting up is beside the robot."""
-    teacher = GetUpTeacher(quadruped(robot_urdf()))
-    return TaughtEnv(get_up_env(randomization), lambda inputs, _: teacher.targets(inputs.imu.down))

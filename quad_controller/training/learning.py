@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 
+from contract_env import taught_walking_env, walking_contract, walking_env
 from imitation import Imitation, Lessons
 import jax
 from networks import Actor, answer, explore, layers_of, Normaliser
@@ -16,97 +17,83 @@ from policy_export import export
 from practice import Practice, Practised
 from progress import Progress
 import skrl
-from tasks import Task
 from trained_contract import metadata_of, PERIOD, Values
 
 from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_description import quadruped, robot_urdf
-from quad_sim.env import ProcessVectorEnv
+from quad_sim.env import ProcessVectorEnv, Randomization
 
 OBSERVED_STEPS = 500  # of each environment, for the ranges that replay_policy compares with
 IMITATION, PRACTICE = 'imitation', 'practice'
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """How a training is done.
-
-    Attributes:
-        seed: Of everything that is drawn.
-        environments: How many at once.
-        lessons: Of the imitation.
-    """
-
-    seed: int = 1
-    environments: int = 64
-    lessons: Lessons = field(default_factory=Lessons)
+RANDOMIZATION = Randomization(
+    friction=(0.35, 1.3), trunk_mass=(0.9, 1.3), kick=(-1.6, 1.6), kick_interval=2.0
+)
+"""What differs in the end; half of it while the teacher is imitated."""
+DEVIATION = 0.18  # of the actions that are tried when practice begins: 0.05 rad
+IMITATED = 'imitation of the trot (DAgger in quad_sim/Walk-v0, firm servos)'
+PRACTISED = 'imitation of the trot, then PPO (quad_sim/Walk-v0, firm servos)'
 
 
-def train(folder: Path, task: Task, plan: Plan, progress: Progress) -> dict[str, Path]:
+def train(
+    folder: Path, progress: Progress, *, seed: int, environments: int, rounds: int
+) -> dict[str, Path]:
     """Train until the time is over.
 
     Args:
         folder: For policies and curves.
-        task: What is learned.
-        plan: How.
         progress: Has the time, and shows how it goes.
+        seed: Of everything that is drawn.
+        environments: How many at once.
+        rounds: Of the imitation.
 
     Returns:
         The policies: what was imitated, and what practice made of it.
     """
     skrl.config.jax.device = 'cpu'
-    skrl.config.jax.key = plan.seed
+    skrl.config.jax.key = seed
     skrl.logger.setLevel('WARNING')
     robot = quadruped(robot_urdf())
-    example = task.make(task.randomization)
+    example = walking_env(RANDOMIZATION)
     actor = Actor(example.observation_space, example.action_space)
     actor.init_state_dict(role='policy')
-    scale = example.contract.action.scale[0]
     policies = {name: folder / f'{name}.onnx' for name in (IMITATION, PRACTICE)}
-    normaliser, observed = _imitate(actor, task, plan, progress, scale)
-    imitated = task.contract(robot, task.teaching.kind)
-    _write(policies[IMITATION], actor, normaliser, observed, imitated)
-    envs = ProcessVectorEnv(partial(task.make, task.randomization), plan.environments)
-    try:
-        explore(actor, task.deviation)
-        practice = Practice(
-            actor,
-            normaliser,
-            envs,
-            task.randomization,
-            period=PERIOD,
-            curves=folder / 'curves',
-            seed=plan.seed,
-        )
-        before = progress.share
-        for each in practice.until(lambda: (progress.share - before) / max(1.0 - before, 1e-6)):
-            progress.figures(_text_of(each, task))
-        practice.close()
-        observed = _observe(actor, normaliser, envs, plan.seed)
-    finally:
-        envs.close()
-    practised = task.contract(robot, task.kind)
-    _write(policies[PRACTICE], actor, normaliser, observed, practised)
-    return policies
-
-
-def _imitate(
-    actor: Actor, task: Task, plan: Plan, progress: Progress, scale: float
-) -> tuple[Normaliser, ObservationStatistics]:
-    ranges = task.randomization.scaled(0.5)
-    envs = ProcessVectorEnv(partial(task.teaching.make, ranges), plan.environments)
-    try:
-        imitation = Imitation(actor, envs, plan.lessons, scale=scale, seed=plan.seed)
+    with closing(
+        ProcessVectorEnv(partial(taught_walking_env, RANDOMIZATION.scaled(0.5)), environments)
+    ) as envs:
+        scale = example.contract.action.scale[0]
+        imitation = Imitation(actor, envs, Lessons(rounds), scale=scale, seed=seed)
         for each in imitation.rounds():
             progress.say(
                 f'imitation, round {each.number}: {each.examples} examples, '
                 f'error {each.error:.4f} rad, {each.falls} falls, {progress.minutes:.1f} min'
             )
-        if imitation.normaliser is None:
-            raise ValueError('an imitation has one round at least')
-        return imitation.normaliser, imitation.observed
-    finally:
-        envs.close()
+    normaliser = imitation.normaliser
+    if normaliser is None:
+        raise ValueError('an imitation has one round at least')
+    imitated = walking_contract(robot, IMITATED)
+    _write(policies[IMITATION], actor, normaliser, imitation.observed, imitated)
+    with closing(ProcessVectorEnv(partial(walking_env, RANDOMIZATION), environments)) as envs:
+        explore(actor, DEVIATION)
+        practice = Practice(
+            actor,
+            normaliser,
+            envs,
+            RANDOMIZATION,
+            period=PERIOD,
+            curves=folder / 'curves',
+            seed=seed,
+        )
+        before = progress.share
+        for practised in practice.until(
+            lambda: (progress.share - before) / max(1.0 - before, 1e-6)
+        ):
+            progress.figures(_text_of(practised))
+        practice.close()
+        observed = _observe(actor, normaliser, envs, seed)
+    _write(policies[PRACTICE], actor, normaliser, observed, walking_contract(robot, PRACTISED))
+    return policies
 
 
 def _observe(
@@ -122,11 +109,10 @@ def _observe(
     return ObservationStatistics.of(np.concatenate(rows))
 
 
-def _text_of(practised: Practised, task: Task) -> str:
+def _text_of(practised: Practised) -> str:
     """Return what came of an update, for people."""
-    falls = f'falls {practised.falls:5.2f}/min  ' if task.ends_with_a_fall else ''
     return (
-        f'reward {practised.reward:5.2f}/s  {falls}'
+        f'reward {practised.reward:5.2f}/s  falls {practised.falls:5.2f}/min  '
         f'{practised.steps / 1e6:.2f} M steps  randomized {practised.share:.0%}'
     )
 

@@ -32,20 +32,16 @@ class Practised:
     """What an update came of.
 
     Attributes:
-        updates: How many there were.
         steps: Of all environments so far.
         reward: Mean reward of a second.
         falls: In a minute of an environment.
         share: Of the randomization.
-        terms: What each term of the reward was worth, mean of the episodes that ended.
     """
 
-    updates: int
     steps: int
     reward: float
     falls: float
     share: float
-    terms: Mapping[str, float]
 
 
 class Practice:
@@ -92,11 +88,7 @@ class Practice:
         self._observed, _ = self._wrapped.reset()
 
     def until(self, progress: Callable[[], float]) -> Iterator[Practised]:
-        """Practise until progress is 1; yield what came of each update.
-
-        Args:
-            progress: Share of the time that has passed.
-        """
+        """Practise until progress is 1; yield what came of each update."""
         while (passed := progress()) < 1.0:
             self._vary(passed)
             before = self._actor.state_dict
@@ -147,27 +139,19 @@ class Practice:
             agent.post_interaction(**step)
         time = ROLLOUT * self._period
         practised = Practised(
-            updates=self._updates,
             steps=self._step * self._envs.num_envs,
             reward=rewards / time,
             falls=60.0 * falls / (time * self._envs.num_envs),
             share=self._share,
-            terms={
-                name: float(np.mean([terms[name] for terms in ended]))
-                for name in (ended[0] if ended else ())
-            },
         )
-        self._track(practised)
-        return practised
-
-    def _track(self, practised: Practised) -> None:
-        """Have it in the curves with what skrl tracks."""
         track = self._agent.track_data
         track('Practice / Reward of a second', practised.reward)
         track('Practice / Falls in a minute', practised.falls)
         track('Practice / Share of the randomization', practised.share)
-        for name, worth in practised.terms.items():
+        for name in ended[0] if ended else ():
+            worth = float(np.mean([terms[name] for terms in ended]))
             track(f'Reward of an episode / {name}', worth)
+        return practised
 
 
 def _terms(infos: Mapping[str, Any]) -> list[Mapping[str, float]]:

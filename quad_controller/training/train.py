@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Trains a policy for a task, checks it and compares it: ``make train`` calls it.
+"""Trains a policy that walks, checks it and compares it: ``make train`` calls it.
 
 It begins with an imitation of a teacher and goes on with PPO. The folder that it prints has the
 policy with its contract, the curves for TensorBoard, and the figures.
@@ -17,8 +17,8 @@ import signal
 import sys
 import time
 
+from comparison import judge
 from progress import Progress
-from tasks import Effort, TASKS
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -27,22 +27,23 @@ def run(arguments: Sequence[str]) -> int:
     # a library for a graphics card would only warn that there is none
     os.environ.setdefault('JAX_PLATFORMS', 'cpu')
     try:
-        from imitation import Lessons
-        from learning import Plan, train
+        from learning import train
     except ImportError as error:
         sys.stdout.write(f'{error}; `make train` installs what a training needs\n')
         return 1
-    folder: Path = options.output or Path('trained') / time.strftime(
-        f'{options.task}-%Y%m%d-%H%M%S'
-    )
+    folder: Path = options.output or Path('trained') / time.strftime('walk-%Y%m%d-%H%M%S')
     folder.mkdir(parents=True, exist_ok=True)
     progress = Progress(options.minutes, time.monotonic)
-    progress.say(f'{options.task}, {options.minutes:g} min, seed {options.seed}: {folder}')
+    progress.say(f'{options.minutes:g} min, seed {options.seed}: {folder}')
     progress.say(f'curves: tensorboard --logdir {folder}')
-    task = TASKS[options.task]
-    plan = Plan(options.seed, options.environments, Lessons(options.rounds))
-    policies = train(folder, task, plan, progress)
-    return task.judge(folder, policies, progress, Effort(options.way, options.drops))
+    policies = train(
+        folder,
+        progress,
+        seed=options.seed,
+        environments=options.environments,
+        rounds=options.rounds,
+    )
+    return judge(folder, policies, progress, options.way)
 
 
 def main() -> None:
@@ -59,16 +60,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         description='Train a policy, check it and compare it.', allow_abbrev=False
     )
-    described = '; '.join(f'{name} {task.description}' for name, task in TASKS.items())
-    parser.add_argument('--task', choices=TASKS, default='walk', help=described)
     parser.add_argument('--minutes', type=_positive, default=30.0, help='how long it learns')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--environments', type=int, default=64, help='at once')
     parser.add_argument('--rounds', type=int, default=6, help='of the imitation')
-    parser.add_argument(
-        '--way', type=_positive, default=15.0, help='of the comparison of walk [s]'
-    )
-    parser.add_argument('--drops', type=int, default=300, help='of the comparison of getup')
+    parser.add_argument('--way', type=_positive, default=15.0, help='of the comparison [s]')
     parser.add_argument('--output', type=Path, metavar='FOLDER', help='for policy and curves')
     return parser
 

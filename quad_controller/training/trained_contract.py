@@ -15,21 +15,10 @@ from quad_sim import ServoModel
 from quad_sim.env import CommandRanges
 
 PERIOD = 0.02  # [s]
-SCALE = 0.25  # [rad] for an action of one, of a policy that walks
-GET_UP_SCALE = 0.5  # [rad] of one that gets up: from all of a joint's range
+SCALE = 0.25  # [rad] for an action of one
 PHASE_THRESHOLD = 0.02  # slower commands have no phase
 
 Values = dict[str, Any]
-
-_TURNING: Values = {
-    'angular_velocity': {'source': 'angular_velocity', 'frame': 'base'},
-    'gravity': {'source': 'gravity'},
-}
-_JOINTS: Values = {
-    'positions': {'source': 'joint_positions', 'relative': True},
-    'velocities': {'source': 'joint_velocities'},
-    'last_action': {'source': 'last_action'},
-}
 
 
 def walking_values(
@@ -43,42 +32,29 @@ def walking_values(
         phase_period: Of the gait [s].
         kind: How the policy is made, for people.
     """
-    ranges = CommandRanges()
-    phase = {
-        'source': 'phase',
-        'phase_period': round(phase_period, 3),
-        'phase_threshold': PHASE_THRESHOLD,
+    ranges, servo = CommandRanges(), ServoModel.FIRM.parameters
+    terms = {
+        'angular_velocity': {'source': 'angular_velocity', 'frame': 'base'},
+        'gravity': {'source': 'gravity'},
+        'command': {'source': 'command'},
+        'phase': {
+            'source': 'phase',
+            'phase_period': round(phase_period, 3),
+            'phase_threshold': PHASE_THRESHOLD,
+        },
+        'positions': {'source': 'joint_positions', 'relative': True},
+        'velocities': {'source': 'joint_velocities'},
+        'last_action': {'source': 'last_action'},
     }
-    terms = {**_TURNING, 'command': {'source': 'command'}, 'phase': phase, **_JOINTS}
-    return {
-        **_values(names, stand, kind, terms, SCALE),
-        'commands': {'x': list(ranges.x), 'y': list(ranges.y), 'yaw': list(ranges.yaw)},
-    }
-
-
-def get_up_values(names: tuple[str, ...], stand: Targets, kind: str) -> Values:
-    """Return the contract of a policy that gets up: nothing is commanded, it has no phase.
-
-    Args:
-        names: Of the joints.
-        stand: Their positions when the robot stands [rad].
-        kind: How the policy is made, for people.
-    """
-    return _values(names, stand, kind, {**_TURNING, **_JOINTS}, GET_UP_SCALE)
-
-
-def _values(
-    names: tuple[str, ...], stand: Targets, kind: str, terms: Values, scale: float
-) -> Values:
-    servo = ServoModel.FIRM.parameters
     return {
         'kind': kind,
         'joints': list(names),
         'default_positions': [round(position, 3) + 0.0 for position in stand],
         'period': PERIOD,
         'observation': {'terms': terms},
-        'action': {'scale': scale},
+        'action': {'scale': SCALE},
         'gains': {'stiffness': servo.stiffness, 'damping': servo.velocity_gain},
+        'commands': {'x': list(ranges.x), 'y': list(ranges.y), 'yaw': list(ranges.yaw)},
     }
 
 

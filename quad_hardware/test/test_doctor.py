@@ -166,7 +166,7 @@ def test_a_port_in_use_is_left_alone(isolation: Isolation, tmp_path: Path) -> No
 def test_a_simulated_robot_is_asked(isolation: Isolation, tmp_path: Path) -> None:
     """It keeps its own port open, which is no reason to leave it alone."""
     link = tmp_path / 'xgo'
-    command = [executable('quad_hardware', 'fake_xgo'), '--no-ros', '--link', str(link)]
+    command = [executable('quad_sim', 'fake_xgo'), '--no-ros', '--link', str(link)]
     with RunningProcess(command, isolation.env) as robot:
         robot.wait_for(f'at {link}')
         assert list(port_users(os.path.realpath(link))) == []

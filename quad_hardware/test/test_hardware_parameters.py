@@ -14,7 +14,6 @@ from rclpy.node import Node
 from node_runner import ParameterError
 from quad_hardware.exceptions import HardwareError
 from quad_hardware.nodes.parameters import declare_parameters, NodeSettings
-from quad_hardware.protocol import Protocol, V1, V2
 
 WRONG = {
     'protokoll:=old': "did you mean 'protocol'",
@@ -46,9 +45,3 @@ def test_a_wrong_parameter_is_refused(argument: str, reason: str) -> None:
     """The message names the value and the remedy."""
     with pytest.raises((ParameterError, HardwareError), match=re.escape(reason)):
         read(argument)
-
-
-@pytest.mark.parametrize(('former', 'protocol'), [('old', V1), ('new', V2)])
-def test_former_names_of_the_protocols_are_accepted(former: str, protocol: Protocol) -> None:
-    """Parameter files of users go on working."""
-    assert read(f'protocol:={former}').robot.link.protocols == (protocol,)

@@ -11,7 +11,7 @@ import math
 from pathlib import Path
 
 from quad_description import Pose, pose_positions, PRESETS, robot_urdf
-from quad_hardware.protocol import Model, Protocol, protocol_argument, V1, V2, warn_of_former_name
+from quad_hardware.protocol import Model, Protocol, V1, V2
 
 from .board.board import Board
 from .board.servos import Mount
@@ -54,27 +54,13 @@ def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add('--link', type=Path, default=DEFAULT_LINK, help='path of the port (%(default)s)')
-    add(
-        '--protocol',
-        type=protocol_argument,
-        choices=_PROTOCOLS,
-        default='both',
-        help='what the board speaks',
-    )
-    add('--baud', type=int, default=0, help='speed to assume [bit/s]; 0: what the host sets')
+    add('--protocol', choices=_PROTOCOLS, default='both', help='what the board speaks')
     add(
         '--v1-baud',
         type=int,
         default=V1.baud,
         metavar='BAUD',
         help='speed of protocol v1 (%(default)s); programs have switched boards to others',
-    )
-    add(
-        '--old-baud',
-        type=_former_v1_baud,
-        dest='v1_baud',
-        default=argparse.SUPPRESS,
-        help=argparse.SUPPRESS,
     )
     add('--preset', choices=PRESETS, default='lite', help='the robot (%(default)s)')
     add('--arm', action='store_true', help='with the arm on its back')
@@ -121,7 +107,7 @@ def build(options: argparse.Namespace) -> Simulation:
     if len(options.firmware) > 10 or not options.firmware.isascii():
         raise SetupError(f'--firmware {options.firmware!r}: give up to 10 ASCII characters')
     faults = FaultPlan(parse_fault(text) for text in options.fault)
-    speeds = _choose_speeds(options.protocol, options.v1_baud, options.baud)
+    speeds = _choose_speeds(options.protocol, options.v1_baud)
     try:
         urdf = robot_urdf(options.preset, options.arm, options.trunk_mass)
     except ValueError as error:
@@ -140,7 +126,6 @@ def build(options: argparse.Namespace) -> Simulation:
         board,
         speeds,
         faults=faults,
-        fixed_baud=options.baud,
         command_gap=options.command_gap,
         seed=options.seed,
     )
@@ -189,26 +174,14 @@ def parse_mount(text: str) -> tuple[int, Mount]:
         raise SetupError(f'--mount {text!r}: give ID=SIGN,DEGREES, such as 12=-1,4.5') from None
 
 
-def _former_v1_baud(text: str) -> int:
-    """Read the value of ``--v1-baud``, given under its former name."""
-    warn_of_former_name('--old-baud', '--v1-baud')
-    return int(text)
-
-
-def _choose_speeds(name: str, v1_baud: int, baud: int) -> Mapping[int, Protocol]:
+def _choose_speeds(name: str, v1_baud: int) -> Mapping[int, Protocol]:
+    """Return what the board speaks, by baud rate [bit/s]."""
     protocols = _PROTOCOLS[name]
-    own = {protocol: protocol.baud for protocol in protocols}
     if v1_baud <= 0:
         raise SetupError(f'--v1-baud {v1_baud}: give bits a second, e.g. {V1.baud}')
-    if V1 in protocols:
-        own[V1] = v1_baud
-    if len(set(own.values())) < len(own):
+    if V2 in protocols and V1 in protocols and v1_baud == V2.baud:
         raise SetupError(f'--v1-baud {v1_baud} is that of v2; add --protocol v1')
-    speeds = {speed: protocol for protocol, speed in own.items()}
-    if baud and baud not in speeds:
-        known = ', '.join(f'{speed} ({protocol.name})' for speed, protocol in speeds.items())
-        raise SetupError(f'--baud {baud}: the board speaks at {known}')
-    return speeds
+    return {v1_baud if protocol is V1 else protocol.baud: protocol for protocol in protocols}
 
 
 def _make_plant(options: argparse.Namespace, urdf: str) -> Plant:

@@ -20,9 +20,6 @@ from quad_description import robot_urdf
 from quad_sim import SetupError, SimulationError, TargetError
 from quad_sim.env import (
     CommandRanges,
-    Drop,
-    GetUpEnv,
-    GetUpWeights,
     ID,
     NO_RANDOMIZATION,
     Observation,
@@ -303,14 +300,6 @@ def test_ranges_from_which_nothing_can_be_drawn_are_refused(wrong: dict[str, obj
         lambda: CommandRanges(rest=2.0),
         lambda: RewardWeights(tracking=math.nan),
         lambda: RewardWeights(turning_width=0.0),
-        lambda: GetUpWeights(upright=math.inf),
-        lambda: GetUpWeights(height_width=-0.1),
-        lambda: Drop(tilt=(0.0, 4.0)),
-        lambda: Drop(height=(-0.1, 0.1)),
-        lambda: Drop(joints=1.5),
-        lambda: Drop(limp=-0.1),
-        lambda: Drop(time=math.inf),
-        lambda: GetUpEnv(duration=2.0, shortest=3.0),
         lambda: WalkingEnv(duration=0.01),
     ],
 )

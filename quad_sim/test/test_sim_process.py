@@ -18,7 +18,6 @@ from typing import Any
 
 from isolation import Isolation
 from nav_msgs.msg import Odometry
-from processes import executable
 import pytest
 from ros_client import RosClient
 from sim_serial import Listener, TEST_TIMEOUT
@@ -27,7 +26,6 @@ from std_srvs.srv import Trigger
 from quad_hardware.protocol import Code, decode_feedback, Frame, Kind
 from quad_msgs.srv import InjectFault, Push
 from quad_sim.fake_xgo import run, split_ros_arguments
-from quad_sim.options import parse_arguments
 
 pytestmark = pytest.mark.slow
 
@@ -110,23 +108,6 @@ def test_it_reports_that_it_is_ready(ros: bool, tmp_path: Path) -> None:
             assert supervisor.recv(100) == b'READY=1'
 
 
-def test_former_names_are_accepted(capsys: pytest.CaptureFixture[str]) -> None:
-    """With a warning that has the present one."""
-    options = parse_arguments(['--protocol', 'old', '--old-baud', '2000000'])
-    assert (options.protocol, options.v1_baud) == ('v1', 2_000_000)
-    warnings = capsys.readouterr().err
-    assert "'old' is called 'v1' now" in warnings
-    assert '--old-baud is called --v1-baud now' in warnings
-
-
-@pytest.mark.parametrize('package', ['quad_sim', 'quad_hardware'])
-def test_it_is_found_under_both_names(package: str) -> None:
-    """``ros2 run quad_hardware fake_xgo`` is the name that others have printed."""
-    command = [executable(package, 'fake_xgo'), '--help']
-    result = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert 'A simulated XGO' in result.stdout
-
-
 @pytest.mark.parametrize(
     ('arguments', 'message'),
     [
@@ -136,7 +117,6 @@ def test_it_is_found_under_both_names(package: str) -> None:
         (['--friction', '0'], 'friction 0'),
         (['--battery', '120'], 'give 0 to 100'),
         (['--firmware', 'much too long'], 'up to 10 ASCII'),
-        (['--protocol', 'v1', '--baud', '2000000'], '115200 \\(v1\\)'),
         (['--fault', 'fire'], 'there are drop'),
         (['--trunk-mass', '0'], 'trunk_mass'),
         (['--command-gap', '-1'], 'command-gap'),

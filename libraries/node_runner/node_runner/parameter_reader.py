@@ -82,8 +82,6 @@ class ParameterReader:
         default: str,
         values: Mapping[str, Choice],
         meaning: str,
-        *,
-        former: Mapping[str, str] | None = None,
     ) -> Choice:
         """Declare and read one of several names; return what it stands for.
 
@@ -92,42 +90,11 @@ class ParameterReader:
             default: One of the names.
             values: What the names stand for.
             meaning: Of the parameter.
-            former: Present names by former ones, which are accepted with a warning.
         """
         name, value = self._given(name, default)
         chosen = parameter_values.text(name, value)
-        if former and chosen in former:
-            self._warn(f"{name} '{chosen}' is called '{former[chosen]}' now")
-            chosen = former[chosen]
         self._declare(name, chosen, f'{meaning} ({", ".join(values)})')
         return parameter_values.choice(name, chosen, values)
-
-    def accept_former_name(self, former: str, name: str) -> None:
-        """Take what is given under a former name for a parameter, with a warning; then declare it.
-
-        That holds for what a client sets later, too: a parameter that cannot be changed then is
-        refused under its present name.
-
-        Args:
-            former: Name that the parameter had.
-            name: Name that it has.
-        """
-        former, name = self._prefix + former, self._prefix + name
-
-        def renamed(parameter: Parameter) -> Parameter:
-            self._warn(f'parameter {former} is called {name} now')
-            return Parameter(name, value=parameter.value)
-
-        overrides = self._node._parameter_overrides  # noqa: SLF001  # no public way to read it
-        given = overrides.pop(former, None)
-        if given is not None:
-            overrides.setdefault(name, renamed(given))
-        self._node.add_pre_set_parameters_callback(
-            lambda parameters: [renamed(p) if p.name == former else p for p in parameters]
-        )
-
-    def _warn(self, text: str) -> None:
-        self._node.get_logger().warning(f'{text}; the former name is accepted for a while')
 
     def _given(self, name: str, default: object) -> tuple[str, object]:
         """Return the full name, and the value from outside or else the default."""

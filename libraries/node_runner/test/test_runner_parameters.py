@@ -148,35 +148,3 @@ def test_other_names_are_left_alone(name: str) -> None:
             refuse_similar([name], ['speed'])
     else:
         refuse_similar([name], ['rate', 'speed'])
-
-
-def test_former_names_count_and_are_warned_of(isolation: Isolation) -> None:
-    """Of a parameter, and of a choice; what is given under the present name comes first."""
-    gaits = {'trot': 1, 'crawl': 2}
-    with node_with(isolation, 'pace:=1.5', 'gait:=walk') as node:
-        read = ParameterReader(node)
-        read.accept_former_name('pace', 'speed')
-        assert read.number('speed', 1.0, SPAN, 'a ratio') == 1.5
-        assert read.choice('gait', 'trot', gaits, 'a gait', former={'walk': 'crawl'}) == 2
-        assert node.get_parameter('gait').value == 'crawl'
-        assert refuse_misspelt(node) == []
-    with node_with(isolation, 'pace:=1.5', 'speed:=0.7') as node:
-        read = ParameterReader(node)
-        read.accept_former_name('pace', 'speed')
-        assert read.number('speed', 1.0, SPAN, 'a ratio') == 0.7
-
-
-@pytest.mark.parametrize(('fixed', 'reason'), [(False, ''), (True, 'read-only')])
-def test_a_former_name_counts_for_what_is_set_later(
-    isolation: Isolation, capfd: pytest.CaptureFixture[str], *, fixed: bool, reason: str
-) -> None:
-    """As at the start; a parameter that is fixed is refused under its present name."""
-    with node_with(isolation) as node:
-        read = ParameterReader(node, 'gait.', fixed=fixed)
-        read.accept_former_name('pace', 'speed')
-        read.number('speed', 1.0, SPAN, 'a ratio')
-        result = node.set_parameters_atomically([Parameter('gait.pace', value=0.7)])
-        assert (result.successful, reason in result.reason) == (not fixed, True)
-        assert node.get_parameter('gait.speed').value == (1.0 if fixed else 0.7)
-        assert not node.has_parameter('gait.pace')
-        assert 'parameter gait.pace is called gait.speed now' in capfd.readouterr().err

@@ -11,7 +11,6 @@ from pathlib import Path
 import sys
 import threading
 import time
-from weakref import WeakKeyDictionary
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
@@ -44,11 +43,10 @@ from quad_description import DescriptionError
 from quad_msgs.msg import FootContacts, JointCommand
 from quad_msgs.srv import LoadPolicy, SetMode
 
-from ..exceptions import ParameterError, PolicyError, QuadControllerError
+from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
-from ..policy.options import PolicyOptions
 from ..policy.shipped import find_policy
 from ..recording.recorder import Recorder
 from ..recording.run import PolicyRun
@@ -56,7 +54,7 @@ from ..recording.step import StepTiming
 from ..states.controller import Controller
 from ..states.faults import Fault
 from ..states.modes import Answer
-from ..states.policy_switch import NO_POLICY
+from ..states.policy_motion import NO_POLICY
 from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
@@ -97,17 +95,13 @@ class ControllerNode(Node):
         self._settings = settings = declare_parameters(self)
         self._report = self.create_publisher(String, '~/policy', LATCHED)
         self._loader = ThreadPoolExecutor(1, thread_name_prefix='load_policy')
-        self._texts: WeakKeyDictionary[Policy, str] = WeakKeyDictionary()
         policy, refusal = self._load_first_policy()
-        get_up_policy = self._load_get_up_policy()
-        self._reported = policy
         self._controller = Controller(
             settings.robot,
             settings.gait,
             settings.states,
             policy=policy,
             policy_refusal=refusal,
-            get_up_policy=get_up_policy,
             dry_run=settings.policy_dry_run,
             first_gait=settings.first_gait,
             arm_pose=settings.arm_pose,
@@ -123,9 +117,8 @@ class ControllerNode(Node):
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
         self._joints = JointReader(settings.robot)
-        policies = [each for each in (policy, get_up_policy) if each is not None]
         self._filter = CommandFilter(
-            settings.robot, others_move=bool(settings.arm_pose or policies)
+            settings.robot, others_move=bool(settings.arm_pose or policy is not None)
         )
         self._targets = self._controller.fallback_positions
         self._unreported: tuple[str, ...] = ()
@@ -141,8 +134,8 @@ class ControllerNode(Node):
         self._subscribe()
         self._seen: set[str] = set()  # topics of estimates
         self._arrived = {topic: threading.Event() for topic in ESTIMATES}
-        for each in policies:
-            self._see_estimates(_estimates_for(each))
+        if policy is not None:
+            self._see_estimates(_estimates_for(policy))
         self.create_service(SetMode, 'set_mode', self._set_mode)
         self.create_service(Trigger, 'stop', self._take_stop)
         self.create_service(Trigger, '~/clear_fault', self._clear_fault)
@@ -209,29 +202,8 @@ class ControllerNode(Node):
         self._report.publish(String(data=str(loaded)))
         return loaded.runner, ''
 
-    def _load_get_up_policy(self) -> Policy | None:
-        """Return what the mode get_up follows; None for its poses, and when it does not fit."""
-        if not self._settings.get_up_policy:
-            return None
-        if self._settings.policy_dry_run:
-            raise ParameterError(
-                'get_up_policy and policy_dry_run: what gets up is followed, and not only asked; '
-                'leave one of them out'
-            )
-        given = self._settings.policy_options  # the others are for a policy that walks
-        options = PolicyOptions(gravity_source=given.gravity_source, servo=given.servo)
-        try:
-            return self._load_policy(self._settings.get_up_policy, options).runner
-        except PolicyError:
-            self.get_logger().error('get_up_policy was refused; get_up uses its own poses')
-            return None
-
-    def _load_policy(self, text: str, options: PolicyOptions | None = None) -> LoadedPolicy:
-        """Load and check a policy; the log has the table in either case.
-
-        Args:
-            text: Its path, or its name if it is shipped.
-            options: How it shall be run; None for the parameters.
+    def _load_policy(self, text: str) -> LoadedPolicy:
+        """Load and check a policy by its path or name; the log has the table in either case.
 
         Raises:
             PolicyError: It does not fit.
@@ -243,14 +215,13 @@ class ControllerNode(Node):
                 find_policy(text),
                 settings.robot,
                 gait.stand_targets,
-                options or settings.policy_options,
+                settings.policy_options,
                 settings.states.period,
             )
         except PolicyError as error:
             self.get_logger().error(str(error))
             raise
         self.get_logger().info(str(loaded))
-        self._texts[loaded.runner] = str(loaded)
         return loaded
 
     def _wait_for_estimates(self, policy: Policy) -> None:
@@ -360,21 +331,24 @@ class ControllerNode(Node):
     def _follow(self, path: str) -> Answer:
         if path in GAIT_WORDS:
             with self._loop.lock:
-                return self._controller.follow(None)
+                answer = self._controller.follow(None)
+            if answer.accepted:
+                self._report.publish(String(data=NO_POLICY))
+            return answer
         with self._loop.lock:
-            if refusal := self._controller.handover_refusal():
+            if refusal := self._controller.swap_refusal():
                 return Answer(False, refusal)
         try:
             loaded = self._load_policy(path)
         except PolicyError as error:
             return Answer(False, f'the policy was refused: {error.reason}')
-        policy = loaded.runner
-        self._wait_for_estimates(policy)
+        self._wait_for_estimates(loaded.runner)
         with self._loop.lock:
-            answer = self._controller.follow(policy)
+            answer = self._controller.follow(loaded.runner)
+            self._filter.others_move |= answer.accepted
         if not answer.accepted:
-            del self._texts[policy]
             return answer
+        self._report.publish(String(data=str(loaded)))
         return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
 
     def _take_stop(
@@ -422,7 +396,6 @@ class ControllerNode(Node):
     def _publish(self, output: Output) -> None:
         logger = self.get_logger()
         if output.targets is not None:
-            self._report_policy()
             now = self.get_clock().now().nanoseconds
             self._targets = output.targets
             sent = self._filter.select(output.targets, output.title, self._joints.unreported)
@@ -446,16 +419,6 @@ class ControllerNode(Node):
             self._title = output.title
             self._state.publish(String(data=output.title))
             self._publish_diagnostics(self._status())
-
-    def _report_policy(self) -> None:
-        """Publish the table of another policy, when one is followed."""
-        policy = self._controller.policy
-        if policy is self._reported:
-            return
-        self._reported = policy
-        self._filter.others_move = self._filter.others_move or policy is not None
-        text = NO_POLICY if policy is None else self._texts.get(policy, policy.name)
-        self._report.publish(String(data=text))
 
     def _publish_diagnostics(self, status: Status) -> None:
         name = self.get_name()

@@ -82,7 +82,6 @@ class NodeSettings:
         policy: Path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none.
         policy_options: How it is run.
         policy_dry_run: Whether the policy is only watched.
-        get_up_policy: Path or name of the one that the mode get_up follows; empty for its poses.
         record: Folder in which each run is recorded; empty for none.
         diagnostics_period: In [s].
         thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
@@ -96,7 +95,6 @@ class NodeSettings:
     policy: str
     policy_options: PolicyOptions
     policy_dry_run: bool
-    get_up_policy: str
     record: str
     diagnostics_period: float
     thread_priority: int
@@ -129,11 +127,6 @@ def declare_parameters(node: Node) -> NodeSettings:
             'policy_dry_run',
             default=False,
             meaning='the policy runs, but its targets go to joint_command_shadow only',
-        ),
-        get_up_policy=read.text(
-            'get_up_policy',
-            '',
-            'ONNX file with its contract that the mode get_up follows; empty: poses of its own',
         ),
         record=read.text('record', '', 'folder for recordings of all steps (MCAP); empty: none'),
         diagnostics_period=read.number('diagnostics_period', 1.0, (0.1, 60.0), 'period [s]'),
@@ -223,7 +216,6 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
-    read.accept_former_name('target_speed', 'setpoint_speed_ratio')
     values = {
         name: read.number(name, getattr(default, name), STATE_RANGES[name], meaning)
         for name, meaning in STATE_MEANINGS.items()

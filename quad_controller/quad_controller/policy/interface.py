@@ -45,16 +45,12 @@ class PolicyStep:
     Attributes:
         targets: Positions of all joints in [rad]; None when the answer cannot be used.
         reason: Why it cannot be used.
-        saturated: Share of the policy's joints whose targets were cut at their limits.
-        computing: Time that the network took in [s], of this thread alone.
         observation: What the network was given; None when it was not asked.
         action: What it answered.
     """
 
     targets: Targets | None
     reason: str = ''
-    saturated: float = 0.0
-    computing: float = 0.0
     observation: Numbers | None = None
     action: Numbers | None = None
 
@@ -80,11 +76,6 @@ class Policy(Protocol):
     @property
     def digest(self) -> str:
         """SHA-256 of its file."""
-        ...
-
-    @property
-    def memory(self) -> float:
-        """How far back it sees what was observed in [s]."""
         ...
 
     def missing(self, inputs: PolicyInputs) -> str:

@@ -125,7 +125,6 @@ def load_policy(
         options=options,
         period=period,
         clock=time.perf_counter,
-        computing_clock=time.thread_time,
     )
 
 
@@ -138,7 +137,6 @@ def validate_policy(
     options: PolicyOptions,
     period: float,
     clock: Callable[[], float],
-    computing_clock: Callable[[], float] = lambda: 0.0,
 ) -> LoadedPolicy:
     """Check a network as a policy.
 
@@ -150,7 +148,6 @@ def validate_policy(
         options: How it shall be run.
         period: Time between two steps in [s].
         clock: A monotonic clock in [s], to see how long it takes.
-        computing_clock: One of the thread alone, by which the time of each answer is taken.
 
     Raises:
         PolicyError: It does not fit; the message has the table.
@@ -170,9 +167,7 @@ def validate_policy(
     )
     checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
     network.recur(contract.recurrence, contract.action.output)
-    runner = PolicyRunner(
-        name, network, contract, robot, options=options, period=period, clock=computing_clock
-    )
+    runner = PolicyRunner(name, network, contract, robot, options=options, period=period)
     standing, held = _observed(runner, stand), runner.in_its_order(stand)
     try:
         answers = check_answers(network, standing, contract, held, period=period, clock=clock)

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -21,31 +19,6 @@ from .observation import ObservationBuilder, Observed
 from .options import PolicyOptions
 
 
-@dataclass(frozen=True, slots=True)
-class JointMapping:
-    """Which joint of the policy is which of the robot.
-
-    Attributes:
-        policy: Places in the policy's order.
-        robot: Places of the same joints in the robot's order.
-        count: Joints of the policy; those that the robot lacks are in neither list.
-    """
-
-    policy: tuple[int, ...]
-    robot: tuple[int, ...]
-    count: int
-
-
-def joint_mapping(names: tuple[str, ...], robot: Quadruped) -> JointMapping:
-    """Return the mapping of a policy's joints by their names."""
-    pairs = [
-        (index, robot.names.index(name)) for index, name in enumerate(names) if name in robot.names
-    ]
-    return JointMapping(
-        tuple(policy for policy, _ in pairs), tuple(place for _, place in pairs), len(names)
-    )
-
-
 class PolicyRunner:
     """A policy for a robot; see :class:`.interface.Policy`."""
 
@@ -58,7 +31,6 @@ class PolicyRunner:
         *,
         options: PolicyOptions,
         period: float,
-        clock: Callable[[], float] = lambda: 0.0,
     ) -> None:
         """Prepare it.
 
@@ -69,16 +41,20 @@ class PolicyRunner:
             robot: The robot.
             options: How to run it.
             period: Of the control loop in [s]; that of the policy is one or several of them.
-            clock: By which the network's time is taken in [s]; without one it counts as none.
 
         Raises:
             PolicyError: Targets are clipped to where a joint may not be.
         """
         self._name, self._network, self._contract = name, network, contract
         self._low_pass = options.low_pass or contract.action.low_pass
-        self._map = joint_mapping(contract.joint_names, robot)
-        self._policy_places = np.array(self._map.policy)
-        self._robot_places = np.array(self._map.robot)
+        places = {name: place for place, name in enumerate(robot.names)}
+        self._places = [
+            (index, places[name])
+            for index, name in enumerate(contract.joint_names)
+            if name in places
+        ]
+        """Places of each common joint in the policy's and in the robot's order."""
+        self._policy_places, self._robot_places = np.array(self._places, int).reshape(-1, 2).T
         self._defaults: Floats = np.array(contract.default_positions, np.float32)
         self._scale: Floats = np.array(contract.action.scale, np.float32)
         self._offset: Floats = np.array(contract.action.offset, np.float32)
@@ -86,10 +62,8 @@ class PolicyRunner:
         self._lower, self._upper = self._limits(robot, options.soft_limits)
         self._builder = ObservationBuilder(contract, options.gravity_source)
         self._decimation = max(round(contract.period / period), 1)
-        self._clock = clock
-        self._saturated = 0.0
         self._waits = 0
-        self._previous: Floats = np.zeros(self._map.count, np.float32)
+        self._previous: Floats = np.zeros(len(contract.joint_names), np.float32)
         self._positions = self._defaults.copy()
         self._velocities = np.zeros_like(self._defaults)
         self._others: Targets = ()
@@ -115,13 +89,6 @@ class PolicyRunner:
     def digest(self) -> str:
         """SHA-256 of its file."""
         return self._network.digest
-
-    @property
-    def memory(self) -> float:
-        """How far back it sees what was observed in [s]."""
-        return self._contract.period * max(
-            (term.history for term in self._contract.terms), default=1
-        )
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Return what it needs and nobody measures; nothing when all is there."""
@@ -181,26 +148,17 @@ class PolicyRunner:
             return PolicyStep(None, missing)
         if self._waits > 0 and self._wanted is not None:
             self._waits -= 1
-            return PolicyStep(self._targets(self._wanted, dt), saturated=self._saturated)
+            return PolicyStep(self._targets(self._wanted, dt))
         observation = self.observe(inputs)
         if not np.isfinite(observation).all():
             return PolicyStep(None, 'the observation is not finite')
-        begun = self._clock()
         try:
             action = self._network.run(observation)[0]
         except Exception as error:  # noqa: BLE001  # whatever a network fails with, the robot stands
             return PolicyStep(None, f'the network failed: {error}')
         if not np.isfinite(action).all():
             return PolicyStep(None, 'the action is not finite')
-        computing = self._clock() - begun
-        targets = self.act(action, dt)
-        return PolicyStep(
-            targets,
-            saturated=self._saturated,
-            computing=computing,
-            observation=observation,
-            action=action,
-        )
+        return PolicyStep(self.act(action, dt), observation=observation, action=action)
 
     def advance(self, dt: float) -> None:
         """Let the clock of the phase go on by some [s]."""
@@ -219,20 +177,14 @@ class PolicyRunner:
         self._waits = self._decimation - 1
         target = self._offset + self._scale * action
         self._wanted = np.minimum(np.maximum(target, self._lower), self._upper)
-        self._saturated = float(np.count_nonzero(self._wanted != target)) / max(len(target), 1)
         return self._targets(self._wanted, dt)
 
     def _command(self, velocity: Velocity) -> Velocity:
         """Return a velocity within what the policy was trained for."""
         if self._contract.commands is None:
             return velocity
-        x, y, yaw = (
-            min(max(value, low), high)
-            for value, (low, high) in zip(
-                (velocity.x, velocity.y, velocity.yaw), self._contract.commands.axes, strict=True
-            )
-        )
-        return Velocity(x, y, yaw)
+        axes = zip(velocity, self._contract.commands.axes, strict=True)
+        return Velocity(*(min(max(value, low), high) for value, (low, high) in axes))
 
     def _targets(self, wanted: Floats, dt: float) -> Targets:
         if self._low_pass > 0.0:
@@ -241,14 +193,14 @@ class PolicyRunner:
             wanted = self._filtered = before + np.float32(share) * (wanted - before)
         targets = list(self._others)
         values = wanted.tolist()
-        for policy, place in zip(self._map.policy, self._map.robot, strict=True):
+        for policy, place in self._places:
             targets[place] = values[policy]
         return tuple(targets)
 
     def _limits(self, robot: Quadruped, share: float) -> tuple[Floats, Floats]:
         """Return the range of each target in the policy's order; the default pose is in it."""
         lower, upper = self._defaults.copy(), self._defaults.copy()
-        for policy, place in zip(self._map.policy, self._map.robot, strict=True):
+        for policy, place in self._places:
             limits = robot.limits[place]
             if math.isinf(limits.lower) or math.isinf(limits.upper):
                 lower[policy], upper[policy] = limits.lower, limits.upper

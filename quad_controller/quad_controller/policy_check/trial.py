@@ -18,7 +18,6 @@ from ..exceptions import CheckError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import Velocity
-from ..policy.contract.model import Source
 from ..policy.load import load_policy, LoadedPolicy
 from ..policy.options import PolicyOptions
 from ..policy.shipped import shipped_policies
@@ -59,18 +58,8 @@ class Candidate:
 
 
 def shipped_walkers() -> dict[str, Candidate]:
-    """Return the shipped policies that follow a velocity, by their names; others do not walk.
-
-    Raises:
-        PolicyError: One does not fit the robot.
-    """
-    shipped = {name: Candidate(path) for name, path in shipped_policies().items()}
-    loaded = {name: who.load() for name, who in shipped.items()}
-    return {
-        name: shipped[name]
-        for name, policy in loaded.items()
-        if policy is not None and policy.contract.needs(Source.COMMAND)
-    }
+    """Return the shipped policies by their names."""
+    return {name: Candidate(path) for name, path in shipped_policies().items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,11 +43,10 @@ from .modes import (
 from .motion import Situation
 from .notices import Notices
 from .parameters import StateParameters
-from .policy_switch import NO_POLICY, PolicySwitch
+from .policy_motion import NO_POLICY, PolicyChoice
 from .status import Event, EventKind, Output, Status
 from .tracking import TrackingMonitor
 from .unseen import UnseenJoints
-from .watchdogs import Watchdogs
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 
@@ -68,7 +67,6 @@ class Controller:
         *,
         policy: Policy | None = None,
         policy_refusal: str = NO_POLICY,
-        get_up_policy: Policy | None = None,
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
         first_gait: Gait = Gait.TROT,
@@ -81,7 +79,6 @@ class Controller:
             states: Limits of states, watchdogs and protections.
             policy: What the mode ``policy`` follows.
             policy_refusal: Why there is none.
-            get_up_policy: What the mode ``get_up`` follows; None for its own poses.
             dry_run: Whether the policy is only asked, and never followed.
             arm_pose: Positions of the joints that belong to no leg when the robot stands, in
                 [rad]; empty leaves them where they are.
@@ -103,9 +100,8 @@ class Controller:
         self._generator = GaitGenerator(robot, gait, poses.fallback_positions)
         self._generator.choose(first_gait)
         self._robot = robot
-        self._machine = StateMachine(poses, self._generator, states, policy, get_up_policy)
-        self._get_up_policy = get_up_policy
-        self._policies = PolicySwitch(self._machine, policy, policy_refusal, dry_run=dry_run)
+        self._machine = StateMachine(poses, self._generator, states, policy)
+        self._policies = PolicyChoice(policy, policy_refusal, dry_run=dry_run)
         self._parameters = states
         self._commands = Commands(states.command_timeout)
         self._health = Health(len(robot.names), states)
@@ -189,13 +185,8 @@ class Controller:
         """What the mode ``policy`` follows."""
         return self._policies.policy
 
-    def handover_refusal(self) -> str:
+    def swap_refusal(self) -> str:
         """Return why no other policy can be taken now, whichever it is; nothing when one can."""
-        if self._policies.is_handing_over:
-            return (
-                f'{self._policies.text}; ask again when that is over '
-                '(the mode walk returns to the gait before)'
-            )
         if self._latch.texts:
             return f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected'
         machine = self._machine
@@ -206,23 +197,25 @@ class Controller:
     def follow(self, policy: Policy | None) -> Answer:
         """Follow another policy from now on, or the gait.
 
-        A robot that stands or walks goes over to it at once. Otherwise nothing moves: the mode
-        ``policy`` follows it.
+        A robot that walks comes to stand first, as on every other way between two modes; then
+        the policy, or the gait instead of a policy, moves it. Lying or relaxed, nothing moves.
 
         Args:
             policy: It fits the robot; None for none.
         """
-        policies, last = self._policies, self._limiter.last
-        refusal = self.handover_refusal()
-        if not refusal and policies.moves and last is not None and policy is not None:
+        machine, policies = self._machine, self._policies
+        moves = machine.can_swap and not policies.dry_run
+        refusal = self.swap_refusal()
+        if not refusal and moves and policy is not None:
             refusal = self._health_refusal() or self._health.unmeasured(policy)
         if refusal:
-            return Answer(False, f'stays with {policies.followed}: {refusal}')
-        return policies.follow(policy, last, self._watchdogs() if policy is not None else None)
-
-    def _watchdogs(self) -> Watchdogs:
-        speeds = [limits.velocity for limits in self._robot.limits]
-        return Watchdogs(self._parameters.max_tilt, speeds, self._parameters.period)
+            return Answer(False, f'stays as it is: {refusal}')
+        text = policies.choose(policy)
+        machine.set_policy(policy)
+        if not moves or (policy is None and machine.state is not State.POLICY):
+            return Answer(True, text)
+        machine.swap(State.WALK if policy is None else State.POLICY)
+        return Answer(True, f'stands, then follows {policy.name if policy else "the gait"}')
 
     def retune(self, gait: GaitParameters) -> Answer:
         """Walk with another tuning from now on; only while the robot is not on its legs.
@@ -266,7 +259,7 @@ class Controller:
             refused=health.refused + self._commands.refused,
             limited=self._limiter.limited,
             unreachable=self._unreachable,
-            policy=self._policies.text,
+            policy=self.policy.name if self.policy is not None else '',
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
@@ -295,7 +288,6 @@ class Controller:
             return Output(None, None, self._machine.title, False, tuple(events))
         self._latch_faults(last, events)
         self._advance_state(last, events)
-        events += self._policies.step()
         self._report_conditions(events)
         if self._unseen.is_pending:  # targets of before would move it, those of one sample, too
             return Output(None, None, self._machine.title, self._health.complete, tuple(events))
@@ -311,7 +303,7 @@ class Controller:
             self._health.complete,
             tuple(events),
             situation,
-            self._policies.asked(is_held=self._held),
+            self._policies.asked(self._machine.motion) if not self._held else None,
         )
 
     def _take(self, state: RobotState, dt: float, events: list[Event]) -> None:
@@ -479,7 +471,7 @@ class Controller:
             if self._machine.state in ON_FEET:
                 return 'it is on its legs, and tilted; a fall stops it, then it may get up'
             swings = self._parameters.get_up_swings
-            return get_up_refusal(self._health, self._latch, self._get_up_policy, swings=swings)
+            return get_up_refusal(self._health, self._latch, swings=swings)
         if self._latch.texts:
             return (
                 f'{"; ".join(self._latch.texts)}; call ~/clear_fault when that is corrected. '

@@ -7,7 +7,6 @@
     REST -> (back, side, nose or tail: stages of a try) -> REST -> ... until it lies on its belly
     REST -> (belly: FOLD -> STAND) -> finished
     REST -> (too many tries) -> failure
-    REST -> (a policy, where there is one) -> finished, or REST and the poses
 
 Where it lies is measured whenever the body has come to rest, so that a stage that did something
 else than it was made for leads to the tries of where it lies now. Swings follow each other without
@@ -24,13 +23,11 @@ import math
 from quad_description import ImuSample, Quadruped, Targets
 from quad_description.rotations import Vector
 
-from ..policy.interface import Policy
 from .faults import Fault, FaultLatch
 from .get_up_poses import RECOVERIES
 from .health import Health
 from .lying import Lying, lying_on
 from .motion import Blend, Hold, Motion, Situation, Swing
-from .policy_motion import PolicyMotion
 
 STILL_ANGLE = 0.05  # [rad] by which the body of a robot at rest may turn
 STILL_TIME = 0.4  # [s] for which it must not have turned more
@@ -41,8 +38,6 @@ MIN_BLEND_TIME = 0.02  # [s]
 LEVEL = 0.35  # [rad] of tilt of a robot that stands
 FOLD_SPEED = 3.0  # [rad/s] of legs that bear nothing yet
 STAND_SPEED = 1.5  # [rad/s]
-POLICY_DEADLINE = 10.0  # [s] for a policy to bring it to its feet
-EASE_TIME = 0.3  # [s] over which a policy takes over
 
 REACH_TOLERANCE = 0.01  # [rad] that a joint may be short of a pose
 
@@ -96,15 +91,12 @@ def stands(imu: ImuSample | None) -> bool:
     return imu is None or imu.is_uncertain or imu.tilt < LEVEL
 
 
-def get_up_refusal(
-    health: Health, latch: FaultLatch, policy: Policy | None, *, swings: bool
-) -> str:
+def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
     """Return why a robot cannot get up now, nothing when it may try.
 
     Args:
         health: What is measured.
         latch: The latched faults; a fall is what getting up is for.
-        policy: What brings it to its feet; None for the poses.
         swings: Whether it may throw itself off its back.
     """
     if others := latch.texts_without(Fault.FALLEN):
@@ -119,26 +111,20 @@ def get_up_refusal(
         return health.uncertainty
     if health.spins:
         return 'it turns faster than max_turn_rate: wait until it is at rest, or look at the gyro'
-    if not swings and policy is None and lying_on(imu.down) is Lying.BACK:
+    if not swings and lying_on(imu.down) is Lying.BACK:
         return ON_ITS_BACK
-    return health.unmeasured(policy)
+    return health.unmeasured(None)
 
 
 class GetUp(Motion):
-    """Brings a robot to its feet, by poses or by a policy.
+    """Brings a robot to its feet by poses.
 
     Attributes:
         text: What it is doing, for people.
     """
 
     def __init__(
-        self,
-        robot: Quadruped,
-        last: Targets,
-        final: FinalPoses,
-        policy: Policy | None = None,
-        *,
-        swings: bool = False,
+        self, robot: Quadruped, last: Targets, final: FinalPoses, *, swings: bool
     ) -> None:
         """Begin with waiting for rest.
 
@@ -146,10 +132,9 @@ class GetUp(Motion):
             robot: The robot.
             last: The last targets of all joints in [rad].
             final: Where it leads.
-            policy: What brings it to its feet before poses are tried; None for the poses alone.
             swings: Whether it may throw itself off its back.
         """
-        self._robot, self._last, self._final, self._policy = robot, last, final, policy
+        self._robot, self._last, self._final = robot, last, final
         self._swings = swings
         self._motion: Motion = Hold(last, math.inf)
         self._deadline = REST_DEADLINE
@@ -193,29 +178,22 @@ class GetUp(Motion):
         if not self._motion.finished:
             self._still.reset()
         self._still.step(imu.down, dt)
-        if self._is_over(imu):
+        if self._is_over():
             self._lying, self._tilt = lying_on(imu.down), imu.tilt
             next(self._stages, None)
         return self._last
 
-    def _is_over(self, imu: ImuSample) -> bool:
+    def _is_over(self) -> bool:
         """Whether a stage has come to its end, or takes too long."""
-        if self._motion.failure or self._time >= self._deadline:
+        if self._time >= self._deadline:
             return True
         if isinstance(self._motion, Swing):
             return self._motion.finished
-        is_still = self._still.time >= STILL_TIME
-        if isinstance(self._motion, PolicyMotion):
-            return is_still and imu.tilt < LEVEL
-        return self._motion.finished and is_still
+        return self._motion.finished and self._still.time >= STILL_TIME
 
     def _script(self) -> Iterator[None]:
         """Begin one stage after another, each when the one before is over."""
         yield
-        if self._policy is not None:
-            yield from self._follow(self._policy)
-            if self._finished:
-                return
         while self._tries.total() < MAX_TRIES:
             lying = self._lying
             self._tries[lying] += 1
@@ -269,22 +247,6 @@ class GetUp(Motion):
         yield
         self._rises = False
         self._finished = self._lying is Lying.BELLY and self._tilt < LEVEL
-
-    def _follow(self, policy: Policy) -> Iterator[None]:
-        """Follow a policy until the robot is upright and at rest."""
-        self.text = f'lies {self._lying.value}; follows the policy {policy.name}'
-        self._motion = PolicyMotion(policy, self._last, EASE_TIME)
-        self._time, self._deadline = 0.0, POLICY_DEADLINE
-        self._still.reset()
-        yield
-        failure = self._motion.failure
-        self._finished = not failure and self._tilt < LEVEL
-        if not self._finished:
-            why = failure or f'it lies {self._lying.value} after {POLICY_DEADLINE:g} s'
-            self.text = f'the policy {policy.name} is given up: {why}; waits for rest'
-            self._motion = Hold(self._last, math.inf)
-            self._time, self._deadline = 0.0, REST_DEADLINE
-            yield
 
     def _start_stage(
         self, targets: Targets, speed: float, swing_time: float | None = None

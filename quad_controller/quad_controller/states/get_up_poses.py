@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses of the legs that turn a robot from its back, side, nose or tail onto its belly.
 
-They are data, for the XGO of quad_description. ``bench/search_get_up.py`` searches such poses in
-physics, and leaves out those in which legs touch each other or the trunk; those of the sides were
-found by looking at the outline: which points touch the ground, and on what side of them the centre
-of mass is. The swings off the back lift it by 7 cm, over the tail.
+They are data, for the XGO of quad_description, found by the cross-entropy method in physics, less
+what lets legs touch each other or the trunk; those of the sides were found by looking at the
+outline: which points touch the ground, and on what side of them the centre of mass is. The swings
+off the back lift it by 7 cm, over the tail.
 ``bench/bench_get_up.py`` measures what they are worth. Another robot needs its own.
 """
 

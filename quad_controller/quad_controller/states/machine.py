@@ -6,7 +6,7 @@
 
     RELAX <-> LIE <-> STAND <-> WALK, TURN      (the gait comes to rest before it is left)
                         ^-----> POLICY          (eased in; winds down, or fails, back to STAND)
-    STAND, WALK, TURN, POLICY <-> POLICY        (handed over while they go on, see handover.py)
+    POLICY -> STAND -> POLICY or WALK           (another policy, or the gait, takes its place)
     RELAX, LIE, FAULT (a fall) -> GET_UP -> STAND   (or FAULT again; see get_up.py)
     any but RELAX and LIE at rest -> FAULT      (then RELAX, LIE or STAND when it is cleared)
     FAULT -> LIE -> RELAX                       (a way down is possible with any fault)
@@ -25,12 +25,10 @@ from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
 from .faults import Reaction
 from .get_up import FinalPoses, GetUp
-from .handover import Handover
 from .modes import GAIT_STATES, MOVING_STATES, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
 from .policy_motion import PolicyMotion
-from .watchdogs import Watchdogs
 
 EASE_TIME = 0.7  # [s] over which a policy takes over
 
@@ -91,7 +89,6 @@ class StateMachine:
         generator: GaitGenerator,
         parameters: StateParameters,
         policy: Policy | None,
-        get_up_policy: Policy | None = None,
     ) -> None:
         """Start relaxed, without targets.
 
@@ -100,15 +97,13 @@ class StateMachine:
             generator: The gait.
             parameters: How fast.
             policy: What POLICY follows; it cannot be entered without.
-            get_up_policy: What GET_UP follows; None for its own poses.
         """
-        self._get_up_policy = get_up_policy
         self._poses, self._generator, self._policy = poses, generator, policy
         self._parameters = parameters
         self._walk = Walk(generator)
         self._lie_down: Blend | None = None
         self._reaction: Reaction | None = None
-        self._gait_state = State.STAND  # that a policy was handed over from
+        self._after_standing: State | None = None
         self.state = self.goal = State.RELAX
         self.motion: Motion = self._walk
 
@@ -160,6 +155,7 @@ class StateMachine:
         Args:
             last: The last targets of all joints in [rad]; None before the first.
         """
+        self._after_standing = None
         if self.state is State.GET_UP and last is not None:
             rises = self.getting_up is not None and self.getting_up.rises
             self.goal = State.STAND if rises else State.RELAX
@@ -177,44 +173,18 @@ class StateMachine:
     def request(self, goal: State) -> None:
         """Go to a state from now on; out of FAULT only down."""
         self.goal = goal
-        self._reaction = None
+        self._reaction = self._after_standing = None
 
     @property
-    def can_hand_over(self) -> bool:
-        """Whether another motion may take over as it is: walking or standing, on no other way."""
+    def can_swap(self) -> bool:
+        """Whether gait or policy moves the robot, on no way to anything else."""
         walks = self.motion is self._walk or isinstance(self.motion, PolicyMotion)
         return walks and self.state is self.goal and self.state is not State.FAULT
 
-    def hand_over(
-        self, policy: Policy | None, last: Targets, watchdogs: Watchdogs | None
-    ) -> Handover:
-        """Go over to another policy, or to the gait; for when that is possible.
-
-        Args:
-            policy: Which one; None for the gait.
-            last: The last targets of all joints in [rad].
-            watchdogs: What ends the policy.
-        """
-        after: Motion = self._walk
-        if policy is not None:
-            after = PolicyMotion(policy, last, ease_time=0.0)
-        else:
-            self._generator.others = last
-            self._generator.reset()
-        memory = policy.memory if policy is not None else 0.0
-        if self.state is not State.POLICY:
-            self._gait_state = self.state
-        self.motion = handover = Handover(self.motion, after, last, watchdogs, memory)
-        self.state = self.goal = State.WALK if policy is None else State.POLICY
-        return handover
-
-    def conclude(self, handover: Handover) -> None:
-        """Go on with what a handover has ended with."""
-        self.motion = handover.current
-        if self.motion is self._walk and self.state is State.POLICY:
-            if self.goal is State.POLICY:
-                self.goal = self._gait_state
-            self.state = self._gait_state
+    def swap(self, goal: State) -> None:
+        """Stand, and go on to a state from there; for when that is possible."""
+        self.request(State.STAND)
+        self._after_standing = goal
 
     def set_policy(self, policy: Policy | None) -> None:
         """Follow another policy when POLICY is entered next."""
@@ -232,7 +202,7 @@ class StateMachine:
         elif self.state is State.FAULT and self._reaction is not None:
             reaction = max(reaction, self._reaction)
         self.state = self.goal = State.FAULT
-        self._reaction = reaction
+        self._reaction, self._after_standing = reaction, None
         if reaction is Reaction.HOLD:
             self.hold(last)
 
@@ -272,6 +242,8 @@ class StateMachine:
         self._stand_after_blend()
         if self.state is self.goal is State.GET_UP and self.motion.finished:
             self.goal = State.STAND
+        if self.state is self.goal is State.STAND and self._after_standing is not None:
+            self.request(self._after_standing)
         following = self._next()
         if following is not None:
             self._enter(following, last)
@@ -313,7 +285,7 @@ class StateMachine:
             if self.motion is not self._lie_down and self.motion.settled:
                 self._lie(last)
         elif self._reaction is Reaction.STAND:
-            if isinstance(self.motion, (PolicyMotion, Handover)):
+            if isinstance(self.motion, PolicyMotion):
                 self._stand(last)
             self._stand_after_blend()
 
@@ -331,8 +303,7 @@ class StateMachine:
     def _get_up(self, last: Targets) -> GetUp:
         self._generator.others = self._poses.with_arm(last)
         final = FinalPoses(self._poses.lying(last), self._generator.stand_targets)
-        swings = self._parameters.get_up_swings
-        return GetUp(self._poses.robot, last, final, self._get_up_policy, swings=swings)
+        return GetUp(self._poses.robot, last, final, swings=self._parameters.get_up_swings)
 
     def _stand(self, last: Targets) -> None:
         self._generator.others = self._poses.with_arm(last)

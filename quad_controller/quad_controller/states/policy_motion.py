@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A policy as one of the motions: eased in, given up when it fails."""
+"""A policy as one of the motions, and which policy that is: eased in, given up when it fails."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from quad_description import Targets
 
 from ..policy.interface import Policy, PolicyStep
 from .motion import Motion, Situation
+from .status import Asked
+
+NO_POLICY = 'no policy is loaded (parameter policy, or ~/load_policy)'
 
 MAX_BAD_STEPS = 3  # in a row; one may be a glitch, the robot stands on its last targets meanwhile
 WIND_DOWN = 0.5  # [s] without velocity before the gait takes over
@@ -72,3 +75,61 @@ class PolicyMotion(Motion):
             a + share * (b - a) for a, b in zip(self._start, step.targets, strict=True)
         )
         return self._last
+
+
+class PolicyChoice:
+    """Which policy the mode ``policy`` follows, or which is only watched in a dry run.
+
+    Attributes:
+        policy: The policy; None for none.
+        dry_run: Whether it is only asked, and never followed.
+    """
+
+    def __init__(self, policy: Policy | None, refusal: str, *, dry_run: bool) -> None:
+        """Begin with a policy, or with why there is none."""
+        self.policy, self._refusal, self.dry_run = policy, refusal, dry_run
+        self._watched_steps = 0
+        self._asked: Asked | None = None
+
+    @property
+    def mode_refusal(self) -> str:
+        """Why the policy keeps the robot from the mode ``policy``; empty if it does not."""
+        if self.policy is None:
+            return self._refusal
+        if self.dry_run:
+            return 'the policy is only watched in a dry run (parameter policy_dry_run)'
+        return ''
+
+    def choose(self, policy: Policy | None) -> str:
+        """Take another policy; return what becomes of it as long as nothing moves."""
+        self.policy, self._watched_steps, self._asked = policy, 0, None
+        if policy is None:
+            self._refusal = NO_POLICY
+            return 'no policy is loaded any more'
+        if self.dry_run:
+            return f'{policy.name} is watched (parameter policy_dry_run)'
+        return f'the mode policy follows {policy.name}'
+
+    def watch(self, situation: Situation, dt: float, last: Targets) -> Targets | None:
+        """Return what a policy that is only watched would send, None without one.
+
+        Args:
+            situation: What is known.
+            dt: Duration of the step in [s].
+            last: The last targets of all joints in [rad].
+        """
+        self._asked, inputs = None, situation.policy_inputs
+        if self.policy is None or not self.dry_run or inputs is None:
+            return None
+        if not self._watched_steps:
+            self.policy.reset(last)
+        self._watched_steps += 1
+        answer = self.policy.step(inputs, dt)
+        self._asked = Asked(self.policy, answer, self._watched_steps)
+        return answer.targets
+
+    def asked(self, motion: Motion) -> Asked | None:
+        """Return what the policy that is watched, or that moves the robot, was asked last."""
+        if self._asked is not None or not isinstance(motion, PolicyMotion):
+            return self._asked
+        return Asked(motion.policy, motion.answer, motion.steps) if motion.answer else None

@@ -34,7 +34,7 @@ class Status:
         refused: Samples and commands that could not be used.
         limited: Targets of single joints that were too fast and were cut.
         unreachable: Steps in which a leg did not reach its target.
-        policy: Which policy is loaded, and how far it is where it takes over; empty for none.
+        policy: Name of the policy that is loaded; empty for none.
     """
 
     state: State

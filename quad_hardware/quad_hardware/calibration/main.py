@@ -16,7 +16,7 @@ from quad_description import movable_joints, PRESETS, robot_urdf
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
 from ..link import DEFAULT_PORT, LinkOptions
-from ..protocol import Model, Protocol, protocol_argument, PROTOCOLS
+from ..protocol import Model, Protocol, PROTOCOLS
 from .console import CancelledError, Console, TerminalConsole
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, servo_parameters, write_parameters
@@ -121,7 +121,6 @@ def _parser() -> argparse.ArgumentParser:
         kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
-            type=protocol_argument,
             choices=_PROTOCOLS,
             default=AUTO,
             help='what the robot speaks (%(default)s)',

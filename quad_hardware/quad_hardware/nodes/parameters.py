@@ -25,7 +25,7 @@ from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_
 from ..link import DEFAULT_PORT, LinkOptions
 from ..link.vendor import VENDOR
 from ..link.vendor_library import is_installed
-from ..protocol import FORMER_NAMES, Model, Protocol, PROTOCOLS
+from ..protocol import Model, Protocol, PROTOCOLS
 from ..serial_robot import RobotSettings
 
 AUTO = 'auto'
@@ -108,7 +108,6 @@ def declare_parameters(node: Node) -> NodeSettings:
         AUTO,
         _PROTOCOLS,
         'auto: detected; vendor: through the vendor’s xgo_lib2',
-        former=FORMER_NAMES,
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
     link = LinkOptions(

@@ -22,7 +22,6 @@ from .motors import (
     MOTOR_ORDER,
     slot_of,
 )
-from .names import FORMER_NAMES, protocol_argument, warn_of_former_name
 from .parser import ParserCounters, StreamParser
 from .register_table import (
     ACTION_RESET,
@@ -55,7 +54,6 @@ __all__ = [
     'ANGLE_SPANS',
     'ARM_MOTORS',
     'BULK_READ_ORDER',
-    'FORMER_NAMES',
     'HOST_KINDS',
     'LEG_MOTORS',
     'MOTOR_OF_JOINT',
@@ -87,8 +85,6 @@ __all__ = [
     'checksum',
     'decode_feedback',
     'model_of_firmware',
-    'protocol_argument',
     'scatter',
     'slot_of',
-    'warn_of_former_name',
 ]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import Enum
 
 import numpy as np
@@ -28,10 +28,6 @@ class Observation(Enum):
         return self.value[1] or joints
 
 
-WALKING = tuple(Observation)
-GETTING_UP = tuple(part for part in Observation if part is not Observation.COMMAND)
-
-
-def row_of(seen: Mapping[Observation, ArrayLike], parts: Sequence[Observation]) -> Floats:
-    """Return some parts of what is seen, one after the other."""
-    return np.concatenate([np.asarray(seen[part], np.float32) for part in parts])
+def row_of(seen: Mapping[Observation, ArrayLike]) -> Floats:
+    """Return all parts of what is seen, one after the other."""
+    return np.concatenate([np.asarray(seen[part], np.float32) for part in Observation])

@@ -9,7 +9,6 @@ every step of each costs two messages. Here a step of all costs two messages for
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from itertools import pairwise
@@ -20,7 +19,7 @@ from multiprocessing.context import SpawnProcess
 from multiprocessing.sharedctypes import RawArray
 import os
 import signal
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 from gymnasium import spaces
@@ -30,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import SetupError, SimulationError
-from .get_up import GetUpEnv
 from .observation import Floats
 from .walking import WalkingEnv
 
@@ -45,46 +43,35 @@ class _Order(Enum):
     CALL = 'call'
 
 
-@dataclass(frozen=True, slots=True)
-class _Memory:
+class _Arrays(NamedTuple):
     """What all processes see; one row for each environment."""
 
-    observations: Any
-    actions: Any
-    rewards: Any
-    terminated: Any
-    truncated: Any
-    count: int
-
-    @classmethod
-    def make(cls, count: int, observation: int, action: int) -> _Memory:
-        return cls(
-            RawArray('f', count * observation),
-            RawArray('f', count * action),
-            RawArray('f', count),
-            RawArray('b', count),
-            RawArray('b', count),
-            count,
-        )
-
-    def arrays(self) -> _Arrays:
-        """Return views of it."""
-        return _Arrays(
-            np.frombuffer(self.observations, np.float32).reshape(self.count, -1),
-            np.frombuffer(self.actions, np.float32).reshape(self.count, -1),
-            np.frombuffer(self.rewards, np.float32),
-            np.frombuffer(self.terminated, np.bool_),
-            np.frombuffer(self.truncated, np.bool_),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class _Arrays:
     observations: Floats
     actions: Floats
     rewards: Floats
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
+
+
+_Memory = tuple[int, tuple[Any, ...]]
+"""Number of environments, and the shared memory of each array."""
+
+
+def _memory(count: int, observation: int, action: int) -> _Memory:
+    sizes = (('f', observation), ('f', action), ('f', 1), ('b', 1), ('b', 1))
+    return count, tuple(RawArray(kind, count * size) for kind, size in sizes)
+
+
+def _arrays(memory: _Memory) -> _Arrays:
+    """Return views of the memory."""
+    count, (observations, actions, rewards, terminated, truncated) = memory
+    return _Arrays(
+        np.frombuffer(observations, np.float32).reshape(count, -1),
+        np.frombuffer(actions, np.float32).reshape(count, -1),
+        np.frombuffer(rewards, np.float32),
+        np.frombuffer(terminated, np.bool_),
+        np.frombuffer(truncated, np.bool_),
+    )
 
 
 class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
@@ -124,8 +111,8 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self.single_observation_space, self.single_action_space = observed, acted
         self.observation_space = batch_space(observed, num_envs)
         self.action_space = batch_space(acted, num_envs)
-        memory = _Memory.make(num_envs, math.prod(observed.shape), math.prod(acted.shape))
-        self._arrays = memory.arrays()
+        memory = _memory(num_envs, math.prod(observed.shape), math.prod(acted.shape))
+        self._arrays = _arrays(memory)
         ends = np.linspace(0, num_envs, workers + 1).round().astype(int).tolist()
         self._workers: list[_Worker] = []
         try:
@@ -217,23 +204,8 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
 
 
 def walking_processes(num_envs: int = 1, **keywords: Any) -> ProcessVectorEnv:  # noqa: ANN401
-    """Make many robots that are to walk.
-
-    Args:
-        num_envs: How many.
-        **keywords: Of :class:`.walking.WalkingEnv`.
-    """
+    """Make many robots that are to walk, with keywords of :class:`.walking.WalkingEnv`."""
     return ProcessVectorEnv(partial(WalkingEnv, **keywords), num_envs)
-
-
-def get_up_processes(num_envs: int = 1, **keywords: Any) -> ProcessVectorEnv:  # noqa: ANN401
-    """Make many robots that are to get up.
-
-    Args:
-        num_envs: How many.
-        **keywords: Of :class:`.get_up.GetUpEnv`.
-    """
-    return ProcessVectorEnv(partial(GetUpEnv, **keywords), num_envs)
 
 
 Answer = list[tuple[int, Any]] | str
@@ -282,7 +254,7 @@ class _Worker:
 def _serve(pipe: Connection, make: Callable[[], Env], memory: _Memory, indices: range) -> None:
     """Do what is asked for until the other end of the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one that started it ends it
-    arrays = memory.arrays()
+    arrays = _arrays(memory)
     envs: list[Env] = []
     try:
         envs += [make() for _ in indices]

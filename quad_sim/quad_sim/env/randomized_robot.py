@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from gymnasium import spaces
 import numpy as np
@@ -92,32 +91,14 @@ class RandomizedRobot:
             )
         self._randomization = randomization
 
-    def begin(self, random: np.random.Generator, **start: Any) -> None:  # noqa: ANN401
-        """Be another robot of the ranges.
-
-        Args:
-            random: What is drawn comes from it.
-            **start: Where it is, as for :meth:`.Robot.reset`; it stands on the ground without.
-        """
+    def begin(self, random: np.random.Generator) -> None:
+        """Stand on the ground as another robot of the ranges."""
         ranges = self._randomization
         seed = int(random.integers(2**31))
-        self.robot.reset(seed=seed, variation=ranges.variation(random), **start)
+        self.robot.reset(seed=seed, variation=ranges.variation(random))
         self._delay = float(random.uniform(*ranges.delay))
         x, y, z = random.uniform(*ranges.gyro_bias, 3).tolist()
         self._bias = ImuBias((x, y, z), *random.uniform(*ranges.level_bias, 2).tolist())
-        self.settle(0.0)
-
-    def settle(self, duration: float, *, limp: bool = False) -> None:
-        """Let time pass before the first step; the servos hold what they are at in the end.
-
-        Args:
-            duration: How long in [s].
-            limp: The servos have no torque until then.
-        """
-        if duration:
-            self.robot.set_torque(not limp)
-            self.robot.step(duration)
-            self.robot.set_torque(True)
         self.action = self.robot.joint_targets.astype(np.float32) - self.stand
         self.state = self._sense()
 
@@ -192,10 +173,8 @@ class RandomizedRobot:
         pose = robot.base_pose
         return Motion(
             velocity=robot.base_velocity,
-            height=pose.position[2],
             tilt=pose.tilt,
             down=down_in_body(pose.orientation),
-            off_stand=robot.joint_positions - self.stand,
             torques=robot.joint_torques,
             velocities=robot.joint_velocities,
             target_speed=(action.astype(np.float64) - self.action) / self.period,

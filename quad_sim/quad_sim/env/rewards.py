@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 import math
-from typing import Any
 
 from quad_description.rotations import Vector
 
@@ -20,20 +19,16 @@ class Motion:
 
     Attributes:
         velocity: How base_link moves.
-        height: Of base_link above level ground in [m].
         tilt: Angle between its z axis and up in [rad].
         down: Direction of gravity in base_link.
-        off_stand: Positions of the joints, from those of a robot that stands, in [rad].
         torques: Of the joints in [N m].
         velocities: Of the joints in [rad/s].
         target_speed: Of the targets since the step before in [rad/s].
     """
 
     velocity: BaseVelocity
-    height: float
     tilt: float
     down: Vector
-    off_stand: Array
     torques: Array
     velocities: Array
     target_speed: Array
@@ -79,7 +74,10 @@ class RewardWeights:
 
     def __post_init__(self) -> None:
         """Refuse numbers of which no reward can be made."""
-        _check_weights(self)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or (field.name.endswith('_width') and value <= 0.0):
+                raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
 
     def terms(
         self, motion: Motion, commanded: Vector, period: float, *, fallen: bool
@@ -111,92 +109,8 @@ class RewardWeights:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the terms."""
-        return _term_names(self)
-
-
-@dataclass(frozen=True, slots=True)
-class GetUpWeights:
-    """Weights of the terms of a second, of which a step has its part.
-
-    Those of a robot that stands count by how upright it is: the cosine of its tilt, 0 from a
-    quarter turn on.
-
-    Attributes:
-        upright: From 0 on the back to 1 upright.
-        height: exp(-(error / height_width)^2) of the height of base_link, as far as upright.
-        pose: exp(-(error / pose_width)^2) of the joints from the standing pose, root mean square,
-            as far as upright.
-        still: exp(-(speed / still_width)^2) of the joints, root mean square, as far as upright.
-        power: Of the servos' torques, before the damping of their motors, in [W].
-        action_rate: Square of the speed of the targets in [rad2/s2].
-        height_width: [m]
-        pose_width: [rad]
-        still_width: [rad/s]
-    """
-
-    upright: float = 1.0
-    height: float = 1.0
-    pose: float = 1.0
-    still: float = 0.5
-    power: float = -0.005
-    action_rate: float = -0.0002
-    height_width: float = 0.03
-    pose_width: float = 0.5
-    still_width: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Refuse numbers of which no reward can be made."""
-        _check_weights(self)
-
-    def terms(self, motion: Motion, nominal_height: float, period: float) -> dict[str, float]:
-        """Return what each term is worth in one step.
-
-        Args:
-            motion: What the step brought about.
-            nominal_height: Of base_link of a robot that stands in [m].
-            period: Time that it took in [s].
-        """
-        up = math.cos(motion.tilt)
-        stands = max(up, 0.0)
-        off = _root_mean_square(motion.off_stand)
-        speed = _root_mean_square(motion.velocities)
-        rates = {
-            'upright': self.upright * 0.5 * (1.0 + up),
-            'height': self.height
-            * stands
-            * _nearness(motion.height - nominal_height, self.height_width),
-            'pose': self.pose * stands * _nearness(off, self.pose_width),
-            'still': self.still * stands * _nearness(speed, self.still_width),
-            'power': self.power * motion.power,
-            'action_rate': self.action_rate * motion.action_rate,
-        }
-        return {name: period * rate for name, rate in rates.items()}
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the terms."""
-        return _term_names(self)
+        return tuple(field.name for field in fields(self) if not field.name.endswith('_width'))
 
 
 def _nearness(error: float, width: float) -> float:
     return math.exp(-((error / width) ** 2))
-
-
-def _root_mean_square(values: Array) -> float:
-    return math.sqrt(float((values * values).mean()))
-
-
-def _check_weights(weights: Any) -> None:  # noqa: ANN401
-    """Refuse numbers of which no reward can be made.
-
-    Raises:
-        SetupError: With the name.
-    """
-    for field in fields(weights):
-        value = getattr(weights, field.name)
-        if not math.isfinite(value) or (field.name.endswith('_width') and value <= 0.0):
-            raise SetupError(f'{field.name} {value}: give a finite number, a width above 0')
-
-
-def _term_names(weights: Any) -> tuple[str, ...]:  # noqa: ANN401
-    return tuple(field.name for field in fields(weights) if not field.name.endswith('_width'))

@@ -18,8 +18,7 @@ from quad_description.rotations import Vector
 
 from ..exceptions import SetupError
 from ..plant.servo import ServoModel, ServoParameters
-from .episode import Episode
-from .observation import Floats, Observation, row_of, WALKING
+from .observation import Floats, Observation, row_of
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
 from .randomized_robot import PERIOD, RandomizedRobot
 from .rewards import RewardWeights
@@ -107,13 +106,16 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
             SetupError: A time is not above 0, or a target may come later than its step ends.
             DescriptionError: There is no such preset.
         """
-        self._weights = weights or RewardWeights()
-        self._episode = Episode(period, duration, self._weights.names)
+        if not (0.0 < period < math.inf and period <= duration < math.inf):
+            raise SetupError(
+                f'period {period} s, duration {duration} s: give 0 < period < duration'
+            )
+        self._weights, self._most = weights or RewardWeights(), round(duration / period)
         self._body = RandomizedRobot(preset, servo, randomization, period)
         self.robot, self.period, self.stand = self._body.robot, period, self._body.stand
         self._commands = commands or CommandRanges()
         self.action_space = self._body.action_space
-        width = sum(part.width(len(self.stand)) for part in WALKING)
+        width = sum(part.width(len(self.stand)) for part in Observation)
         self.observation_space = spaces.Box(-np.inf, np.inf, (width,), np.float32)
         self.command: Vector = (0.0, 0.0, 0.0)
         self._begin()
@@ -153,13 +155,15 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         motion = self._body.step(action, self.np_random)
         fallen = motion.tilt > MAX_TILT
         terms = self._weights.terms(motion, self.command, self.period, fallen=fallen)
-        reward = self._episode.add(terms)
-        is_over = self._episode.is_over
-        info = self._episode.info if fallen or is_over else {}
-        if not self._is_command_lasting and self._episode.steps % self._command_steps == 0:
+        self._steps += 1
+        for name, value in terms.items():
+            self._sums[name] += value
+        is_over = self._steps >= self._most
+        info = {'reward_terms': dict(self._sums)} if fallen or is_over else {}
+        if not self._is_command_lasting and self._steps % self._command_steps == 0:
             # what is seen now is judged next
             self.command = self._commands.draw(self.np_random)
-        return self._observation(), reward, fallen, is_over and not fallen, info
+        return self._observation(), sum(terms.values()), fallen, is_over and not fallen, info
 
     def vary(self, randomization: Randomization) -> None:
         """Let other things differ from the next episode on; noise stays as it was made.
@@ -174,10 +178,10 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         self._is_command_lasting = command is not None
         self.command = command or self._commands.draw(self.np_random)
         self._command_steps = max(round(self._commands.time / self.period), 1)
-        self._episode.begin()
+        self._steps, self._sums = 0, dict.fromkeys(self._weights.names, 0.0)
 
     def _observation(self) -> Floats:
-        return row_of({**self._body.seen, Observation.COMMAND: self.command}, WALKING)
+        return row_of({**self._body.seen, Observation.COMMAND: self.command})
 
 
 def _lasting_command(options: Mapping[str, Any]) -> Vector | None:

@@ -54,7 +54,6 @@ class RobotLine:
         speeds: Mapping[int, Protocol] | None = None,
         *,
         faults: FaultPlan | None = None,
-        fixed_baud: int = 0,
         command_gap: float = 0.0,
         seed: int = 0,
     ) -> None:
@@ -64,7 +63,6 @@ class RobotLine:
             board: The robot.
             speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
             faults: What goes wrong, and when.
-            fixed_baud: Speed to assume [bit/s] whatever the host sets; 0 for the host's.
             command_gap: Least time between two frames of the host in protocol v1 [s]; a frame
                 that comes sooner is lost, as the vendor warns.
             seed: Of the damage on the line.
@@ -78,9 +76,8 @@ class RobotLine:
         self._functions, self._registers = Functions(board), Registers(board)
         self._by_baud = dict(speeds or {V2.baud: V2, V1.baud: V1})
         self._forget_partial_frames()
-        self._fixed_baud = fixed_baud
         self._command_gap = command_gap
-        self._baud = fixed_baud or next(iter(self._by_baud))
+        self._baud = next(iter(self._by_baud))
         self._received_at = self._frame_end = -math.inf
         self._battery_fault: Fault | None = None
         self._powered = self._plugged = True
@@ -98,7 +95,7 @@ class RobotLine:
 
     def set_baud(self, baud: int) -> None:
         """Follow the speed that the host has set [bit/s]."""
-        if not self._fixed_baud and baud != self._baud:
+        if baud != self._baud:
             self._baud = baud
             self._forget_partial_frames()
 

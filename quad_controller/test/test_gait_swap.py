@@ -1,0 +1,204 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Another policy while the robot stands or walks: it comes to stand, and goes on by that one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from quad_controller.gait.generator import GaitGenerator
+from quad_controller.gait.parameters import GaitParameters
+from quad_controller.gait.velocity import Velocity
+from quad_controller.policy.interface import PolicyInputs, PolicyStep
+from quad_controller.policy.load import load_policy
+from quad_controller.policy.options import PolicyOptions
+from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy.shipped import find_policy
+from quad_controller.states.controller import Controller
+from quad_controller.states.modes import State
+from quad_controller.states.parameters import StateParameters
+from quad_description import Targets
+from quad_gait_physics import MODEL, PhysicsRig
+from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted
+
+STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
+CROUCHED = tuple(angle + 0.1 for angle in STAND)
+STANDING_LOW = tuple(angle + 0.05 for angle in STAND)
+FORWARD = Velocity(0.15)
+
+
+class NamedPolicy(StillPolicy):
+    """A policy that answers as a test says."""
+
+    def __init__(self, name: str, answer: PolicyStep) -> None:
+        """Answer always the same."""
+        super().__init__(answer.targets or STAND)
+        self.name, self.answer = name, answer
+
+    def step(self, inputs: PolicyInputs, dt: float) -> PolicyStep:
+        """Answer."""
+        self.velocities.append(inputs.velocity)
+        return self.answer
+
+
+def good(name: str = 'good', targets: Targets = CROUCHED) -> NamedPolicy:
+    """Return a policy that is well."""
+    return NamedPolicy(name, PolicyStep(targets))
+
+
+def standing(policy: NamedPolicy | None = None, mode: str = 'stand') -> Rig:
+    """Return a rig that stands, by a policy if there is one and the mode is its."""
+    rig = Rig(Controller(ROBOT, GaitParameters(), StateParameters(), policy=policy))
+    rig.step()
+    rig.ask(mode)
+    rig.run(4.0)
+    rig.log.clear()
+    return rig
+
+
+@pytest.mark.parametrize('mode', ['stand', 'walk', 'turn'])
+def test_a_policy_takes_over_from_the_gait_standing(mode: str) -> None:
+    """The robot comes to rest, then the policy is eased in; no target jumps."""
+    rig, policy = standing(mode=mode), good()
+    rig.run(1.0, FORWARD)
+    answer = rig.controller.follow(policy)
+    assert answer.message == 'stands, then follows good'
+    assert rig.controller.status.policy == 'good'
+    while not rig.is_in(State.POLICY):
+        assert policy.resets == 0
+        rig.step(FORWARD)
+    assert rig.positions == pytest.approx(STAND, abs=0.02)
+    rig.largest_step = 0.0
+    rig.run(2.0)
+    assert rig.positions == pytest.approx(CROUCHED)
+    assert rig.controller.status.title == 'policy'
+    assert rig.largest_step < 0.005
+    assert policy.resets == 1
+
+
+def test_a_policy_takes_over_from_another_standing() -> None:
+    """The former one winds down without a velocity; the new one gets it again."""
+    former, policy = good('former'), good('new', STANDING_LOW)
+    rig = standing(former, 'policy')
+    rig.run(1.0, FORWARD)
+    assert rig.controller.follow(policy).accepted
+    former.velocities.clear()
+    rig.step(FORWARD)
+    assert not rig.controller.follow(good('third')).accepted
+    assert rig.controller.status.title == 'policy'
+    rig.run(4.0, FORWARD)
+    assert rig.log == ['policy -> stand', 'stand -> policy']
+    assert all(velocity.at_rest for velocity in former.velocities)
+    assert policy.velocities[-1] == FORWARD
+    assert rig.positions == pytest.approx(STANDING_LOW)
+    assert rig.largest_step <= 10.0 * 1.5 * PERIOD + 1e-9
+
+
+def test_the_gait_takes_over_from_a_policy_standing() -> None:
+    """And walks on as commanded; no policy is loaded any more."""
+    rig = standing(good('former'), 'policy')
+    assert rig.controller.follow(None).message == 'stands, then follows the gait'
+    rig.run(4.0, FORWARD)
+    assert rig.is_in(State.WALK)
+    assert rig.controller.status.velocity == FORWARD
+    assert rig.controller.status.policy == ''
+    assert not rig.controller.set_mode('policy').accepted
+
+
+@pytest.mark.parametrize('end', ['stop', 'lie', 'fall'])
+def test_what_comes_between_ends_the_swap(end: str) -> None:
+    """The robot does not walk off afterwards; the mode policy follows the new one."""
+    former, policy = good('former'), good('new')
+    rig = standing(former, 'policy')
+    rig.run(1.0, FORWARD)
+    assert rig.controller.follow(policy).accepted
+    rig.run(0.1)
+    assert rig.is_in(State.POLICY)
+    if end == 'stop':
+        assert rig.controller.stop().accepted
+    elif end == 'lie':
+        rig.ask('lie')
+    else:
+        rig.imu = replace(tilted(0.0), angular_velocity=(9.0, 0.0, 0.0))
+    rig.run(6.0)
+    assert policy.resets == 0
+    assert rig.is_in({'stop': State.STAND, 'lie': State.LIE, 'fall': State.FAULT}[end])
+    assert rig.controller.policy is policy
+    if end == 'fall':
+        assert 'fall' in rig.controller.follow(good()).message
+
+
+def test_a_policy_that_fails_is_no_obstacle() -> None:
+    """The robot stands by the gait in between."""
+    former, policy = good('former'), good('new')
+    rig = standing(former, 'policy')
+    rig.run(1.0, FORWARD)
+    former.answer = PolicyStep(None, 'broken')
+    assert rig.controller.follow(policy).accepted
+    rig.run(4.0)
+    assert 'the policy was given up: broken' in rig.log
+    assert rig.is_in(State.POLICY)
+    assert policy.resets == 1
+
+
+def test_a_policy_that_misses_a_measurement_is_refused_before_the_robot_stands() -> None:
+    """What is followed goes on."""
+    rig = standing(mode='walk')
+    rig.imu = replace(tilted(0.0), angular_velocity=None)
+    rig.step()
+    answer = rig.controller.follow(good())
+    assert not answer.accepted
+    assert answer.message == 'stays as it is: a policy needs what /imu does not have'
+    assert rig.controller.policy is None
+    assert rig.is_in(State.WALK)
+
+
+def test_lying_it_is_loaded_and_nothing_moves() -> None:
+    """The mode policy follows it then."""
+    rig = standing()
+    rig.ask('lie')
+    rig.run(3.0)
+    before = rig.positions
+    assert 'the mode policy follows good' in rig.controller.follow(good()).message
+    rig.run(2.0)
+    assert rig.positions == before
+    rig.ask('policy')
+    rig.until(State.POLICY)
+
+
+def test_on_the_way_down_no_policy_is_taken() -> None:
+    """The request to lie down counts."""
+    rig = standing()
+    rig.ask('walk')
+    rig.run(1.0, FORWARD)
+    rig.ask('lie')
+    assert 'on its way to lie' in rig.controller.follow(good()).message
+
+
+def shipped() -> PolicyRunner:
+    """Return the policy that is shipped, anew."""
+    path = find_policy('trot_imitation')
+    stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
+    return load_policy(path, MODEL, stand, PolicyOptions(), PERIOD).runner
+
+
+@pytest.mark.slow
+def test_gait_policy_and_gait_walk_on_in_physics() -> None:
+    """From one to the other at 0.15 m/s, the robot goes on as commanded and stays level."""
+    rig = PhysicsRig()
+    rig.mode('walk')
+    rig.run(1.0, FORWARD)
+    for policy, state in (
+        (shipped(), State.POLICY),
+        (shipped(), State.POLICY),
+        (None, State.WALK),
+    ):
+        assert rig.controller.follow(policy).accepted
+        rig.run(5.0, FORWARD)
+        assert rig.controller.status.state is state
+        travel = rig.travel(4.0, FORWARD)
+        assert travel.x == pytest.approx(FORWARD.x, abs=0.03)
+        assert travel.tilt < 0.15
+    assert rig.controller.policy is None
