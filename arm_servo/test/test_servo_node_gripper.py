@@ -19,7 +19,7 @@ from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
 from arm_servo.ros.gripper.interfaces import ParallelGripper, SingleGripper
 from arm_servo.ros.gripper.parameters import GripperParameters
-from arm_servo.ros.group_motion import ToolMotion
+from arm_servo.ros.group_motion import set_tool_active
 from arm_servo.ros.trajectory.controller import TrajectoryController
 
 pytestmark = pytest.mark.slow
@@ -261,16 +261,14 @@ def test_a_deactivated_controller_moves_no_gripper() -> None:
     drives.attach()
     drives.run(2)
     node = SimpleNamespace(get_name=lambda: 'hand_controller')
-    tool: Any = object.__new__(ToolMotion)
-    tool.drives = SimpleNamespace(gateway=drives.gateway, prepare=lambda: None)
-    tool._controller = object.__new__(TrajectoryController)
-    vars(tool._controller).update(_node=node, _gateway=drives.gateway, active=True)
-    tool._controller.check_active()
+    controller = object.__new__(TrajectoryController)
+    vars(controller).update(_node=node, _gateway=drives.gateway, active=True)
+    controller.check_active()
     command = drives.gateway.request(TargetRequest({JOINT: 1.0}, 0.1))
     drives.run(20)
     assert not command.ended.done()
-    tool._set_active(False)
+    set_tool_active(controller, drives.gateway, False)
     drives.run(20)
     assert command.ended.result().canceled
     with pytest.raises(NotReadyError, match='hand_controller is inactive'):
-        tool._controller.check_active()
+        controller.check_active()

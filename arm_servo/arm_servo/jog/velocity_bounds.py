@@ -115,7 +115,7 @@ class VelocityBounds:
         """Name the bounds and rows that press, the strongest first.
 
         Args:
-            forces: How hard they press, of :class:`Solution`.
+            forces: How hard the bounds (n) and the rows (m) press, with the sense of the bound.
             factor: What is left of the asked speed.
         """
         count, share = len(self._limits), min(max(factor, 0.0), 1.0)

@@ -12,25 +12,27 @@ A quadratic program finds the joint speeds x that come nearest to the asked twis
 Held axes weigh more in W than commanded ones, so that what a limit takes away is taken from the
 command and not paid for by a drift. d_i damps the directions that are nearly lost, and only those;
 n is the way out of a singular pose; N x moves the joints but not the tool. Whatever the arm is in,
-standing still or leaving is feasible. The answer is then slowed as a whole to the joints' greatest
-speeds, which keeps its direction.
+standing still or leaving is feasible.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+import math
 
+import daqp
 import numpy as np
 
 from arm_model import Array, frozen, Mask, RobotModel, RobotState, turned_twists
 
 from ..report import Cause, Limiter, MotionReport
-from .box_qp import Program
 from .reach_limit import ReachLimit
 from .singularity import Directions, directions
 from .velocity_bounds import Bounds, VelocityBounds, VelocityBoundsSettings
 
 AXES = ('x', 'y', 'z', 'rotation x', 'rotation y', 'rotation z')  # names of the axes of a twist
+OPTIMAL = 1  # exit flag of daqp
+FREE = 1e30  # what daqp takes for no bound
 REGULARIZATION = 1e-5  # weight of the joint speeds that keeps the program definite
 
 SELF_MOTION_WEIGHT = 2e-3
@@ -72,15 +74,6 @@ class IkAnswer:
     report: MotionReport  # what limits them
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Weighted:
-    """A task with its weights: jacobian (k, n), command and correction (k)."""
-
-    jacobian: Array
-    command: Array
-    correction: Array
-
-
 class VelocityIk:
     """Velocity inverse kinematics of an arm.
 
@@ -111,30 +104,27 @@ class VelocityIk:
         weights = self._weights(task)
         bounds = self._velocity_bounds.bounds(state, period)
         # the directions of the weighted task: how well the command does while held axes stay
-        asked = _Weighted(
-            self._turned(state.position, task.axes, weights),
-            task.twist * weights,
-            task.correction * weights,
-        )
-        found = directions(asked.jacobian, asked.command, asked.correction, self._limits.velocity)
         position = state.position
+        jacobian = self._turned(position, task.axes, weights)
+        command, correction = task.twist * weights, task.correction * weights
+        found = directions(jacobian, command, correction, self._limits.velocity)
 
         def jacobian_at(other: Array) -> Array:
             return self._turned(other, task.axes, weights)
 
-        found = self._reach_limit.slowed(jacobian_at, position, found, asked.command)
-        hessian = asked.jacobian.T @ asked.jacobian
+        found = self._reach_limit.slowed(jacobian_at, position, found, command)
+        hessian = jacobian.T @ jacobian
         if found.damped:
             hessian += (found.joints.T * found.damping) @ found.joints
         if len(found.joints) < len(hessian):
             still = self._identity - found.joints.T @ found.joints
             hessian += SELF_MOTION_WEIGHT * still
-        gradient = -((asked.command + asked.correction) @ asked.jacobian)
-        way = self._reach_limit.way_out(jacobian_at, position, found, asked.command)
+        gradient = -((command + correction) @ jacobian)
+        way = self._reach_limit.way_out(jacobian_at, position, found, command)
         if way is not None:
             hessian += way.weight * np.outer(way.direction, way.direction)
             gradient -= (way.weight * way.speed) * way.direction
-        return self._answer(hessian, gradient, bounds, asked, found)
+        return self._answer(hessian, gradient, bounds, asked=(jacobian, command), found=found)
 
     def joints(
         self, state: RobotState, velocity: Array, commanded: Mask, period: float
@@ -147,10 +137,11 @@ class VelocityIk:
         """
         self._reach_limit.forget()
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
-        asked = _Weighted(np.diag(weight), weight * velocity, np.zeros(len(weight)))
-        hessian = np.diag(weight * weight)
+        jacobian, command = np.diag(weight), weight * velocity
         bounds = self._velocity_bounds.bounds(state, period)
-        return self._answer(hessian, -(weight * weight * velocity), bounds, asked, None)
+        return self._answer(
+            jacobian * jacobian, -weight * command, bounds, asked=(jacobian, command)
+        )
 
     def _weights(self, task: TwistTask) -> Array:
         """Return the weights of the axes; they change only with what is commanded."""
@@ -170,32 +161,46 @@ class VelocityIk:
         hessian: Array,
         gradient: Array,
         bounds: Bounds,
-        asked: _Weighted,
-        found: Directions | None,
+        *,
+        asked: tuple[Array, Array],
+        found: Directions | None = None,
     ) -> IkAnswer:
-        """Solve, slow down to the joints' speeds, and say what limits."""
+        """Solve, and name what limits; ``asked`` are weighted Jacobian and command."""
+        jacobian, command = asked
         hessian += self._regularization
-        lower, upper, rows, least = bounds.lower, bounds.upper, bounds.rows, bounds.least
-        solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+        rows = bounds.rows, bounds.least
+        solution = _minimum(hessian, gradient, (bounds.lower, bounds.upper), *rows)
         if solution is None:  # too fast for the rows; standing still is feasible
-            lower, upper = np.minimum(lower, 0.0), np.maximum(upper, 0.0)
-            solution = Program(hessian, gradient, lower, upper, rows, least).solve()
+            box = np.minimum(bounds.lower, 0.0), np.maximum(bounds.upper, 0.0)
+            solution = _minimum(hessian, gradient, box, *rows)
         if solution is None:
             stuck = Limiter(Cause.SOLVER, 'no answer; standing still', 0.0, 0.0)
             return IkAnswer(np.zeros(len(gradient)), MotionReport(0.0, (stuck,)))
-        velocity, command = solution.values, asked.command
-        excess = np.abs(velocity) / self._limits.velocity
-        fastest = int(excess.argmax())
-        slowed = 1.0 / max(1.0, float(excess[fastest]))
+        velocity, forces = solution
         size = float(command @ command)
-        factor = float(command @ (asked.jacobian @ velocity)) * slowed / size if size else 1.0
-        limiters = self._velocity_bounds.pressing(bounds, solution.forces, factor)
-        if slowed < 0.999:
-            name, needed = self._limits.names[fastest], float(abs(velocity[fastest]))
-            limiters.append(Limiter(Cause.JOINT_VELOCITY, name, needed, slowed))
+        factor = float(command @ (jacobian @ velocity)) / size if size else 1.0
+        limiters = self._velocity_bounds.pressing(bounds, forces, factor)
         if found is not None and size:
             limiters += _losses(found, command, factor)
-        return IkAnswer(velocity * slowed, MotionReport(factor, tuple(limiters)))
+        return IkAnswer(velocity, MotionReport(factor, tuple(limiters)))
+
+
+def _minimum(
+    hessian: Array, gradient: Array, box: tuple[Array, Array], rows: Array, least: Array
+) -> tuple[Array, Array] | None:
+    """Minimise x'Hx/2 + g'x with x in a box and rows x >= least, by daqp.
+
+    Returns:
+        The variables (n), and how hard each bound (n), then each row (m) presses: above zero where
+        the upper bound presses, below zero where the lower one does. None where no x is feasible.
+    """
+    lower, upper = box
+    above = np.concatenate((upper, np.full(len(least), FREE)))
+    below = np.concatenate((lower, least))
+    values, _, flag, info = daqp.solve(hessian, gradient, rows, above, below)
+    if flag != OPTIMAL or not math.isfinite(values.sum()):
+        return None
+    return np.minimum(np.maximum(values, lower), upper), np.array(info['lam'])
 
 
 def _losses(found: Directions, command: Array, factor: float) -> list[Limiter]:

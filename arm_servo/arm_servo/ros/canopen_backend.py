@@ -22,7 +22,7 @@ from ..core.settings import CoreSettings
 from ..exceptions import BackendError
 from ..io.drive_source import DriveSource
 from .controller_manager import ControllerManager, declare_manager
-from .group_motion import MakeNode, Offers, RobotMotion
+from .group_motion import build_groups, by_check, MakeNode, Offers
 from .joint_state_broadcaster import JointStateBroadcaster
 from .other_programs import watch_other_programs
 from .parameter_check import check_names
@@ -116,12 +116,14 @@ class CanopenMotion:
         main = models.arms[0]
         name, broadcasts = declare_manager(manager, main)
 
-        def on_bus(_: Node, model: RobotModel, settings: CoreSettings) -> BusDrives:
-            return BusDrives(self._master, model, settings)
+        self._drives: list[BusDrives] = []
 
-        robot = RobotMotion.build(models, name, make_node, offers, on_bus)
-        self._drives = robot.drives
-        SceneListener(manager, robot.checked, robot.unchecked)
+        def on_bus(_: Node, model: RobotModel, settings: CoreSettings) -> BusDrives:
+            self._drives.append(BusDrives(self._master, model, settings))
+            return self._drives[-1]
+
+        groups = build_groups(models, name, make_node, offers, on_bus)
+        SceneListener(manager, *by_check(groups))
         broadcaster = make_node('joint_state_broadcaster')
         self._broadcaster = JointStateBroadcaster(
             broadcaster,
@@ -130,8 +132,9 @@ class CanopenMotion:
             _mimics(manager),
             active=broadcasts,
         )
-        self.nodes = [manager, *robot.nodes, broadcaster]
-        entries = robot.entries(self._master.bus.master.sync_period)
+        self.nodes = [manager, *(node for each in groups for node in each.nodes), broadcaster]
+        period = self._master.bus.master.sync_period
+        entries = [entry for group in groups for entry in group.entries(period)]
         self._switch = ControllerManager(manager, [*entries, self._broadcaster.entry()])
         check_names(self.nodes)
         for note in models.notes:

@@ -98,18 +98,3 @@ class ControllerManager:
         controller.set_active(active)
         word = 'active' if active else 'inactive'
         self._node.get_logger().info(f'{controller.name} is {word}')
-
-
-def trajectory_entry(
-    name: str, joints: Sequence[str], period: float, set_active: Callable[[bool], None]
-) -> Controller:
-    """Return the trajectory controller as MoveIt and rqt look for it.
-
-    Args:
-        period: Period of its cycle in [s]; 0 is unknown.
-        set_active: Called when it is switched.
-    """
-    interfaces = [f'{joint}/position' for joint in joints]
-    kind = 'joint_trajectory_controller/JointTrajectoryController'
-    rate = round(1.0 / period) if period else 0
-    return Controller(name, kind, rate, set_active, interfaces)

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from functools import partial
+from typing import Protocol
 
 from rclpy.node import Node
 
@@ -18,13 +19,15 @@ from ..core.gateway import CommandGateway
 from ..core.requests import StopRequest
 from ..core.set_point import Source
 from ..core.settings import CoreSettings
-from .controller_manager import Controller, trajectory_entry
+from .controller_manager import Controller
 from .gripper.controller import GripperController
 from .gripper.parameters import declare_gripper
 from .servo.node import Servo
 from .servo.parameters import declare_servo, PREFIX, ServoParameters
 from .trajectory.controller import TrajectoryController
 from .trajectory.parameters import declare_check, declare_trajectory, TrajectoryParameters
+
+TRAJECTORY_KIND = 'joint_trajectory_controller/JointTrajectoryController'
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,61 +54,61 @@ class Drives(Protocol):
         ...
 
 
-AnyDrives = TypeVar('AnyDrives', bound=Drives)
-MakeDrives = Callable[[Node, RobotModel, CoreSettings], AnyDrives]
+MakeDrives = Callable[[Node, RobotModel, CoreSettings], Drives]
 """Builds the core of a group over its drives; its first node may say how."""
+
 MakeNode = Callable[[str], Node]  # makes the node of a name
 
 
-class ArmMotion(Generic[AnyDrives]):
-    """An arm: a trajectory controller and a servo, or one of both.
+@dataclass(frozen=True, slots=True)
+class MovedGroup:
+    """A group of a robot, its core and the nodes that command it."""
 
-    Attributes:
-        drives: Its drives.
-        nodes: Its nodes.
-    """
-
-    def __init__(
-        self,
-        model: RobotModel,
-        controller: Node | None,
-        servo: Node | None,
-        make_drives: MakeDrives[AnyDrives],
-    ) -> None:
-        """Offer what there are nodes for.
-
-        Args:
-            controller: Node of the trajectory controller; None for none.
-            servo: Node of the servo, with the robot declared; None for none.
-
-        Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            ModelError: The parameters do not fit the arm.
-        """
-        self.nodes: Sequence[Node] = [node for node in (controller, servo) if node is not None]
-        trajectory = (
-            None
-            if controller is None
-            else declare_trajectory(controller, model.joints, model.limits)
-        )
-        jogging = None if servo is None else declare_servo(servo, model)
-        check = trajectory.check if trajectory is not None else _check_of_servo(servo)
-        self.drives = drives = make_drives(
-            self.nodes[0], model, _settings(trajectory, jogging, check=check)
-        )
-        if servo is not None and jogging is not None:
-            self._servo = Servo(servo, drives.gateway, jogging, drives.prepare)
-        self._controller: TrajectoryController | None = None
-        if controller is not None and trajectory is not None:
-            self._controller = TrajectoryController(
-                controller, drives.gateway, trajectory, drives.prepare
-            )
+    nodes: Sequence[Node]
+    gateway: CommandGateway  # commands to the core
+    set_active: Callable[[bool], None] | None  # of the trajectory controller, if there is one
+    is_checked: bool = True  # whether the group is checked for collision
 
     def entries(self, period: float) -> list[Controller]:
-        """Return the trajectory controller, if there is one, as the manager shows it."""
-        if self._controller is None:
+        """Return the trajectory controller, if there is one, as MoveIt and rqt look for it.
+
+        Args:
+            period: Period of its cycle in [s]; 0 is unknown.
+        """
+        if self.set_active is None:
             return []
-        return [_entry(self.nodes[0], self.drives, period, self._controller.set_active)]
+        interfaces = [f'{joint}/position' for joint in self.gateway.model.joints]
+        rate = round(1.0 / period) if period else 0
+        name = self.nodes[0].get_name()
+        return [Controller(name, TRAJECTORY_KIND, rate, self.set_active, interfaces)]
+
+
+def build_arm(
+    model: RobotModel, controller: Node | None, servo: Node | None, make_drives: MakeDrives
+) -> MovedGroup:
+    """Offer a trajectory controller and a servo, or one of both.
+
+    Args:
+        controller: Node of the trajectory controller; None for none.
+        servo: Node of the servo, with the robot declared; None for none.
+
+    Raises:
+        ParameterError: A parameter is misspelt, of another kind or out of its range.
+        ModelError: The parameters do not fit the arm.
+    """
+    nodes = [node for node in (controller, servo) if node is not None]
+    trajectory = (
+        None if controller is None else declare_trajectory(controller, model.joints, model.limits)
+    )
+    jogging = None if servo is None else declare_servo(servo, model)
+    check = trajectory.check if trajectory is not None else _check_of_servo(servo)
+    drives = make_drives(nodes[0], model, _settings(trajectory, jogging, check=check))
+    if servo is not None and jogging is not None:
+        Servo(servo, drives.gateway, jogging, drives.prepare)
+    if controller is None or trajectory is None:
+        return MovedGroup(nodes, drives.gateway, None)
+    following = TrajectoryController(controller, drives.gateway, trajectory, drives.prepare)
+    return MovedGroup(nodes, drives.gateway, following.set_active)
 
 
 def _check_of_servo(servo: Node | None) -> bool:
@@ -126,137 +129,78 @@ def _settings(
     )
 
 
-class ToolMotion(Generic[AnyDrives]):
-    """An end effector: a gripper and a trajectory controller on one node.
+def build_tool(model: RobotModel, node: Node, make_drives: MakeDrives) -> MovedGroup:
+    """Offer a gripper and a trajectory controller of an end effector on one node.
 
     Its links may touch, as a gripper holds something, unless ``check_self_collision`` is set.
 
-    Attributes:
-        drives: Its drives.
-        nodes: Its node.
-        checks: Whether its motions are checked for collision.
+    Raises:
+        ParameterError: A parameter is misspelt, of another kind or out of its range.
+        ModelError: The core cannot move it.
     """
+    trajectory = declare_trajectory(node, model.joints, checks=False)
+    gripper = declare_gripper(node)
+    settings = CoreSettings(
+        execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
+    )
+    drives = make_drives(node, model, settings)
+    gateway, prepare = drives.gateway, drives.prepare
+    controller = TrajectoryController(node, gateway, trajectory, prepare)
+    GripperController(node, gateway, gripper, controller.check_active, prepare)
+    set_active = partial(set_tool_active, controller, gateway)
+    return MovedGroup((node,), gateway, set_active, is_checked=trajectory.check)
 
-    def __init__(
-        self, model: RobotModel, controller: Node, make_drives: MakeDrives[AnyDrives]
-    ) -> None:
-        """Offer both.
 
-        Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            ModelError: The core cannot move it.
-        """
-        trajectory = declare_trajectory(controller, model.joints, checks=False)
-        gripper = declare_gripper(controller)
-        settings = CoreSettings(
-            execution=trajectory.execution, clearance=None, check_self_collision=trajectory.check
+def set_tool_active(
+    controller: TrajectoryController, gateway: CommandGateway, active: bool
+) -> None:
+    """Take trajectories and gripper goals, or come to rest and take none."""
+    controller.set_active(active)
+    if not active:
+        gateway.command(StopRequest('the controller was deactivated', (Source.TARGET,)))
+
+
+def build_groups(
+    models: GroupModels, main: str, make_node: MakeNode, offers: Offers, make_drives: MakeDrives
+) -> list[MovedGroup]:
+    """Make the nodes and cores of all groups, the main arm first; nothing moves yet.
+
+    Args:
+        main: Name of the main arm's trajectory controller; that of another group is
+            ``<group>_controller``.
+
+    Raises:
+        ParameterError: A parameter is misspelt, of another kind or out of its range.
+        ModelError: The parameters do not fit a group, or two controllers have one name.
+    """
+    first, *others = models.arms
+    names = [f'{model.group}_controller' for model in (*others, *models.tools)]
+    if main in names:  # each goal would reach both
+        raise ModelError(
+            f'controller_name {main}: another group of this robot has a controller of that'
+            ' name; choose another one, or let it be named after its group'
         )
-        self.checks = trajectory.check
-        self.nodes: Sequence[Node] = (controller,)
-        self.drives = drives = make_drives(controller, model, settings)
-        self._controller = TrajectoryController(
-            controller, drives.gateway, trajectory, drives.prepare
-        )
-        self._gripper = GripperController(
-            controller, drives.gateway, gripper, self._controller.check_active, drives.prepare
-        )
 
-    def entries(self, period: float) -> list[Controller]:
-        """Return the controller as the manager shows it."""
-        return [_entry(self.nodes[0], self.drives, period, self._set_active)]
+    def arm(model: RobotModel, controller: str, servo: str) -> MovedGroup:
+        trajectories = make_node(controller) if offers.trajectories else None
+        jogging = make_node(servo) if offers.jogging else None
+        if jogging is not None:
+            same_robot(jogging, model)
+        return build_arm(model, trajectories, jogging, make_drives)
 
-    def _set_active(self, active: bool) -> None:  # a callback of the manager
-        self._controller.set_active(active)
-        if not active:
-            stop = StopRequest('the controller was deactivated', (Source.TARGET,))
-            self.drives.gateway.command(stop)
+    return [
+        arm(first, main, 'servo_node'),
+        *(arm(each, f'{each.group}_controller', f'{each.group}_servo_node') for each in others),
+        *(
+            build_tool(each, make_node(f'{each.group}_controller'), make_drives)
+            for each in models.tools
+        ),
+    ]
 
 
-@dataclass(frozen=True, slots=True)
-class RobotMotion(Generic[AnyDrives]):
-    """The groups of a robot that are moved, each by itself."""
-
-    arms: Sequence[ArmMotion[AnyDrives]]  # the arms, the main one first
-    tools: Sequence[ToolMotion[AnyDrives]]  # the end effectors
-
-    @classmethod
-    def build(
-        cls,
-        models: GroupModels,
-        main: str,
-        make_node: MakeNode,
-        offers: Offers,
-        make_drives: MakeDrives[AnyDrives],
-    ) -> RobotMotion[AnyDrives]:
-        """Make the nodes and cores of all groups; nothing moves yet.
-
-        Args:
-            main: Name of the main arm's trajectory controller; that of another group is
-                ``<group>_controller``.
-            make_drives: Builds the cores.
-
-        Raises:
-            ParameterError: A parameter is misspelt, of another kind or out of its range.
-            ModelError: The parameters do not fit a group, or two controllers have one name.
-        """
-        first, *others = models.arms
-        names = [f'{model.group}_controller' for model in (*others, *models.tools)]
-        if main in names:  # each goal would reach both
-            raise ModelError(
-                f'controller_name {main}: another group of this robot has a controller of that'
-                ' name; choose another one, or let it be named after its group'
-            )
-
-        def arm(model: RobotModel, controller: str, servo: str) -> ArmMotion[AnyDrives]:
-            trajectories = make_node(controller) if offers.trajectories else None
-            jogging = make_node(servo) if offers.jogging else None
-            if jogging is not None:
-                same_robot(jogging, model)
-            return ArmMotion(model, trajectories, jogging, make_drives)
-
-        arms = [arm(first, main, 'servo_node')]
-        arms += [
-            arm(model, f'{model.group}_controller', f'{model.group}_servo_node')
-            for model in others
-        ]
-        tools = [
-            ToolMotion(model, make_node(f'{model.group}_controller'), make_drives)
-            for model in models.tools
-        ]
-        return cls(arms, tools)
-
-    @property
-    def drives(self) -> list[AnyDrives]:
-        """The drives of each group, the main arm's first."""
-        return [group.drives for group in self._groups]
-
-    @property
-    def nodes(self) -> list[Node]:
-        """The nodes of all groups."""
-        return [node for group in self._groups for node in group.nodes]
-
-    @property
-    def checked(self) -> list[CommandGateway]:
-        """Commands to the cores of the groups that are checked for collision."""
-        tools = [tool.drives.gateway for tool in self.tools if tool.checks]
-        return [*(arm.drives.gateway for arm in self.arms), *tools]
-
-    @property
-    def unchecked(self) -> list[CommandGateway]:
-        """The same of the other groups, which the checked ones may meet."""
-        return [tool.drives.gateway for tool in self.tools if not tool.checks]
-
-    def entries(self, period: float) -> list[Controller]:
-        """Return the controllers as the manager shows them."""
-        return [entry for group in self._groups for entry in group.entries(period)]
-
-    @property
-    def _groups(self) -> Sequence[ArmMotion[AnyDrives] | ToolMotion[AnyDrives]]:
-        return (*self.arms, *self.tools)
-
-
-def _entry(
-    node: Node, drives: Drives, period: float, set_active: Callable[[bool], None]
-) -> Controller:
-    joints = drives.gateway.model.joints
-    return trajectory_entry(node.get_name(), joints, period, set_active)
+def by_check(groups: Sequence[MovedGroup]) -> tuple[list[CommandGateway], list[CommandGateway]]:
+    """Return the gateways of the groups that are checked for collision, and of the others."""
+    checked, others = (
+        [each.gateway for each in groups if each.is_checked is wanted] for wanted in (True, False)
+    )
+    return checked, others

@@ -33,7 +33,7 @@ from ..io.joint_feedback import JointFeedback
 from ..io.motion_thread import MotionCycle, MotionThread
 from ..io.topic_output import ARRAY, declare_output, TopicOutput, TRAJECTORY
 from .controller_manager import ControllerManager, declare_manager
-from .group_motion import ArmMotion, MakeNode, Offers, RobotMotion
+from .group_motion import build_arm, build_groups, by_check, MakeNode, Offers
 from .other_programs import watch_other_programs
 from .parameter_check import check_names
 from .scene_listener import SceneListener
@@ -141,16 +141,21 @@ def build_motion(make_node: MakeNode, offers: Offers) -> Sequence[MotionThread]:
     main = models.arms[0]
     name, _ = declare_manager(manager, main)
 
+    drives: list[TopicDrives] = []
+
     def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
         topic = ARRAY_TOPIC if model is main else f'{model.group}_{ARRAY_TOPIC}'
-        return TopicDrives(node, model, settings, output=(topic, ARRAY))
+        drives.append(TopicDrives(node, model, settings, output=(topic, ARRAY)))
+        return drives[-1]
 
-    robot = RobotMotion.build(models, name, make_node, offers, make_drives)
-    first = robot.drives[0]
-    SceneListener(manager, robot.checked, robot.unchecked, joint_topic=first.joint_topic)
-    ControllerManager(manager, robot.entries(first.period))
-    watch_other_programs([manager, *robot.nodes], [drives.topic for drives in robot.drives])
-    return [drives.thread for drives in robot.drives]
+    groups = build_groups(models, name, make_node, offers, make_drives)
+    checked, unchecked = by_check(groups)
+    SceneListener(manager, checked, unchecked, joint_topic=drives[0].joint_topic)
+    entries = [entry for group in groups for entry in group.entries(drives[0].period)]
+    ControllerManager(manager, entries)
+    nodes = [node for group in groups for node in group.nodes]
+    watch_other_programs([manager, *nodes], [each.topic for each in drives])
+    return [each.thread for each in drives]
 
 
 def _beside_a_controller(servo: Node) -> MotionThread:
@@ -160,13 +165,17 @@ def _beside_a_controller(servo: Node) -> MotionThread:
         servo.get_logger().warning(note)
     topic = f'{model.group}_controller/joint_trajectory'
 
-    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
-        return TopicDrives(node, model, settings, prefix=PREFIX, output=(topic, TRAJECTORY))
+    drives: list[TopicDrives] = []
 
-    drives = ArmMotion(model, None, servo, make_drives).drives
-    SceneListener(servo, [drives.gateway], joint_topic=drives.joint_topic)
-    watch_other_programs([servo], [drives.topic])
-    return drives.thread
+    def make_drives(node: Node, model: RobotModel, settings: CoreSettings) -> TopicDrives:
+        output = (topic, TRAJECTORY)
+        drives.append(TopicDrives(node, model, settings, prefix=PREFIX, output=output))
+        return drives[-1]
+
+    build_arm(model, None, servo, make_drives)
+    SceneListener(servo, [drives[0].gateway], joint_topic=drives[0].joint_topic)
+    watch_other_programs([servo], [drives[0].topic])
+    return drives[0].thread
 
 
 class TopicDrives:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
-from typing import Any, Protocol
+from typing import Any
 
 from control_msgs.action import GripperCommand, ParallelGripperCommand
 from sensor_msgs.msg import JointState
@@ -25,29 +25,6 @@ class GripperState:
     measured: RobotState  # what was measured of them
     stalled: bool = False  # it does not move although it is not at the goal
     reached: bool = False  # it is at the goal
-
-
-class GripperInterface(Protocol):
-    """One of the actions."""
-
-    action: Any  # its type
-    name: str  # its name
-
-    def request(self, goal: Any, joints: Sequence[str]) -> TargetRequest:  # noqa: ANN401
-        """Return what a goal asks.
-
-        Raises:
-            CommandError: It does not fit the joints.
-        """
-
-    def asks_effort(self, goal: Any) -> bool:  # noqa: ANN401
-        """Whether a goal asks for a limit of effort."""
-
-    def feedback(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as feedback."""
-
-    def result(self, state: GripperState) -> Any:  # noqa: ANN401
-        """Return a state as result."""
 
 
 class SingleGripper:
@@ -119,6 +96,9 @@ class ParallelGripper:
             position=state.measured.position.tolist(),
             velocity=state.measured.velocity.tolist(),
         )
+
+
+GripperInterface = SingleGripper | ParallelGripper
 
 
 def _finite(positions: Mapping[str, float]) -> Mapping[str, float]:
