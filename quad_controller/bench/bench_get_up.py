@@ -45,19 +45,12 @@ MODEL = quadruped(URDF)
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a drop.
+    """What became of a drop."""
 
-    Attributes:
-        lay: Where it came to rest.
-        stood: Whether it stood in the end.
-        time: How long it took in [s].
-        words: What the controller answered or latched where it did not.
-    """
-
-    lay: Lying
-    stood: bool
-    time: float
-    words: str
+    lay: Lying  # where it came to rest
+    stood: bool  # whether it stood in the end
+    time: float  # how long it took in [s]
+    words: str  # what the controller answered or latched where it did not
 
 
 def attitude(random: np.random.Generator, side: Lying | None) -> Quaternion:
@@ -73,7 +66,6 @@ def fallen(seed: int, side: Lying | None) -> PhysicsBackend:
     """Return a robot that was dropped and came to rest.
 
     Args:
-        seed: Of everything random.
         side: With which side below it is dropped; None for any attitude.
     """
     random = np.random.default_rng(seed)
@@ -95,7 +87,6 @@ def get_up(seed: int, side: Lying | None = None, only: bool = False) -> Outcome:
     """Drop a robot, and let it get up.
 
     Args:
-        seed: Of everything random.
         side: With which side below it is dropped; None for any attitude.
         only: Do nothing where it came to rest on another side.
     """

@@ -112,7 +112,6 @@ def judge(folder: Path, policies: Mapping[str, Path], progress: Progress, durati
     Args:
         folder: For figures, and the policy that is better.
         policies: Files of those that were made, by their names.
-        progress: Says what is found.
         duration: Of each way in [s].
 
     Returns:

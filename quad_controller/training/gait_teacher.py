@@ -34,7 +34,6 @@ class GaitTeacher:
         """Return the joint targets in [rad].
 
         Args:
-            velocity: Velocity of the body.
             phase: Share of the period that has passed.
             tilt: Measured roll and pitch in [rad].
         """

@@ -30,34 +30,21 @@ TRIED = 0.2  # deviation of what the walker tries beside its answer, so that it 
 
 @dataclass(frozen=True, slots=True)
 class Lessons:
-    """How much is learned.
+    """How much is learned."""
 
-    Attributes:
-        rounds: Of walking and learning.
-        steps: Of each environment in each round.
-        epochs: How often all examples are seen in each round; the last has 3 times.
-    """
-
-    rounds: int = 6
-    steps: int = 250
-    epochs: int = 15
+    rounds: int = 6  # of walking and learning
+    steps: int = 250  # of each environment in each round
+    epochs: int = 15  # how often all examples are seen in each round; the last has 3 times
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What came of a round.
+    """What came of a round."""
 
-    Attributes:
-        number: Which one, from 1.
-        examples: How many there are.
-        error: Of the targets in [rad], root mean square.
-        falls: Of all environments in the round.
-    """
-
-    number: int
-    examples: int
-    error: float
-    falls: int
+    number: int  # which one, from 1
+    examples: int  # how many there are
+    error: float  # of the targets in [rad], root mean square
+    falls: int  # of all environments in the round
 
 
 class Imitation:
@@ -73,11 +60,8 @@ class Imitation:
         """Prepare it.
 
         Args:
-            actor: What learns.
             envs: Their observations end with the actions of the teacher.
-            lessons: How much.
             scale: What an action of one moves a joint by in [rad].
-            seed: Of everything that is drawn.
         """
         self.normaliser: Normaliser | None = None
         self._actor, self._envs, self._lessons, self._scale = actor, envs, lessons, scale

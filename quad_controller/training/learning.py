@@ -42,11 +42,7 @@ def train(
     """Train until the time is over.
 
     Args:
-        folder: For policies and curves.
         progress: Has the time, and shows how it goes.
-        seed: Of everything that is drawn.
-        environments: How many at once.
-        rounds: Of the imitation.
 
     Returns:
         The policies: what was imitated, and what practice made of it.

@@ -21,29 +21,16 @@ IR_VERSION = 8  # what ONNX Runtime 1.14 reads, and everything newer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layers:
-    """Fully connected layers with ELU between them; inputs are normalised.
+    """Fully connected layers with ELU between them; inputs are normalised."""
 
-    Attributes:
-        mean: Subtracted from the inputs.
-        deviation: The inputs are divided by it.
-        weights: One matrix for each layer, inputs by outputs.
-        biases: One row for each layer.
-    """
-
-    mean: Floats
-    deviation: Floats
-    weights: Sequence[Floats]
-    biases: Sequence[Floats]
+    mean: Floats  # subtracted from the inputs
+    deviation: Floats  # the inputs are divided by it
+    weights: Sequence[Floats]  # one matrix for each layer, inputs by outputs
+    biases: Sequence[Floats]  # one row for each layer
 
 
 def export(layers: Layers, path: Path, metadata: Mapping[str, str]) -> None:
-    """Write a network.
-
-    Args:
-        layers: What to write.
-        path: Where to.
-        metadata: Keys and texts for the file.
-    """
+    """Write a network."""
     tensors: dict[str, Floats] = {'mean': layers.mean, 'deviation': layers.deviation}
     nodes = [
         helper.make_node('Sub', ['obs', 'mean'], ['centred']),

@@ -29,19 +29,12 @@ STEPS_UNKNOWN = 1_000_000_000  # skrl wants to know how many; here the clock end
 
 @dataclass(frozen=True, slots=True)
 class Practised:
-    """What an update came of.
+    """What an update came of."""
 
-    Attributes:
-        steps: Of all environments so far.
-        reward: Mean reward of a second.
-        falls: In a minute of an environment.
-        share: Of the randomization.
-    """
-
-    steps: int
-    reward: float
-    falls: float
-    share: float
+    steps: int  # of all environments so far
+    reward: float  # mean reward of a second
+    falls: float  # in a minute of an environment
+    share: float  # of the randomization
 
 
 class Practice:
@@ -61,13 +54,7 @@ class Practice:
         """Prepare it.
 
         Args:
-            actor: What practises.
-            normaliser: Of its observations.
-            envs: Where.
-            randomization: What differs in the end.
-            period: Of a step in [s].
             curves: Folder for the files that TensorBoard reads.
-            seed: Of the environments.
         """
         self._envs, self._wrapped = envs, wrap_env(envs, wrapper='gymnasium', verbose=False)
         self._randomization, self._period, self._actor = randomization, period, actor

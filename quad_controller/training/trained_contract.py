@@ -27,7 +27,6 @@ def walking_values(
     """Return the contract of a policy that walks, as it is written into the file.
 
     Args:
-        names: Of the joints.
         stand: Their positions when the robot stands [rad].
         phase_period: Of the gait [s].
         kind: How the policy is made, for people.

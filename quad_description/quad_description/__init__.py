@@ -10,6 +10,9 @@ Where the feet are, and the joints for where they shall be::
     feet = robot.feet(list(pose_positions(Pose.STAND).values()))
     solutions = robot.solve(feet)
 
+Conventions: joint vectors are in the order of the URDF's movable joints in [rad]; points are in
+base_link in [m], x ahead, y left, z up; quaternions are x, y, z, w.
+
 Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
 """
 

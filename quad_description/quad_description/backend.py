@@ -17,15 +17,10 @@ if TYPE_CHECKING:
 
 
 class Backend(ABC):
-    """What gets joint targets and gives states, one period after the other.
+    """What gets joint targets and gives states, one period after the other."""
 
-    Attributes:
-        names: Joints in the order of states and targets.
-        period: Time that a step takes in [s].
-    """
-
-    names: tuple[str, ...]
-    period: float
+    names: tuple[str, ...]  # joints in the order of states and targets
+    period: float  # time that a step takes in [s]
 
     @abstractmethod
     def reset(self) -> RobotState:
@@ -72,7 +67,6 @@ class RecordedBackend(Backend):
         Args:
             names: Joints in the order of the states.
             states: In the order in which they were observed, at least one.
-            period: Between two of them in [s].
 
         Raises:
             ValueError: There is no state.

@@ -25,10 +25,6 @@ class Pose(Enum):
 def pose_positions(pose: Pose, arm: bool = False) -> dict[str, float]:
     """Return the joint positions of a pose.
 
-    Args:
-        pose: Which one.
-        arm: With the joints of the arm.
-
     Returns:
         Positions in [rad], for the gripper in [m], by the joint's name in the order of the URDF.
     """

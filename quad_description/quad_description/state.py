@@ -23,36 +23,22 @@ MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
 @dataclass(frozen=True, slots=True)
 class JointSample:
-    """Joints as they were measured, in the order of :attr:`.Quadruped.names`.
+    """Joints as they were measured, in the order of :attr:`.Quadruped.names`."""
 
-    Attributes:
-        positions: In [rad] or [m].
-        velocities: In [rad/s] or [m/s]; None when they are not measured.
-        time: When they were measured, on the clock of the back end in [s].
-        unmeasured: Places of the joints that no sensor measures; their positions are those that
-            were commanded last.
-    """
-
-    positions: tuple[float, ...]
-    velocities: tuple[float, ...] | None
-    time: float = 0.0
+    positions: tuple[float, ...]  # in [rad] or [m]
+    velocities: tuple[float, ...] | None  # in [rad/s] or [m/s]; None when they are not measured
+    time: float = 0.0  # when they were measured, on the clock of the back end in [s]
+    # places of the joints that no sensor measures; their positions are those that were commanded
+    # last
     unmeasured: tuple[int, ...] = ()
 
     def measured(self, names: Sequence[str]) -> dict[str, float]:
-        """Return the positions that are measured, by joint.
-
-        Args:
-            names: Joints of the robot.
-        """
+        """Return the positions that are measured, by joint."""
         positions = zip(names, self.positions, strict=True)
         return {name: p for i, (name, p) in enumerate(positions) if i not in self.unmeasured}
 
     def problem(self, count: int) -> str:
-        """Return what is wrong with it, nothing when it can be used.
-
-        Args:
-            count: How many joints there are.
-        """
+        """Return what is wrong with it, nothing when it can be used."""
         for what, values in (('positions', self.positions), ('velocities', self.velocities)):
             if values is None:
                 continue
@@ -65,22 +51,16 @@ class JointSample:
 
 @dataclass(frozen=True, slots=True)
 class ImuSample:
-    """The body's attitude and motion, in the body's frame.
+    """The body's attitude and motion, in the body's frame."""
 
-    Attributes:
-        orientation: Unit quaternion of the body in the world, x, y, z, w.
-        angular_velocity: In [rad/s]; None when it is not measured.
-        acceleration: Specific force in [m/s^2]: +9.81 along z at rest (REP 145); None when it is
-            not measured.
-        deviation: Standard deviation of roll or pitch, the larger one, in [rad]; 0 when it is not
-            known. A heading is only held against itself, so that of yaw does not matter.
-        rate_differentiated: The angular velocity is the orientation's derivative, not a gyro's.
-    """
-
-    orientation: Quaternion
-    angular_velocity: Vector | None
+    orientation: Quaternion  # unit quaternion of the body in the world, x, y, z, w
+    angular_velocity: Vector | None  # in [rad/s]; None when it is not measured
+    # specific force in [m/s^2]: +9.81 along z at rest (REP 145); None when it is not measured
     acceleration: Vector | None
+    # Standard deviation of roll or pitch, the larger one, in [rad]; 0 when it is not known. A
+    # heading is only held against itself, so that of yaw does not matter.
     deviation: float = 0.0
+    # the angular velocity is the orientation's derivative, not a gyro's
     rate_differentiated: bool = False
 
     @property
@@ -115,24 +95,18 @@ class ImuSample:
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """State of a robot, as far as it is new; what every back end observes.
+    """State of a robot, as far as it is new; what every back end observes."""
 
-    Attributes:
-        joints: The newest joint states, None when there were none.
-        imu: The newest attitude, None when there was none or the IMU is of no use.
-        battery: Charge 0 to 1, None while it is unknown.
-        position: Of base_link in the world in [m]; None where the back end does not know it.
-        linear_velocity: Of base_link in its own frame in [m/s]; None where nobody estimates it.
-        foot_contacts: Which feet are on the ground, in the order of :data:`.FEET`; None where
-            nobody estimates it.
-        time: When it was measured, on the clock of the back end in [s]; the joints may have been
-            measured before.
-    """
-
-    joints: JointSample | None = None
+    joints: JointSample | None = None  # the newest joint states, None when there were none
+    # the newest attitude, None when there was none or the IMU is of no use
     imu: ImuSample | None = None
-    battery: float | None = None
+    battery: float | None = None  # charge 0 to 1, None while it is unknown
+    # of base_link in the world in [m]; None where the back end does not know it
     position: Vector | None = None
+    # of base_link in its own frame in [m/s]; None where nobody estimates it
     linear_velocity: Vector | None = None
+    # which feet are on the ground, in the order of :data:`.FEET`; None where nobody estimates it
     foot_contacts: tuple[bool, ...] | None = None
+    # when it was measured, on the clock of the back end in [s]; the joints may have been measured
+    # before
     time: float = 0.0

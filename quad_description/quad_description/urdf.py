@@ -30,19 +30,12 @@ MOVABLE = frozenset({JointKind.REVOLUTE, JointKind.CONTINUOUS, JointKind.PRISMAT
 
 @dataclass(frozen=True, slots=True)
 class JointLimits:
-    """Range of a joint.
+    """Range of a joint."""
 
-    Attributes:
-        lower: Smallest position in [rad] or [m].
-        upper: Largest position in [rad] or [m].
-        velocity: Largest speed in [rad/s] or [m/s].
-        effort: Largest torque in [N m] or force in [N].
-    """
-
-    lower: float = -math.inf
-    upper: float = math.inf
-    velocity: float = math.inf
-    effort: float = math.inf
+    lower: float = -math.inf  # smallest position in [rad] or [m]
+    upper: float = math.inf  # largest position in [rad] or [m]
+    velocity: float = math.inf  # largest speed in [rad/s] or [m/s]
+    effort: float = math.inf  # largest torque in [N m] or force in [N]
 
     def clamp(self, position: float) -> float:
         """Return the nearest position within the range."""
@@ -51,29 +44,18 @@ class JointLimits:
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint; the child's frame sits in the parent's at ``position``, turned by ``rotation``.
+    """A joint; the child's frame sits in the parent's at ``position``, turned by ``rotation``."""
 
-    Attributes:
-        name: Name in the URDF.
-        kind: Its type.
-        parent: Link that it is fixed to.
-        child: Link that it moves.
-        position: Origin in the parent's frame in [m].
-        rotation: From the child's frame at zero to the parent's.
-        axis: Unit vector of the motion in the child's frame.
-        limits: Its range; unlimited where the joint takes no commands and the URDF has none.
-        mimics: Whether it follows another joint.
-    """
-
-    name: str
-    kind: JointKind
-    parent: str
-    child: str
-    position: Vector
-    rotation: Quaternion
-    axis: Vector
+    name: str  # name in the URDF
+    kind: JointKind  # its type
+    parent: str  # link that it is fixed to
+    child: str  # link that it moves
+    position: Vector  # origin in the parent's frame in [m]
+    rotation: Quaternion  # from the child's frame at zero to the parent's
+    axis: Vector  # unit vector of the motion in the child's frame
+    # its range; unlimited where the joint takes no commands and the URDF has none
     limits: JointLimits
-    mimics: bool
+    mimics: bool  # whether it follows another joint
 
     @property
     def commanded(self) -> bool:
@@ -91,18 +73,12 @@ class PointMass:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A robot.
+    """A robot."""
 
-    Attributes:
-        links: Names of all links in the order of the URDF.
-        joints: All joints in the order of the URDF.
-        masses: Mass and centre of the links that have one, by name.
-        spheres: Radius of the first sphere of the links that have one, by name, in [m].
-    """
-
-    links: tuple[str, ...]
-    joints: tuple[Joint, ...]
-    masses: dict[str, PointMass]
+    links: tuple[str, ...]  # names of all links in the order of the URDF
+    joints: tuple[Joint, ...]  # all joints in the order of the URDF
+    masses: dict[str, PointMass]  # mass and centre of the links that have one, by name
+    # radius of the first sphere of the links that have one, by name, in [m]
     spheres: dict[str, float]
 
     @property
@@ -113,9 +89,6 @@ class Description:
 
 def parse(urdf: str) -> Description:
     """Read a URDF.
-
-    Args:
-        urdf: URDF as XML text.
 
     Raises:
         DescriptionError: It is no URDF, a number in it is none, or a joint that takes commands

@@ -33,8 +33,6 @@ def robot_at(
     """Return the back end of a robot that is as its URDF says.
 
     Args:
-        port: Device file.
-        urdf: What it is.
         protocols: What to try, in this order.
         imu_checked: Its IMU is mounted as in the URDF, and somebody has made sure of it; a
             simulated one is.
@@ -51,7 +49,6 @@ def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedB
 
     Args:
         log: Of a black box, or of the parameter ``serial_log`` of hardware_node.
-        urdf: What the robot is.
         imu_checked: As of :func:`robot_at`.
 
     Raises:
@@ -87,9 +84,6 @@ class SerialBackend(Backend):
 
     def __init__(self, settings: RobotSettings) -> None:
         """Prepare; :meth:`reset` opens the port.
-
-        Args:
-            settings: Which robot it is, and where.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.

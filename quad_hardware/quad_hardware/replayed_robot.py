@@ -31,19 +31,12 @@ from .serial_robot import RobotSettings
 
 @dataclass(slots=True)
 class _Conversation:
-    """A robot that was found.
+    """A robot that was found."""
 
-    Attributes:
-        opened: What it was found as.
-        dialect: How it was talked to.
-        robot: Finds frames in what it sent.
-        host: Finds frames in what was sent to it.
-    """
-
-    opened: Opened
-    dialect: Dialect[Any]
-    robot: StreamParser
-    host: StreamParser
+    opened: Opened  # what it was found as
+    dialect: Dialect[Any]  # how it was talked to
+    robot: StreamParser  # finds frames in what it sent
+    host: StreamParser  # finds frames in what was sent to it
 
 
 class ReplayedRobot:
@@ -68,7 +61,6 @@ class ReplayedRobot:
         """Begin without a robot.
 
         Args:
-            settings: Which robot it is.
             on_state: Takes each report as a state in SI units, without the position.
             on_change: Takes the state of the link when it changes, and its detail.
             on_refusal: Takes why a report cannot be.

@@ -34,27 +34,19 @@ LINK, ROBOT, COMMANDS = 'serial link', 'robot', 'joint commands'
 
 @dataclass(frozen=True, slots=True)
 class RobotSettings:
-    """Which robot it is, and how it is read and commanded.
+    """Which robot it is, and how it is read and commanded."""
 
-    Attributes:
-        link: Where the robot is.
-        urdf: What it is.
-        joints: Its servos.
-        limiter: How fast targets may move.
-        command_loss: What the robot does when commands break off with a leg in the air.
-        estimator: How its reports are read.
-        black_box: How the last bytes are written when a fault happens; None for not at all.
-        serial_log: Where all bytes are written to as they pass; None for nowhere.
-    """
-
-    link: LinkOptions
-    urdf: str
-    joints: JointMap
-    limiter: LimiterSettings = field(default_factory=LimiterSettings)
+    link: LinkOptions  # where the robot is
+    urdf: str  # what it is
+    joints: JointMap  # its servos
+    limiter: LimiterSettings = field(default_factory=LimiterSettings)  # how fast targets may move
+    # what the robot does when commands break off with a leg in the air
     command_loss: LossReaction = LossReaction.LIE
+    # how its reports are read
     estimator: EstimatorSettings = field(default_factory=EstimatorSettings)
+    # how the last bytes are written when a fault happens; None for not at all
     black_box: BlackBoxSettings | None = None
-    serial_log: Path | None = None
+    serial_log: Path | None = None  # where all bytes are written to as they pass; None for nowhere
 
 
 class SerialRobot:
@@ -81,7 +73,6 @@ class SerialRobot:
         """Prepare; :meth:`start` opens the port.
 
         Args:
-            settings: Which robot it is.
             on_state: Takes each report as a state in SI units, without the position.
             on_change: Takes the state of the link when it changes, and its detail.
             on_refusal: Takes why a report cannot be.

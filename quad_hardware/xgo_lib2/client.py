@@ -41,19 +41,12 @@ HOST_GAP = 0.001  # [s] between commands of protocol v1
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """What the IMU measures.
+    """What the IMU measures."""
 
-    Attributes:
-        roll: Attitude about x [deg].
-        pitch: Attitude about y [deg].
-        yaw: Attitude about z [deg].
-        acceleration: Specific force x, y, z [m/s²].
-    """
-
-    roll: float
-    pitch: float
-    yaw: float
-    acceleration: tuple[float, float, float]
+    roll: float  # attitude about x [deg]
+    pitch: float  # attitude about y [deg]
+    yaw: float  # attitude about z [deg]
+    acceleration: tuple[float, float, float]  # specific force x, y, z [m/s²]
 
 
 class XgoDog:
@@ -63,7 +56,6 @@ class XgoDog:
         """Open a port and look for the robot.
 
         Args:
-            port: Device file.
             baud: Speed [bit/s]; 0 tries 2 000 000, then 115 200.
 
         Raises:

@@ -21,29 +21,19 @@ from quad_hardware.protocol import (
 
 @dataclass(frozen=True, slots=True)
 class DeviceState:
-    """State of a robot at one moment, in the units of the wire.
+    """State of a robot at one moment, in the units of the wire."""
 
-    Attributes:
-        battery: Charge [%].
-        roll: Attitude about x [deg].
-        pitch: Attitude about y [deg].
-        yaw: Attitude about z [deg].
-        acceleration: Specific force x, y, z [m/s²]; about 9.8 in all at rest.
-        joint_pos_deg: 16 joint angles [deg], by :func:`xgo_lib2.registry.feedback_slot_of`.
-        joint_vel_deg_s: 16 joint velocities [deg/s], in the same order.
-        device_time_ms: Clock of the robot [ms].
-        sequence: Counts states modulo 2¹⁶.
-    """
-
-    battery: int
-    roll: float
-    pitch: float
-    yaw: float
+    battery: int  # charge [%]
+    roll: float  # attitude about x [deg]
+    pitch: float  # attitude about y [deg]
+    yaw: float  # attitude about z [deg]
+    # specific force x, y, z [m/s²]; about 9.8 in all at rest
     acceleration: tuple[float, float, float]
+    # 16 joint angles [deg], by :func:`xgo_lib2.registry.feedback_slot_of`
     joint_pos_deg: tuple[float, ...]
-    joint_vel_deg_s: tuple[float, ...]
-    device_time_ms: int
-    sequence: int
+    joint_vel_deg_s: tuple[float, ...]  # 16 joint velocities [deg/s], in the same order
+    device_time_ms: int  # clock of the robot [ms]
+    sequence: int  # counts states modulo 2¹⁶
 
 
 class SendStateParser:

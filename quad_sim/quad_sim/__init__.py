@@ -11,6 +11,10 @@ Physics in virtual time, without ROS, threads or a serial port (needs MuJoCo)::
     robot.set_targets({'fl_thigh_joint': 0.9})
     robot.step(0.02)
     print(robot.base_pose.tilt, robot.imu.specific_force)
+
+Conventions: ``now`` is the time of the simulation in [s], ``period`` the time of a step in [s];
+joints are in [rad], servo angles of the board in [deg] by motor id. Equal seeds repeat noise and
+damage.
 """
 
 from .exceptions import SetupError, SimulationError, TargetError

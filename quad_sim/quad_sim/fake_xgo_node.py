@@ -45,7 +45,6 @@ class FakeXgoNode(Node):
 
         Args:
             server: The loop in which the robot lives.
-            simulation: The robot.
         """
         super().__init__('fake_xgo')
         self._server, self._simulation = server, simulation
@@ -142,9 +141,6 @@ def serve_with_ros(
 
     Args:
         server: The loop in which the robot lives.
-        simulation: The robot.
-        ros_arguments: For rclpy.
-        report_ready: Called when the services are there.
 
     Raises:
         SimulationError: What ended the robot.

@@ -32,17 +32,11 @@ _NOISE = {'none': NONE, 'board': BOARD}
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A robot and its line, ready to be served.
+    """A robot and its line, ready to be served."""
 
-    Attributes:
-        plant: The robot.
-        board: Its board.
-        line: Its serial line.
-    """
-
-    plant: Plant
-    board: Board
-    line: RobotLine
+    plant: Plant  # the robot
+    board: Board  # its board
+    line: RobotLine  # its serial line
 
 
 def parse_arguments(argv: Sequence[str]) -> argparse.Namespace:

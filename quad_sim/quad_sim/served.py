@@ -48,15 +48,10 @@ class _Request(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """What was seen of a robot since :meth:`ServedRobot.begin`.
+    """What was seen of a robot since :meth:`ServedRobot.begin`."""
 
-    Attributes:
-        metered: Where it went, and what that cost.
-        timing: When its commands came.
-    """
-
-    metered: Metered
-    timing: CommandTiming
+    metered: Metered  # where it went, and what that cost
+    timing: CommandTiming  # when its commands came
 
 
 class ServedRobot:

@@ -15,23 +15,14 @@ from .velocity import approach
 
 @dataclass(frozen=True, slots=True)
 class BodyPose:
-    """A pose of the body relative to its normal one over the feet.
+    """A pose of the body relative to its normal one over the feet."""
 
-    Attributes:
-        x: Forward in [m].
-        y: To the left in [m].
-        z: Up in [m].
-        roll: About x in [rad].
-        pitch: About y, positive is nose down, in [rad].
-        yaw: About z in [rad].
-    """
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    roll: float = 0.0
-    pitch: float = 0.0
-    yaw: float = 0.0
+    x: float = 0.0  # forward in [m]
+    y: float = 0.0  # to the left in [m]
+    z: float = 0.0  # up in [m]
+    roll: float = 0.0  # about x in [rad]
+    pitch: float = 0.0  # about y, positive is nose down, in [rad]
+    yaw: float = 0.0  # about z in [rad]
 
     @property
     def finite(self) -> bool:
@@ -49,25 +40,15 @@ UPRIGHT = BodyPose()
 
 @dataclass(frozen=True, slots=True)
 class BodyLimits:
-    """How far and how fast the body may be moved over the feet.
+    """How far and how fast the body may be moved over the feet."""
 
-    Attributes:
-        shift: Along x and y in [m].
-        height: Along z, up and down, in [m].
-        roll: About x in [rad].
-        pitch: About y in [rad].
-        yaw: About z in [rad].
-        speed: Along all axes in [m/s].
-        turn_speed: About all axes in [rad/s].
-    """
-
-    shift: float = 0.025
-    height: float = 0.03
-    roll: float = 0.35
-    pitch: float = 0.3
-    yaw: float = 0.25
-    speed: float = 0.05
-    turn_speed: float = 0.8
+    shift: float = 0.025  # along x and y in [m]
+    height: float = 0.03  # along z, up and down, in [m]
+    roll: float = 0.35  # about x in [rad]
+    pitch: float = 0.3  # about y in [rad]
+    yaw: float = 0.25  # about z in [rad]
+    speed: float = 0.05  # along all axes in [m/s]
+    turn_speed: float = 0.8  # about all axes in [rad/s]
 
     def clamp(self, pose: BodyPose) -> BodyPose:
         """Return the nearest pose within the limits."""
@@ -96,7 +77,6 @@ def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list
 
     Args:
         feet: Feet in the frame of a body at its normal pose in [m].
-        pose: Where the body is instead.
         centre: Point that the body turns about in [m].
     """
     axes = axes_from_roll_pitch_yaw(pose.roll, pose.pitch, pose.yaw)
@@ -141,7 +121,6 @@ class Leveller:
         Args:
             attitude: Measured roll, pitch and yaw in [rad]; None lets the correction fade.
             pose: Pose that is requested; its own roll and pitch are no error.
-            dt: Duration of the step in [s].
         """
         roll = pitch = 0.0
         if attitude is not None:

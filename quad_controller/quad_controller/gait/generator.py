@@ -26,17 +26,11 @@ CLAMP_YAW = 0.02  # [rad/s]
 
 @dataclass(frozen=True, slots=True)
 class GaitStep:
-    """What one step gives.
+    """What one step gives."""
 
-    Attributes:
-        targets: Positions of all joints in [rad].
-        contacts: Which legs stand, in the order of :data:`quad_description.LEGS`.
-        reachable: Whether the feet are where they should be; else limits cut them off.
-    """
-
-    targets: Targets
-    contacts: tuple[bool, ...]
-    reachable: bool
+    targets: Targets  # positions of all joints in [rad]
+    contacts: tuple[bool, ...]  # which legs stand, in the order of :data:`quad_description.LEGS`
+    reachable: bool  # whether the feet are where they should be; else limits cut them off
 
 
 class GaitGenerator:
@@ -56,11 +50,6 @@ class GaitGenerator:
         self, robot: Quadruped, parameters: GaitParameters, others: Sequence[float] | None = None
     ) -> None:
         """Start standing.
-
-        Args:
-            robot: The robot.
-            parameters: Its tuning.
-            others: Positions of all joints, for those that are no legs' in [rad]; zero when None.
 
         Raises:
             DescriptionError: The legs do not reach the nominal height.
@@ -134,7 +123,6 @@ class GaitGenerator:
             velocity: Velocity that is requested; clamped and approached.
             pose: Pose of the body that is requested; clamped and approached.
             attitude: Measured roll, pitch and yaw in [rad], None when they are not known.
-            dt: Duration of the step in [s].
         """
         self._advance_velocity(velocity, dt)
         limits = self._parameters.body

@@ -34,7 +34,6 @@ class HeadingHold:
         Args:
             velocity: The one that is wanted; at rest the course is forgotten.
             heading: Measured yaw in [rad], None when it is not known.
-            dt: Duration of the step in [s].
         """
         if heading is None or velocity.at_rest or self._gain == 0.0:
             self._course = None

@@ -37,7 +37,6 @@ class SwingLift:
         Args:
             robot: Whose joints have limits of their speed.
             neutral: Where the feet are without motion, in the body's frame [m].
-            schedule: The gait.
             swing_height: How high a foot is lifted where the joints allow it [m].
         """
         self._robot, self._neutral, self._schedule = robot, neutral, schedule

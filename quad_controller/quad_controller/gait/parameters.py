@@ -19,45 +19,30 @@ from .velocity import VelocityLimits
 
 @dataclass(frozen=True, slots=True)
 class GaitParameters:
-    """Tuning of the gait; the defaults are those that walk with the XGO's dimensions.
+    """Tuning of the gait; the defaults are those that walk with the XGO's dimensions."""
 
-    Attributes:
-        max_linear_velocity_x: Forward and backward in [m/s]; its servos are at their speed there.
-        max_linear_velocity_y: To a side in [m/s].
-        max_angular_velocity_z: Turning in [rad/s].
-        linear_acceleration: Change of the linear velocity in [m/s^2].
-        angular_acceleration: Change of the turning in [rad/s^2].
-        nominal_height: Hip axes above the centres of the feet in [m].
-        stance_widening: Feet outwards from below the hips in [m]; pushes tip a wide stance less
-            often, and it goes less exactly as commanded.
-        com_x_translation: Feet ahead of the centre of mass in [m], when the URDF's is not true.
-        swing_height: How high a foot is lifted in [m].
-        stance_depth: How far a standing foot is pushed below the ground in [m].
-        stance_duration: How long a foot stands in [s]; 0 takes that of the gait.
-        duty: Share of the period that a foot stands; 0 takes that of the gait.
-        sway: Body to the side away from the lifted legs in [m]; negative takes that of the gait.
-        level_gain: Turns the body against the measured tilt, per tilt; 0 is off.
-        heading_gain: Corrects the turning by the measured heading, in [1/s]; 0 is off.
-        servo: What to compensate for; None for servos that are firm.
-        body: How far the body may be moved over the feet.
-    """
-
+    # forward and backward in [m/s]; its servos are at their speed there
     max_linear_velocity_x: float = 0.3
-    max_linear_velocity_y: float = 0.15
-    max_angular_velocity_z: float = 1.5
-    linear_acceleration: float = 1.0
-    angular_acceleration: float = 4.0
-    nominal_height: float = 0.085
+    max_linear_velocity_y: float = 0.15  # to a side in [m/s]
+    max_angular_velocity_z: float = 1.5  # turning in [rad/s]
+    linear_acceleration: float = 1.0  # change of the linear velocity in [m/s^2]
+    angular_acceleration: float = 4.0  # change of the turning in [rad/s^2]
+    nominal_height: float = 0.085  # hip axes above the centres of the feet in [m]
+    # feet outwards from below the hips in [m]; pushes tip a wide stance less often, and it goes
+    # less exactly as commanded
     stance_widening: float = 0.0
+    # feet ahead of the centre of mass in [m], when the URDF's is not true
     com_x_translation: float = 0.0
-    swing_height: float = 0.02
-    stance_depth: float = 0.0
-    stance_duration: float = 0.0
-    duty: float = 0.0
+    swing_height: float = 0.02  # how high a foot is lifted in [m]
+    stance_depth: float = 0.0  # how far a standing foot is pushed below the ground in [m]
+    stance_duration: float = 0.0  # how long a foot stands in [s]; 0 takes that of the gait
+    duty: float = 0.0  # share of the period that a foot stands; 0 takes that of the gait
+    # body to the side away from the lifted legs in [m]; negative takes that of the gait
     sway: float = -1.0
-    level_gain: float = 0.5
-    heading_gain: float = 2.0
-    servo: ServoModel | None = None
+    level_gain: float = 0.5  # turns the body against the measured tilt, per tilt; 0 is off
+    heading_gain: float = 2.0  # corrects the turning by the measured heading, in [1/s]; 0 is off
+    servo: ServoModel | None = None  # what to compensate for; None for servos that are firm
+    # how far the body may be moved over the feet
     body: BodyLimits = field(default_factory=BodyLimits)
 
     def __post_init__(self) -> None:
@@ -96,7 +81,6 @@ class GaitParameters:
         """Return where the feet of a robot at rest are, in base_link in [m].
 
         Args:
-            robot: The robot.
             others: Positions of all joints, for those that are no legs' in [rad].
 
         Raises:

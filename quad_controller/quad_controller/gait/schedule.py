@@ -22,19 +22,14 @@ class Schedule:
     """A gait; phases are shares of a period.
 
     A leg stands while its own phase (the gait's plus its offset) is below the duty.
-
-    Attributes:
-        offsets: Lead of each leg's phase, front left, front right, back left, back right.
-        stance_duration: How long a foot stays on the ground in [s].
-        duty: Share of the period that a foot stands.
-        sway: How far the body moves to the side away from the legs in the air in [m].
-        speed: Largest speed of a foot over the body that the gait keeps its balance at in [m/s].
     """
 
+    # lead of each leg's phase, front left, front right, back left, back right
     offsets: tuple[float, float, float, float]
-    stance_duration: float
-    duty: float
-    sway: float
+    stance_duration: float  # how long a foot stays on the ground in [s]
+    duty: float  # share of the period that a foot stands
+    sway: float  # how far the body moves to the side away from the legs in the air in [m]
+    # largest speed of a foot over the body that the gait keeps its balance at in [m/s]
     speed: float
 
     @property

@@ -21,31 +21,19 @@ GRAVITY = 9.81  # [m/s^2]
 
 @dataclass(frozen=True, slots=True)
 class ServoModel:
-    """A servo as a spring with a damper.
+    """A servo as a spring with a damper."""
 
-    Attributes:
-        kp: Stiffness in [N m/rad].
-        damping: Its own velocity gain and the joint's friction in [N m s/rad].
-        inertia: What a joint turns in [kg m^2].
-        mass: Weight that the legs carry in [kg]; 0 takes that of the URDF.
-    """
-
-    kp: float = 2.45
-    damping: float = 0.09
-    inertia: float = 0.001
-    mass: float = 0.0
+    kp: float = 2.45  # stiffness in [N m/rad]
+    damping: float = 0.09  # its own velocity gain and the joint's friction in [N m s/rad]
+    inertia: float = 0.001  # what a joint turns in [kg m^2]
+    mass: float = 0.0  # weight that the legs carry in [kg]; 0 takes that of the URDF
 
 
 class ServoCompensation:
     """Changes joint targets; costs one step of delay, since it looks one step ahead."""
 
     def __init__(self, robot: Quadruped, servo: ServoModel) -> None:
-        """Start without a past.
-
-        Args:
-            robot: The robot.
-            servo: Its servos.
-        """
+        """Start without a past."""
         self._robot = robot
         self._servo = servo
         self._weight = GRAVITY * (servo.mass or robot.mass)
@@ -66,8 +54,6 @@ class ServoCompensation:
 
         Args:
             targets: Where the joints shall be in [rad].
-            contacts: Which legs stand.
-            dt: Duration of the step in [s].
         """
         window = self._window
         window.append((targets, contacts))

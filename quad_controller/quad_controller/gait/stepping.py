@@ -56,9 +56,7 @@ class Stepper:
         """Start with all feet at their neutral places.
 
         Args:
-            schedule: The gait.
             neutral: Where the feet are without motion, in the body's frame in [m].
-            lift: How high a foot is lifted [m], by its velocity over the ground [m/s].
             depth: How far a standing foot is pushed below the ground in [m].
         """
         self.schedule = schedule
@@ -99,12 +97,7 @@ class Stepper:
         self._walking = False
 
     def step(self, velocity: Velocity, dt: float) -> list[Vector]:
-        """Advance and return the feet in the frame of a level body in [m].
-
-        Args:
-            velocity: Velocity of the body.
-            dt: Duration of the step in [s].
-        """
+        """Advance and return the feet in the frame of a level body in [m]."""
         if not self._walking and not velocity.at_rest:
             self._walking = True
             self._phase = 0.0

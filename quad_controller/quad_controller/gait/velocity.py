@@ -10,17 +10,11 @@ from typing import NamedTuple
 
 
 class Velocity(NamedTuple):
-    """A velocity of the body over ground, in the body's level frame.
+    """A velocity of the body over ground, in the body's level frame."""
 
-    Attributes:
-        x: Forward in [m/s].
-        y: To the left in [m/s].
-        yaw: Turning to the left in [rad/s].
-    """
-
-    x: float = 0.0
-    y: float = 0.0
-    yaw: float = 0.0
+    x: float = 0.0  # forward in [m/s]
+    y: float = 0.0  # to the left in [m/s]
+    yaw: float = 0.0  # turning to the left in [rad/s]
 
     def __str__(self) -> str:
         """Return it for people."""
@@ -46,25 +40,15 @@ REST = Velocity()
 
 @dataclass(frozen=True, slots=True)
 class VelocityLimits:
-    """What the robot can do.
+    """What the robot can do."""
 
-    Attributes:
-        x: Forward and backward in [m/s].
-        y: To a side in [m/s].
-        yaw: Turning in [rad/s].
-        acceleration: Change of x and y together in [m/s^2].
-        yaw_acceleration: Change of the turning in [rad/s^2].
-        dead_linear: Slower than this is standing in [m/s].
-        dead_yaw: Slower than this is no turning in [rad/s].
-    """
-
-    x: float
-    y: float
-    yaw: float
-    acceleration: float = 1.0
-    yaw_acceleration: float = 4.0
-    dead_linear: float = 0.002
-    dead_yaw: float = 0.01
+    x: float  # forward and backward in [m/s]
+    y: float  # to a side in [m/s]
+    yaw: float  # turning in [rad/s]
+    acceleration: float = 1.0  # change of x and y together in [m/s^2]
+    yaw_acceleration: float = 4.0  # change of the turning in [rad/s^2]
+    dead_linear: float = 0.002  # slower than this is standing in [m/s]
+    dead_yaw: float = 0.01  # slower than this is no turning in [rad/s]
 
     def clamp(self, velocity: Velocity) -> Velocity:
         """Return the velocity within the ellipse of x and y, with the same direction."""

@@ -37,12 +37,9 @@ class ControlLoop:
         """Prepare; the thread starts with :meth:`start`.
 
         Args:
-            controller: What to step.
-            period: Nominal time between two steps in [s].
-            publish: Takes every output, in the thread.
             fail: Takes what ended the thread, in the thread.
-            record: Takes every output after it was published, in the thread, with the time
-                since the step before, that of the step, and from feedback to command in [s].
+            record: Takes every output after it was published, in the thread, with the time since
+                the step before, that of the step, and from feedback to command in [s].
         """
         self.lock = threading.Lock()
         self._controller, self._period = controller, period

@@ -90,12 +90,7 @@ class CommandFilter:
     """
 
     def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
-        """Begin with a robot that has not moved.
-
-        Args:
-            robot: The robot.
-            others_move: Whether joints that are no legs' will be sent elsewhere, ever.
-        """
+        """Begin with a robot that has not moved."""
         legs = len(robot.names) - len(robot.others)
         legs_first = all(index >= legs for index in robot.others)
         self._count = legs if legs_first else len(robot.names)
@@ -107,8 +102,6 @@ class CommandFilter:
 
         Args:
             targets: Of all joints [rad].
-            title: Name of the controller's state.
-            unreported: Joints that nobody measures.
         """
         self._moved = self._moved or title not in STILL_TITLES
         if unreported and not (self.others_move and self._moved):

@@ -109,13 +109,9 @@ def body_pose(message: Pose) -> BodyPose:
 
 @dataclass(frozen=True, slots=True)
 class JointCommands:
-    """Targets of joints.
+    """Targets of joints."""
 
-    Attributes:
-        count: How many joints.
-    """
-
-    count: int
+    count: int  # how many joints
 
     def message(self, stamp: Time, numbers: Sequence[float]) -> JointCommand:
         """Make a message of targets [rad]."""

@@ -71,33 +71,20 @@ THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
 
 @dataclass(frozen=True, slots=True)
 class NodeSettings:
-    """All parameters.
+    """All parameters."""
 
-    Attributes:
-        robot: The robot.
-        gait: Tuning of the gait.
-        first_gait: Gait to begin with.
-        states: Limits of states, watchdogs and protections.
-        arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
-        policy: Path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none.
-        policy_options: How it is run.
-        policy_dry_run: Whether the policy is only watched.
-        record: Folder in which each run is recorded; empty for none.
-        diagnostics_period: In [s].
-        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
-    """
-
-    robot: Quadruped
-    gait: GaitParameters
-    first_gait: Gait
-    states: StateParameters
+    robot: Quadruped  # the robot
+    gait: GaitParameters  # tuning of the gait
+    first_gait: Gait  # gait to begin with
+    states: StateParameters  # limits of states, watchdogs and protections
+    # positions of the joints that are no legs' in [rad]; empty leaves them
     arm_pose: tuple[float, ...]
-    policy: str
-    policy_options: PolicyOptions
-    policy_dry_run: bool
-    record: str
-    diagnostics_period: float
-    thread_priority: int
+    policy: str  # path of an ONNX file, or name of one of :func:`shipped_policies`; empty for none
+    policy_options: PolicyOptions  # how it is run
+    policy_dry_run: bool  # whether the policy is only watched
+    record: str  # folder in which each run is recorded; empty for none
+    diagnostics_period: float  # in [s]
+    thread_priority: int  # SCHED_FIFO priority of the thread of its loop; 0 requests none
 
 
 def declare_parameters(node: Node) -> NodeSettings:
@@ -140,7 +127,6 @@ def changed_gait(gait: GaitParameters, values: Mapping[str, object]) -> GaitPara
     """Return a tuning with the parameters that concern it; None when there are none.
 
     Args:
-        gait: The tuning of now.
         values: Values of some parameters by their names.
 
     Raises:

@@ -48,10 +48,6 @@ def check_contract(
     """Compare what a policy declares with the robot; yields a row for each.
 
     Args:
-        network: The network.
-        contract: What it expects.
-        robot: The robot.
-        stand: Where the gait stands [rad].
         document: Where the values of the contract come from.
         declared: What its file says of sizes and rate besides.
         hold_missing: Joints that the robot lacks count as being at their default.
@@ -104,11 +100,8 @@ def check_answers(
     """Ask a policy for actions as it will be asked, and look at them.
 
     Args:
-        network: The network.
         standing: The observation of a robot that stands.
-        contract: What it expects.
         stand: Where the robot stands, in the order of the policy [rad].
-        period: Time between two steps in [s].
         clock: A monotonic clock in [s].
     """
 

@@ -22,19 +22,12 @@ STATED = 'gains of the training'
 
 @dataclass(frozen=True, slots=True)
 class ServoResponse:
-    """How a servo follows its target.
+    """How a servo follows its target."""
 
-    Attributes:
-        stiffness: Torque per position error in [N m/rad].
-        damping: Torque per speed in [N m s/rad], of motor and control together.
-        inertia: Of rotor and gear at the joint in [kg m2].
-        latency: From a target to a set-point that is there, in the mean, in [s].
-    """
-
-    stiffness: float
-    damping: float
-    inertia: float
-    latency: float = 0.0
+    stiffness: float  # torque per position error in [N m/rad]
+    damping: float  # torque per speed in [N m s/rad], of motor and control together
+    inertia: float  # of rotor and gear at the joint in [kg m2]
+    latency: float = 0.0  # from a target to a set-point that is there, in the mean, in [s]
 
     @property
     def bandwidth(self) -> float:
@@ -51,7 +44,6 @@ def gain_rows(gains: Gains | None, servo: ServoResponse | None, period: float) -
     Args:
         gains: Of the training; None when nobody said.
         servo: Of the robot; None when nobody knows.
-        period: Between two steps in [s].
     """
     if gains is None:
         if servo is not None:

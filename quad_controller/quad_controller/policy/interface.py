@@ -20,39 +20,27 @@ Numbers = npt.NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class PolicyInputs:
-    """What a policy may see in one step.
+    """What a policy may see in one step."""
 
-    Attributes:
-        joints: Measured joints.
-        imu: Measured attitude and turning.
-        velocity: Velocity that is requested.
-        linear_velocity: Of the body in its own frame in [m/s], estimated; None where nobody does.
-        foot_contacts: Which feet are on the ground, in the order of :data:`quad_description.FEET`;
-            None where nobody estimates it.
-    """
-
-    joints: JointSample
-    imu: ImuSample
-    velocity: Velocity
+    joints: JointSample  # measured joints
+    imu: ImuSample  # measured attitude and turning
+    velocity: Velocity  # velocity that is requested
+    # of the body in its own frame in [m/s], estimated; None where nobody does
     linear_velocity: Vector | None = None
+    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None where
+    # nobody estimates it
     foot_contacts: tuple[bool, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class PolicyStep:
-    """What a policy answers in one step.
+    """What a policy answers in one step."""
 
-    Attributes:
-        targets: Positions of all joints in [rad]; None when the answer cannot be used.
-        reason: Why it cannot be used.
-        observation: What the network was given; None when it was not asked.
-        action: What it answered.
-    """
-
+    # positions of all joints in [rad]; None when the answer cannot be used
     targets: Targets | None
-    reason: str = ''
-    observation: Numbers | None = None
-    action: Numbers | None = None
+    reason: str = ''  # why it cannot be used
+    observation: Numbers | None = None  # what the network was given; None when it was not asked
+    action: Numbers | None = None  # what it answered
 
 
 class Policy(Protocol):

@@ -32,23 +32,14 @@ UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
 
 @dataclass(frozen=True, slots=True)
 class LoadedPolicy:
-    """A policy that has passed.
+    """A policy that has passed."""
 
-    Attributes:
-        runner: What runs it.
-        contract: What it expects.
-        document: The contract, and where each of its values comes from.
-        report: The table of the check.
-        digest: SHA-256 of its file, and of those that its weights lie in.
-        metadata: What its file has, as it stands there.
-    """
-
-    runner: PolicyRunner
-    contract: PolicyContract
-    document: ContractDocument
-    report: Report
-    digest: str
-    metadata: dict[str, str]
+    runner: PolicyRunner  # what runs it
+    contract: PolicyContract  # what it expects
+    document: ContractDocument  # the contract, and where each of its values comes from
+    report: Report  # the table of the check
+    digest: str  # SHA-256 of its file, and of those that its weights lie in
+    metadata: dict[str, str]  # what its file has, as it stands there
 
     def __str__(self) -> str:
         """Return everything for people."""
@@ -67,7 +58,6 @@ def document_for(network: Network, options: PolicyOptions) -> ContractDocument:
 
     Args:
         network: The network, with what its file has.
-        options: What was set for it.
 
     Raises:
         PolicyError: A file cannot be read, or a value of it.
@@ -106,13 +96,6 @@ def load_policy(
 ) -> LoadedPolicy:
     """Load a policy and check it.
 
-    Args:
-        path: An ONNX file.
-        robot: The robot.
-        stand: Where the gait stands [rad].
-        options: How it shall be run.
-        period: Time between two steps in [s].
-
     Raises:
         PolicyError: It cannot be loaded or does not fit; the message has the table.
     """
@@ -141,12 +124,6 @@ def validate_policy(
     """Check a network as a policy.
 
     Args:
-        name: How it is called in messages.
-        network: What answers.
-        robot: The robot.
-        stand: Where the gait stands [rad].
-        options: How it shall be run.
-        period: Time between two steps in [s].
         clock: A monotonic clock in [s], to see how long it takes.
 
     Raises:

@@ -21,21 +21,13 @@ FLOAT = 'tensor(float)'  # ONNX Runtime's name of the type
 
 
 class Network(Protocol):
-    """A network that answers an observation with an action.
+    """A network that answers an observation with an action."""
 
-    Attributes:
-        metadata: What the file has of it.
-        inputs: Name, type and shape of each input.
-        outputs: The same of each output.
-        digest: SHA-256 of the file and of those that its weights lie in.
-        warnings: What a person should know of the file.
-    """
-
-    metadata: Mapping[str, str]
-    inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
-    digest: str
-    warnings: tuple[str, ...]
+    metadata: Mapping[str, str]  # what the file has of it
+    inputs: tuple[Port, ...]  # name, type and shape of each input
+    outputs: tuple[Port, ...]  # the same of each output
+    digest: str  # SHA-256 of the file and of those that its weights lie in
+    warnings: tuple[str, ...]  # what a person should know of the file
 
     def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
         """Feed outputs to inputs in the step after; `actions` names the output of the actions."""
@@ -57,7 +49,6 @@ class OnnxNetwork:
         """Load it.
 
         Args:
-            path: The file.
             new_weights: Accept side files other than those that its contract was written for.
 
         Raises:
@@ -109,8 +100,6 @@ def observation_ports(
     """Return the inputs and outputs that are not recurrent: one each in a network that fits.
 
     Args:
-        network: The network.
-        states: Its recurrent states.
         actions: Name of the output that holds the actions; empty where there is one only.
     """
     fed, kept = {state.input for state in states}, {state.output for state in states}

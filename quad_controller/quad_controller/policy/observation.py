@@ -39,7 +39,6 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
     Args:
         imu: Attitude and specific force; an accelerometer at rest reads +g upward (REP 145).
-        source: What to believe.
     """
     down = imu.down
     if source is GravitySource.EULER or imu.acceleration is None:
@@ -59,25 +58,17 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """What is measured and commanded in one step, joints in the order of the policy.
+    """What is measured and commanded in one step, joints in the order of the policy."""
 
-    Attributes:
-        positions: Of the joints in [rad].
-        velocities: Of the joints in [rad/s].
-        imu: Attitude and turning.
-        velocity: Velocity that is requested.
-        previous: The last action.
-        linear_velocity: Of the body in its own frame in [m/s]; None while nobody estimates it.
-        foot_contacts: Which feet are on the ground, in the order of :data:`quad_description.FEET`;
-            None while nobody estimates it.
-    """
-
-    positions: Floats
-    velocities: Floats
-    imu: ImuSample
-    velocity: Velocity
-    previous: Floats
+    positions: Floats  # of the joints in [rad]
+    velocities: Floats  # of the joints in [rad/s]
+    imu: ImuSample  # attitude and turning
+    velocity: Velocity  # velocity that is requested
+    previous: Floats  # the last action
+    # of the body in its own frame in [m/s]; None while nobody estimates it
     linear_velocity: Vector | None = None
+    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None while
+    # nobody estimates it
     foot_contacts: tuple[bool, ...] | None = None
 
 
@@ -115,12 +106,7 @@ class ObservationBuilder:
     """Fills one buffer, step after step."""
 
     def __init__(self, contract: PolicyContract, source: GravitySource) -> None:
-        """Prepare it.
-
-        Args:
-            contract: What the policy expects.
-            source: Of the direction of gravity.
-        """
+        """Prepare it."""
         self._defaults: Floats = np.array(contract.default_positions, np.float32)
         widths = [term.width for term in contract.terms]
         ends = np.cumsum([0, *widths]).tolist()
@@ -158,11 +144,7 @@ class ObservationBuilder:
         self._time += dt
 
     def build(self, observed: Observed) -> Floats:
-        """Return the observation; the history goes on by one step.
-
-        Args:
-            observed: What is measured and commanded.
-        """
+        """Return the observation; the history goes on by one step."""
         past, frame = self._history[1:], self._history[0]
         if len(past):
             past[:] = self._history[:-1]
@@ -212,9 +194,6 @@ def observed_places(contract: PolicyContract) -> npt.NDArray[np.intp]:
 
     The history is a table: a row for each step, the newest first; a column for each number of
     one step. The places count its cells row by row.
-
-    Args:
-        contract: What the policy expects.
     """
     columns = sum(term.width for term in contract.terms)
     newest_first = contract.newest is Newest.FIRST

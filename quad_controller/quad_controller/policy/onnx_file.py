@@ -39,14 +39,10 @@ FIXED_SIZES = {FIXED64: 8, FIXED32: 4}
 
 @dataclass(frozen=True, slots=True)
 class OnnxModel:
-    """A model as it was read once: what happens to its files later does not count.
+    """A model as it was read once: what happens to its files later does not count."""
 
-    Attributes:
-        data: Its file.
-        sides: Files that its weights lie in, by the names that the model has for them.
-    """
-
-    data: bytes
+    data: bytes  # its file
+    # files that its weights lie in, by the names that the model has for them
     sides: Mapping[str, bytes]
 
     @property

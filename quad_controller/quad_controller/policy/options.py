@@ -36,27 +36,19 @@ class ImuFrame(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PolicyOptions:
-    """Options of the runner.
+    """Options of the runner."""
 
-    Attributes:
-        contract: File whose values count before those in the policy's own; None for none.
-        phase_period: In [s]; 0 takes that of the contract.
-        imu_frame: Of the angular velocity.
-        gravity_source: Of the direction of gravity.
-        hold_missing: Joints of the policy that the robot lacks count as being at their default.
-        soft_limits: Share of a joint's range that targets may use.
-        low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
-        servo: How the servos of the robot follow, to be compared with those of the training; None
-            when nobody knows.
-    """
-
+    # file whose values count before those in the policy's own; None for none
     contract: Path | None = None
-    phase_period: float = 0.0
-    imu_frame: ImuFrame = ImuFrame.AUTO
-    gravity_source: GravitySource = GravitySource.BLEND
+    phase_period: float = 0.0  # in [s]; 0 takes that of the contract
+    imu_frame: ImuFrame = ImuFrame.AUTO  # of the angular velocity
+    gravity_source: GravitySource = GravitySource.BLEND  # of the direction of gravity
+    # joints of the policy that the robot lacks count as being at their default
     hold_missing: bool = False
-    soft_limits: float = 0.9
-    low_pass: float = 0.0
+    soft_limits: float = 0.9  # share of a joint's range that targets may use
+    low_pass: float = 0.0  # cut-off of a filter of the targets in [Hz]; 0 for none
+    # how the servos of the robot follow, to be compared with those of the training; None when
+    # nobody knows
     servo: ServoResponse | None = None
 
     def __post_init__(self) -> None:

@@ -18,19 +18,12 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One thing that was looked at.
+    """One thing that was looked at."""
 
-    Attributes:
-        subject: What.
-        expected: What it should be.
-        found: What it is.
-        verdict: What follows.
-    """
-
-    subject: str
-    expected: str
-    found: str
-    verdict: Verdict
+    subject: str  # what
+    expected: str  # what it should be
+    found: str  # what it is
+    verdict: Verdict  # what follows
 
 
 @dataclass(frozen=True, slots=True)

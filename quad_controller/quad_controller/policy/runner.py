@@ -35,11 +35,7 @@ class PolicyRunner:
         """Prepare it.
 
         Args:
-            name: How it is called in messages.
-            network: What answers.
             contract: What it expects; checked before.
-            robot: The robot.
-            options: How to run it.
             period: Of the control loop in [s]; that of the policy is one or several of them.
 
         Raises:
@@ -165,12 +161,7 @@ class PolicyRunner:
         self._builder.advance(dt)
 
     def act(self, action: Floats, dt: float) -> Targets:
-        """Return the protected targets of all joints that an action means; it is the last one now.
-
-        Args:
-            action: What the network answers, finite.
-            dt: Time since the step before in [s].
-        """
+        """Return the protected targets that an action means; it is the last one now."""
         if self._clip is not None:
             action = np.clip(action, *self._clip)
         self._previous[:] = action

@@ -21,19 +21,12 @@ DIGITS = 5  # of each number in the metadata
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObservationStatistics:
-    """Of each number of an observation, as the network is given it.
+    """Of each number of an observation, as the network is given it."""
 
-    Attributes:
-        mean: Means.
-        std: Standard deviations.
-        least: Smallest values.
-        most: Largest values.
-    """
-
-    mean: Floats
-    std: Floats
-    least: Floats
-    most: Floats
+    mean: Floats  # means
+    std: Floats  # standard deviations
+    least: Floats  # smallest values
+    most: Floats  # largest values
 
     @classmethod
     def of(cls, rows: npt.NDArray[np.floating]) -> ObservationStatistics:
@@ -54,10 +47,6 @@ class ObservationStatistics:
         cls, metadata: Mapping[str, str], width: int
     ) -> ObservationStatistics | None:
         """Return those that a model has; None when it has none.
-
-        Args:
-            metadata: Of the model.
-            width: Of its observation.
 
         Raises:
             PolicyError: They are no such object, or of another width.

@@ -36,17 +36,11 @@ FRESH = 3  # reports after which what was observed before the robot was put down
 
 @dataclass(frozen=True, slots=True)
 class RobotChoice:
-    """Which simulated robot walks.
+    """Which simulated robot walks."""
 
-    Attributes:
-        preset: Of its description.
-        arm: It has its arm.
-        servo: Model of its servos.
-    """
-
-    preset: str = 'lite'
-    arm: bool = False
-    servo: str = 'firm'
+    preset: str = 'lite'  # of its description
+    arm: bool = False  # it has its arm
+    servo: str = 'firm'  # model of its servos
 
     @property
     def urdf(self) -> str:
@@ -76,7 +70,6 @@ class PhysicsArena:
         """Make robot and ground.
 
         Args:
-            choice: Which robot.
             conditions: What is otherwise than as it is made.
         """
         urdf = choice.urdf
@@ -128,11 +121,7 @@ class PatientBackend(Backend):
     """
 
     def __init__(self, backend: Backend) -> None:
-        """Wait for a robot.
-
-        Args:
-            backend: The robot.
-        """
+        """Wait for a robot."""
         self._backend = backend
         self.names, self.period = backend.names, backend.period
         self.interruption = ''
@@ -182,12 +171,7 @@ class SerialArena:
     """
 
     def __init__(self, served: ServedRobot, backend: Backend) -> None:
-        """Watch a robot.
-
-        Args:
-            served: The robot.
-            backend: Its driver, which has been reset.
-        """
+        """Watch a robot."""
         self._served, self._patient = served, PatientBackend(backend)
         self.backend: Backend = self._patient
 
@@ -227,7 +211,6 @@ def serial_arena(choice: RobotChoice, *, noise: bool = True) -> Iterator[SerialA
     """Let a robot live behind a serial port, and open it.
 
     Args:
-        choice: Which robot.
         noise: Its sensors are as noisy as those of a board.
 
     Raises:

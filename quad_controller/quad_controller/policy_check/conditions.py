@@ -9,25 +9,15 @@ from dataclasses import dataclass, field, replace
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """How robot and ground differ.
+    """How robot and ground differ."""
 
-    Attributes:
-        trunk_mass: Factor of the mass of the trunk.
-        friction: Of the ground; None leaves it as it is.
-        delay: From targets that are sent to servos that have them in [s].
-        gyro_bias: Of each axis of the gyro in [rad/s].
-        level_bias: Of measured roll and pitch in [rad].
-        push: Change of the velocity at once, to any side, every two seconds, in [m/s].
-        roughness: Height of the highest bumps of the ground in [m].
-    """
-
-    trunk_mass: float = 1.0
-    friction: float | None = None
-    delay: float = 0.0
-    gyro_bias: float = 0.0
-    level_bias: float = 0.0
-    push: float = 0.0
-    roughness: float = 0.0
+    trunk_mass: float = 1.0  # factor of the mass of the trunk
+    friction: float | None = None  # of the ground; None leaves it as it is
+    delay: float = 0.0  # from targets that are sent to servos that have them in [s]
+    gyro_bias: float = 0.0  # of each axis of the gyro in [rad/s]
+    level_bias: float = 0.0  # of measured roll and pitch in [rad]
+    push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
+    roughness: float = 0.0  # height of the highest bumps of the ground in [m]
 
 
 AS_MADE = Conditions()
@@ -39,21 +29,13 @@ TIPPING_PUSH = 1.3
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """One parameter and the values that are tried.
+    """One parameter and the values that are tried."""
 
-    Attributes:
-        name: An attribute of :class:`Conditions`.
-        title: What a person reads.
-        unit: Of the values as they are shown.
-        factor: From a value to how it is shown.
-        values: In their order.
-    """
-
-    name: str
-    title: str
-    unit: str
-    values: tuple[float, ...] = field(default=())
-    factor: float = 1.0
+    name: str  # an attribute of :class:`Conditions`
+    title: str  # what a person reads
+    unit: str  # of the values as they are shown
+    values: tuple[float, ...] = field(default=())  # in their order
+    factor: float = 1.0  # from a value to how it is shown
 
     def conditions(self, value: float) -> Conditions:
         """Return what differs at a value."""

@@ -38,13 +38,9 @@ SPEEDS = 3
 
 
 class Arena(Protocol):
-    """Where a robot walks and is watched.
+    """Where a robot walks and is watched."""
 
-    Attributes:
-        backend: The robot.
-    """
-
-    backend: Backend
+    backend: Backend  # the robot
 
     def stand(self) -> RobotState:
         """Put the robot on its feet, whatever it did before."""
@@ -80,30 +76,18 @@ def axis_of(command: Velocity) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """What came of one command.
+    """What came of one command."""
 
-    Attributes:
-        commanded: The command.
-        went: Mean velocity, in the robot's own frame.
-        time: How long it walked in [s].
-        falls: How often it fell, or its watchdogs ended the walk.
-        tilt: Largest tilt in [rad].
-        torque_saturation: Share of the time that a servo is at its largest torque.
-        speed_saturation: Share of the time that a joint is at its largest speed.
-        smoothness: Root mean square of the second difference of the targets in [rad].
-        cost_of_transport: Work of the servos for weight and way; NaN on the spot.
-        timing: Of the commands on the wire; None where there are no real clocks.
-    """
-
-    commanded: Velocity
-    went: Velocity
-    time: float
-    falls: int
-    tilt: float
-    torque_saturation: float
-    speed_saturation: float
-    smoothness: float
-    cost_of_transport: float
+    commanded: Velocity  # the command
+    went: Velocity  # mean velocity, in the robot's own frame
+    time: float  # how long it walked in [s]
+    falls: int  # how often it fell, or its watchdogs ended the walk
+    tilt: float  # largest tilt in [rad]
+    torque_saturation: float  # share of the time that a servo is at its largest torque
+    speed_saturation: float  # share of the time that a joint is at its largest speed
+    smoothness: float  # root mean square of the second difference of the targets in [rad]
+    cost_of_transport: float  # work of the servos for weight and way; NaN on the spot
+    # of the commands on the wire; None where there are no real clocks
     timing: CommandTiming | None = None
 
     @property
@@ -124,13 +108,9 @@ class Passage:
 
 @dataclass(frozen=True, slots=True)
 class CourseFigures:
-    """What came of a course.
+    """What came of a course."""
 
-    Attributes:
-        passages: Of each command.
-    """
-
-    passages: tuple[Passage, ...]
+    passages: tuple[Passage, ...]  # of each command
 
     @property
     def falls(self) -> int:
@@ -201,10 +181,7 @@ class CourseWalker:
         """Put the robot on its feet.
 
         Args:
-            arena: Where.
-            robot: The model of the robot.
             policy: What walks; None for the gait.
-            gait: Tuning of the gait.
         """
         self._arena, self.interruptions = arena, 0
         self._walker = WalkingRobot(arena.backend, robot, policy, arena.stand(), gait)
@@ -215,10 +192,7 @@ class CourseWalker:
         """Walk as commanded.
 
         Args:
-            commands: One after the other.
-            duration: Of each in [s].
             push: Change of the velocity at once, to any side, every two seconds, in [m/s].
-            seed: Of the pushes.
         """
         random = np.random.default_rng(seed)
         passages = [self._passage(command, duration, push, random) for command in commands]

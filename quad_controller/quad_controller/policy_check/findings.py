@@ -18,49 +18,31 @@ POLICY, GAIT = 'policy', 'gait'
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What two came to on the same course.
+    """What two came to on the same course."""
 
-    Attributes:
-        title: Where that was.
-        policy: What the policy came to.
-        gait: What the gait came to.
-    """
-
-    title: str
-    policy: CourseFigures
-    gait: CourseFigures
+    title: str  # where that was
+    policy: CourseFigures  # what the policy came to
+    gait: CourseFigures  # what the gait came to
 
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """What a sweep of one parameter came to.
+    """What a sweep of one parameter came to."""
 
-    Attributes:
-        sweep: What was tried.
-        results: For each of its values.
-    """
-
-    sweep: Sweep
-    results: tuple[Compared, ...]
+    sweep: Sweep  # what was tried
+    results: tuple[Compared, ...]  # for each of its values
 
 
 @dataclass(slots=True)
 class Findings:
-    """All that was found of a policy.
+    """All that was found of a policy."""
 
-    Attributes:
-        courses: Courses that policy and gait walked.
-        sweeps: What was tried besides.
-        walks: Single walks: commanded, went in [m/s] and [rad/s], largest tilt in [rad].
-        reasons: Why it does not stand up.
-        notes: What else is to be known.
-    """
-
-    courses: list[Compared] = field(default_factory=list)
-    sweeps: list[Swept] = field(default_factory=list)
+    courses: list[Compared] = field(default_factory=list)  # courses that policy and gait walked
+    sweeps: list[Swept] = field(default_factory=list)  # what was tried besides
+    # single walks: commanded, went in [m/s] and [rad/s], largest tilt in [rad]
     walks: list[tuple[Velocity, Velocity, float]] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)  # why it does not stand up
+    notes: list[str] = field(default_factory=list)  # what else is to be known
 
 
 Table = list[tuple[str, ...]]

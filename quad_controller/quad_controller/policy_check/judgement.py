@@ -49,7 +49,6 @@ def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -
 
     Args:
         network: Of the policy; one without memory.
-        contract: What it observes.
         observed: What it saw on a walk, an observation in each row.
     """
     plain = _answers(network, observed)

@@ -30,19 +30,12 @@ from .walk import STAND_TIME
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Who walks.
+    """Who walks."""
 
-    Attributes:
-        path: An ONNX file; None for the gait.
-        options: How the policy is run.
-        robot: Which robot walks.
-        gait: Tuning of the gait.
-    """
-
-    path: Path | None = None
-    options: PolicyOptions = field(default_factory=PolicyOptions)
-    robot: RobotChoice = field(default_factory=RobotChoice)
-    gait: GaitParameters = AS_TUNED
+    path: Path | None = None  # an ONNX file; None for the gait
+    options: PolicyOptions = field(default_factory=PolicyOptions)  # how the policy is run
+    robot: RobotChoice = field(default_factory=RobotChoice)  # which robot walks
+    gait: GaitParameters = AS_TUNED  # tuning of the gait
 
     def load(self) -> LoadedPolicy | None:
         """Return its policy, checked; None for the gait.
@@ -64,21 +57,13 @@ def shipped_walkers() -> dict[str, Candidate]:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A course that somebody walks.
+    """A course that somebody walks."""
 
-    Attributes:
-        who: Who walks.
-        commands: One after the other.
-        duration: Of each in [s].
-        conditions: What differs.
-        seed: Of the pushes.
-    """
-
-    who: Candidate
-    commands: tuple[Velocity, ...]
-    duration: float
-    conditions: Conditions = AS_MADE
-    seed: int = 1
+    who: Candidate  # who walks
+    commands: tuple[Velocity, ...]  # one after the other
+    duration: float  # of each in [s]
+    conditions: Conditions = AS_MADE  # what differs
+    seed: int = 1  # of the pushes
 
     def run(self) -> CourseFigures:
         """Walk it in physics, in virtual time.
@@ -116,11 +101,6 @@ def run_chain(
     walkers: Sequence[Candidate], commands: Sequence[Velocity], duration: float
 ) -> list[CourseFigures]:
     """Have several walk a course in real time, one after the other, each on a line of its own.
-
-    Args:
-        walkers: Who walk.
-        commands: One after the other.
-        duration: Of each in [s].
 
     Raises:
         CheckError: The simulation or the line failed.

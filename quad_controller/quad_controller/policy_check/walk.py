@@ -28,19 +28,12 @@ FALLEN = math.radians(60.0)
 
 @dataclass(frozen=True, slots=True)
 class Walked:
-    """How a walk went.
+    """How a walk went."""
 
-    Attributes:
-        velocity: Mean velocity in the robot's own frame.
-        tilt: Largest angle between the body's z axis and up in [rad].
-        trouble: Why it ended early; empty when it did not.
-        observed: What the policy saw, an observation in each row.
-    """
-
-    velocity: Velocity
-    tilt: float
-    trouble: str
-    observed: Floats
+    velocity: Velocity  # mean velocity in the robot's own frame
+    tilt: float  # largest angle between the body's z axis and up in [rad]
+    trouble: str  # why it ended early; empty when it did not
+    observed: Floats  # what the policy saw, an observation in each row
 
 
 class WalkingRobot:
@@ -65,20 +58,13 @@ class WalkingRobot:
 
         Args:
             backend: Where the robot is; for the way, it has to know its position.
-            robot: The model of the robot.
             policy: What walks; None for the gait.
-            state: What was observed last.
-            gait: Tuning of the gait.
         """
         self._backend, self._robot, self._policy, self._gait = backend, robot, policy, gait
         self.restart(state)
 
     def restart(self, state: RobotState) -> None:
-        """Begin anew, with a new controller.
-
-        Args:
-            state: What was observed last.
-        """
+        """Begin anew, with a new controller."""
         self._state, self._dt = state, self._backend.period
         states = StateParameters(period=self._backend.period)
         self.controller = Controller(self._robot, self._gait, states, policy=self._policy)
@@ -180,10 +166,7 @@ def walk(
 
     Args:
         backend: Where the robot is; it has to know its position.
-        robot: The model of the robot.
         policy: What walks; it has been checked.
-        velocity: What is commanded.
-        duration: How long in [s].
     """
     walker = WalkingRobot(backend, robot, policy, backend.reset())
     try:

@@ -34,8 +34,6 @@ class Recorder:
         """Make the folder.
 
         Args:
-            folder: Of this recording; must not exist.
-            about: What is written down with it.
             backlog: How many steps wait at most.
 
         Raises:

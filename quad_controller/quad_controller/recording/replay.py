@@ -30,23 +30,15 @@ MAX_OUTSIDE = 0.05  # share of the samples
 
 @dataclass(frozen=True, slots=True)
 class TermRange:
-    """Where the numbers of a term lie.
+    """Where the numbers of a term lie."""
 
-    Attributes:
-        name: Of the term.
-        least: The smallest number in the recording.
-        most: The largest one.
-        reference: Smallest and largest in the reference; None without one.
-        outside: Largest share of samples of one number that lie outside of its range there.
-        shift: How far a mean is off, as a multiple of the deviation there; the largest.
-    """
-
-    name: str
-    least: float
-    most: float
+    name: str  # of the term
+    least: float  # the smallest number in the recording
+    most: float  # the largest one
+    # smallest and largest in the reference; None without one
     reference: tuple[float, float] | None
-    outside: float
-    shift: float
+    outside: float  # largest share of samples of one number that lie outside of its range there
+    shift: float  # how far a mean is off, as a multiple of the deviation there; the largest
 
     @property
     def leaves(self) -> bool:
@@ -56,25 +48,16 @@ class TermRange:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What came of a recording.
+    """What came of a recording."""
 
-    Attributes:
-        steps: Steps of the recording.
-        asked: In how many the policy was asked here.
-        compared: How many of them have an answer of the same file in the recording.
-        action_difference: Largest difference of actions from the recorded ones.
-        observation_difference: The same of observations.
-        others: Files that were asked in the recording and are not this one: name and SHA-256.
-        terms: Where each term lies.
-    """
-
-    steps: int
-    asked: int
-    compared: int
-    action_difference: float
-    observation_difference: float
+    steps: int  # steps of the recording
+    asked: int  # in how many the policy was asked here
+    compared: int  # how many of them have an answer of the same file in the recording
+    action_difference: float  # largest difference of actions from the recorded ones
+    observation_difference: float  # the same of observations
+    # files that were asked in the recording and are not this one: name and SHA-256
     others: tuple[str, ...]
-    terms: tuple[TermRange, ...]
+    terms: tuple[TermRange, ...]  # where each term lies
 
     @property
     def agrees(self) -> bool:
@@ -84,19 +67,12 @@ class Replay:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """What a policy saw and answered in a step of a recording.
+    """What a policy saw and answered in a step of a recording."""
 
-    Attributes:
-        step: As it was recorded.
-        observation: What it saw.
-        action: What it answered.
-        synchronous: Whether it has seen all that it had seen there.
-    """
-
-    step: StepRecord
-    observation: Floats
-    action: Floats
-    synchronous: bool
+    step: StepRecord  # as it was recorded
+    observation: Floats  # what it saw
+    action: Floats  # what it answered
+    synchronous: bool  # whether it has seen all that it had seen there
 
 
 def read_recording(path: Path) -> list[StepRecord]:
@@ -154,9 +130,6 @@ def replay(
     """Feed a policy by a recording and compare.
 
     Args:
-        runner: The policy.
-        contract: What it observes.
-        steps: The recording.
         reference: What it observed in training, or in another recording; None for nothing.
 
     Raises:

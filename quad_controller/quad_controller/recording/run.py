@@ -20,18 +20,12 @@ CONTRACT_FILE = 'contract.yaml'  # in the folder of a recording
 
 @dataclass(frozen=True, slots=True)
 class PolicyRun:
-    """What the steps do not say, and the answers depend on.
+    """What the steps do not say, and the answers depend on."""
 
-    Attributes:
-        policy: As it was named; empty for the gait, None where a recording does not say, as one
-            that goes on.
-        options: How it was run.
-        period: Of the control loop in [s].
-    """
-
+    # as it was named; empty for the gait, None where a recording does not say, as one that goes on
     policy: str | None
-    options: PolicyOptions
-    period: float
+    options: PolicyOptions  # how it was run
+    period: float  # of the control loop in [s]
 
     @property
     def about(self) -> Mapping[str, str]:
@@ -58,9 +52,6 @@ class PolicyRun:
     @classmethod
     def of(cls, recording: Path) -> PolicyRun:
         """Return that of a recording; what an older one does not say has its default.
-
-        Args:
-            recording: Its folder, or its MCAP file.
 
         Raises:
             PolicyError: It cannot be read.

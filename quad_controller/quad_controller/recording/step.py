@@ -73,19 +73,12 @@ def definition() -> str:
 
 @dataclass(frozen=True, slots=True)
 class StepTiming:
-    """Times of a step.
+    """Times of a step."""
 
-    Attributes:
-        stamp: When it was sent in [ns since 1970].
-        dt: Since the step before in [s].
-        computing: From its begin to the command in [s].
-        latency: From the joint states to the command in [s]; None without.
-    """
-
-    stamp: int
-    dt: float
-    computing: float
-    latency: float | None
+    stamp: int  # when it was sent in [ns since 1970]
+    dt: float  # since the step before in [s]
+    computing: float  # from its begin to the command in [s]
+    latency: float | None  # from the joint states to the command in [s]; None without
 
 
 @dataclass(frozen=True, slots=True)

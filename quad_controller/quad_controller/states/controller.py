@@ -74,15 +74,10 @@ class Controller:
         """Start relaxed.
 
         Args:
-            robot: The robot.
-            gait: Tuning of the gait.
-            states: Limits of states, watchdogs and protections.
             policy: What the mode ``policy`` follows.
-            policy_refusal: Why there is none.
             dry_run: Whether the policy is only asked, and never followed.
             arm_pose: Positions of the joints that belong to no leg when the robot stands, in
                 [rad]; empty leaves them where they are.
-            first_gait: Gait to begin with.
 
         Raises:
             DescriptionError: The legs do not reach the heights of the parameters, or a joint has
@@ -220,9 +215,6 @@ class Controller:
     def retune(self, gait: GaitParameters) -> Answer:
         """Walk with another tuning from now on; only while the robot is not on its legs.
 
-        Args:
-            gait: The new tuning.
-
         Raises:
             DescriptionError: The legs do not reach its height.
         """
@@ -263,20 +255,11 @@ class Controller:
         )
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Count joint states or attitudes that are received and cannot be used.
-
-        Args:
-            what: JOINTS or IMU.
-            reason: In words.
-        """
+        """Count joint states or attitudes that are received and cannot be used."""
         self._health.refuse(what, reason)
 
     def step(self, state: RobotState, dt: float) -> Output:
         """Advance.
-
-        Args:
-            state: What arrived since the last step.
-            dt: Time since the last step in [s].
 
         Returns:
             The targets to send, and what happened.

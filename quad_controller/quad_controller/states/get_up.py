@@ -55,15 +55,10 @@ WITH_AN_ARM = (
 
 @dataclass(frozen=True, slots=True)
 class FinalPoses:
-    """Where every way up leads.
+    """Where every way up leads."""
 
-    Attributes:
-        folded: Targets of a robot that lies with its feet under its hips [rad].
-        standing: Targets of one that stands [rad].
-    """
-
-    folded: Targets
-    standing: Targets
+    folded: Targets  # targets of a robot that lies with its feet under its hips [rad]
+    standing: Targets  # targets of one that stands [rad]
 
 
 class StillnessWatch:
@@ -95,7 +90,6 @@ def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
     """Return why a robot cannot get up now, nothing when it may try.
 
     Args:
-        health: What is measured.
         latch: The latched faults; a fall is what getting up is for.
         swings: Whether it may throw itself off its back.
     """
@@ -129,9 +123,6 @@ class GetUp(Motion):
         """Begin with waiting for rest.
 
         Args:
-            robot: The robot.
-            last: The last targets of all joints in [rad].
-            final: Where it leads.
             swings: Whether it may throw itself off its back.
         """
         self._robot, self._last, self._final = robot, last, final

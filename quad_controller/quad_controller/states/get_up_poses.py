@@ -24,18 +24,13 @@ _SWING_SPEED = 10.0  # [rad/s], all that the URDF lets a joint have
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One pose of a recovery.
+    """One pose of a recovery."""
 
-    Attributes:
-        legs: Hip, thigh and calf of each leg in [rad], in the order of
-            :data:`quad_description.LEGS`.
-        speed: Of the fastest joint in [rad/s].
-        duration: Of a swing in [s], in which each joint goes as fast as that, and which the next
-            stage follows at once, wherever the body is; None for going softly and coming to rest.
-    """
-
+    # hip, thigh and calf of each leg in [rad], in the order of :data:`quad_description.LEGS`
     legs: Sequence[Vector]
-    speed: float
+    speed: float  # of the fastest joint in [rad/s]
+    # of a swing in [s], in which each joint goes as fast as that, and which the next stage follows
+    # at once, wherever the body is; None for going softly and coming to rest
     duration: float | None = None
 
     @property

@@ -33,12 +33,7 @@ class Health:
     """
 
     def __init__(self, count: int, parameters: StateParameters) -> None:
-        """Start without a measurement.
-
-        Args:
-            count: How many joints there are.
-            parameters: Limits.
-        """
+        """Start without a measurement."""
         self._count = count
         self._parameters = parameters
         self.joints: JointSample | None = None
@@ -57,10 +52,6 @@ class Health:
 
     def take(self, measurement: RobotState, dt: float) -> list[str]:
         """Take what is new.
-
-        Args:
-            measurement: What arrived.
-            dt: Time since the last call in [s].
 
         Returns:
             What was refused and why.
@@ -93,12 +84,7 @@ class Health:
         return problems
 
     def refuse(self, what: Fault, reason: str) -> None:
-        """Remember why what comes cannot be used, for a while, or until something comes that can.
-
-        Args:
-            what: JOINTS or IMU.
-            reason: In words.
-        """
+        """Remember for a while, or until something usable comes, why what comes is not."""
         self._refusals[what] = reason, 0.0
 
     def forget_joints(self) -> None:

@@ -27,8 +27,6 @@ class StepLimiter:
         """Start at no target.
 
         Args:
-            limits: Of each joint.
-            period: Nominal time between two targets in [s].
             speed: Speed of a target per speed of its joint.
         """
         self._limits = tuple(limits)
@@ -56,7 +54,6 @@ class StepLimiter:
 
         Args:
             targets: What is wanted; finite.
-            dt: Time since the last step in [s].
         """
         if self._last is None:
             return self.start(targets)

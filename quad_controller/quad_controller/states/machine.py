@@ -46,7 +46,6 @@ class Poses:
         """Prepare them.
 
         Args:
-            robot: The robot.
             lie_height: Hip axes above the centres of the feet when it lies in [m].
             arm_pose: Positions of the joints that are no legs' in [rad]; empty leaves them.
 
@@ -93,9 +92,6 @@ class StateMachine:
         """Start relaxed, without targets.
 
         Args:
-            poses: Where to go.
-            generator: The gait.
-            parameters: How fast.
             policy: What POLICY follows; it cannot be entered without.
         """
         self._poses, self._generator, self._policy = poses, generator, policy
@@ -191,12 +187,7 @@ class StateMachine:
         self._policy = policy
 
     def react(self, reaction: Reaction, last: Targets) -> None:
-        """Go into FAULT, or to a stronger reaction there.
-
-        Args:
-            reaction: What the faults require.
-            last: The last targets of all joints in [rad].
-        """
+        """Go into FAULT, or to a stronger reaction there."""
         if self.state is State.GET_UP:
             reaction = Reaction.HOLD  # legs that bear nothing can neither stand nor lie down
         elif self.state is State.FAULT and self._reaction is not None:
@@ -223,9 +214,6 @@ class StateMachine:
 
     def advance(self, last: Targets) -> str:
         """Change state and motion when it is time.
-
-        Args:
-            last: The last targets of all joints in [rad].
 
         Returns:
             Why the policy was given up; empty as a rule.

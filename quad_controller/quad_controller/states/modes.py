@@ -58,15 +58,10 @@ MODES = (
 
 @dataclass(frozen=True, slots=True)
 class ModeRequest:
-    """What a word requests.
+    """What a word requests."""
 
-    Attributes:
-        state: State to go to.
-        gait: Gait to walk with, None for the one that is set.
-    """
-
-    state: State
-    gait: Gait | None = None
+    state: State  # state to go to
+    gait: Gait | None = None  # gait to walk with, None for the one that is set
 
 
 def parse_mode(text: str) -> ModeRequest | None:
@@ -82,12 +77,7 @@ def parse_mode(text: str) -> ModeRequest | None:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What becomes of a request.
+    """What becomes of a request."""
 
-    Attributes:
-        accepted: Whether it is followed.
-        message: What happens now, or why not and what can be done.
-    """
-
-    accepted: bool
-    message: str
+    accepted: bool  # whether it is followed
+    message: str  # what happens now, or why not and what can be done

@@ -19,22 +19,15 @@ from ..policy.interface import PolicyInputs
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What a motion may know of the world in one step.
+    """What a motion may know of the world in one step."""
 
-    Attributes:
-        joints: The joints, None when they are not known any more.
-        imu: Attitude and turning, None when they are not known any more.
-        velocity: Velocity that is requested.
-        pose: Pose of the body that is requested.
-        linear_velocity: Of the body in its own frame in [m/s], None while nobody estimates it.
-        foot_contacts: Which feet are on the ground, None while nobody estimates it.
-    """
-
-    joints: JointSample | None
-    imu: ImuSample | None
-    velocity: Velocity
-    pose: BodyPose
+    joints: JointSample | None  # the joints, None when they are not known any more
+    imu: ImuSample | None  # attitude and turning, None when they are not known any more
+    velocity: Velocity  # velocity that is requested
+    pose: BodyPose  # pose of the body that is requested
+    # of the body in its own frame in [m/s], None while nobody estimates it
     linear_velocity: Vector | None = None
+    # which feet are on the ground, None while nobody estimates it
     foot_contacts: tuple[bool, ...] | None = None
 
     @property
@@ -71,12 +64,7 @@ class Motion(ABC):
 
     @abstractmethod
     def step(self, situation: Situation, dt: float) -> Targets:
-        """Return the next targets of all joints in [rad].
-
-        Args:
-            situation: What is known.
-            dt: Duration of the step in [s].
-        """
+        """Return the next targets of all joints in [rad]."""
 
 
 class Hold(Motion):

@@ -12,47 +12,30 @@ from ..exceptions import ParameterError
 
 @dataclass(frozen=True, slots=True)
 class StateParameters:
-    """Tuning of everything but the gait and the policy.
+    """Tuning of everything but the gait and the policy."""
 
-    Attributes:
-        period: Nominal time between two steps in [s].
-        command_timeout: A velocity older than this counts as zero, in [s].
-        warn_age: Joint states and attitude older than this are reported, in [s].
-        hold_age: Older than this, nothing moves on, in [s].
-        fault_age: Older than this is a fault, in [s].
-        max_tilt: A larger angle between the body's z axis and up is a fall, in [rad].
-        max_turn_rate: A body that turns faster is falling, in [rad/s].
-        fall_time: How long it must be so in [s].
-        low_battery: Charge below which the robot lies down; 0 never.
-        battery_time: How long the charge must be lower in [s].
-        require_imu: Whether the robot may move its legs only with a known attitude.
-        lie_height: Hip axes above the centres of the feet when it lies, in [m].
-        blend_speed: Speed of the fastest joint between two poses in [rad/s].
-        blend_time: Shortest time between two poses in [s].
-        hold_band: How far a joint may be off a set-point that holds it, in [rad]; it follows then.
-        setpoint_speed_ratio: Speed of a set-point per speed of its joint; a soft servo that is
-            compensated for has its set-point further ahead, and needs 2.
-        policy_fallback_walks: Whether the gait goes on walking when a policy fails, or stands.
-        get_up_swings: Whether the mode get_up may throw the robot off its back, at full speed.
-    """
-
-    period: float = 0.02
-    command_timeout: float = 0.5
-    warn_age: float = 0.06
-    hold_age: float = 0.2
-    fault_age: float = 0.5
-    max_tilt: float = 0.9
-    max_turn_rate: float = 8.0
-    fall_time: float = 0.1
-    low_battery: float = 0.1
-    battery_time: float = 3.0
-    require_imu: bool = True
-    lie_height: float = 0.055
-    blend_speed: float = 1.0
-    blend_time: float = 1.0
+    period: float = 0.02  # nominal time between two steps in [s]
+    command_timeout: float = 0.5  # a velocity older than this counts as zero, in [s]
+    warn_age: float = 0.06  # joint states and attitude older than this are reported, in [s]
+    hold_age: float = 0.2  # older than this, nothing moves on, in [s]
+    fault_age: float = 0.5  # older than this is a fault, in [s]
+    max_tilt: float = 0.9  # a larger angle between the body's z axis and up is a fall, in [rad]
+    max_turn_rate: float = 8.0  # a body that turns faster is falling, in [rad/s]
+    fall_time: float = 0.1  # how long it must be so in [s]
+    low_battery: float = 0.1  # charge below which the robot lies down; 0 never
+    battery_time: float = 3.0  # how long the charge must be lower in [s]
+    require_imu: bool = True  # whether the robot may move its legs only with a known attitude
+    lie_height: float = 0.055  # hip axes above the centres of the feet when it lies, in [m]
+    blend_speed: float = 1.0  # speed of the fastest joint between two poses in [rad/s]
+    blend_time: float = 1.0  # shortest time between two poses in [s]
+    # how far a joint may be off a set-point that holds it, in [rad]; it follows then
     hold_band: float = 0.25
+    # speed of a set-point per speed of its joint; a soft servo that is compensated for has its
+    # set-point further ahead, and needs 2
     setpoint_speed_ratio: float = 1.0
+    # whether the gait goes on walking when a policy fails, or stands
     policy_fallback_walks: bool = False
+    # whether the mode get_up may throw the robot off its back, at full speed
     get_up_swings: bool = False
 
     def __post_init__(self) -> None:

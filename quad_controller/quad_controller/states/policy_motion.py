@@ -29,7 +29,6 @@ class PolicyMotion(Motion):
         """Begin where the joints are.
 
         Args:
-            policy: The policy; it is reset.
             start: Last targets of all joints in [rad].
             ease_time: Over how long the policy's targets take over in [s].
         """
@@ -111,13 +110,7 @@ class PolicyChoice:
         return f'the mode policy follows {policy.name}'
 
     def watch(self, situation: Situation, dt: float, last: Targets) -> Targets | None:
-        """Return what a policy that is only watched would send, None without one.
-
-        Args:
-            situation: What is known.
-            dt: Duration of the step in [s].
-            last: The last targets of all joints in [rad].
-        """
+        """Return what a policy that is only watched would send, None without one."""
         self._asked, inputs = None, situation.policy_inputs
         if self.policy is None or not self.dry_run or inputs is None:
             return None

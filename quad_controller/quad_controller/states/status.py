@@ -18,39 +18,22 @@ from .motion import Situation
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The controller at one moment.
+    """The controller at one moment."""
 
-    Attributes:
-        state: What it is doing.
-        title: Its name, with the way to it as long as it stands up or lies down.
-        goal: What it is on the way to.
-        gait: The gait.
-        velocity: Velocity that the gait walks.
-        faults: Latched faults with their reasons.
-        warnings: What is not right but no fault.
-        joints_age: Time since the joint states in [s].
-        imu_age: Time since the attitude in [s].
-        battery: Charge 0 to 1, None when it is not known.
-        refused: Samples and commands that could not be used.
-        limited: Targets of single joints that were too fast and were cut.
-        unreachable: Steps in which a leg did not reach its target.
-        policy: Name of the policy that is loaded; empty for none.
-    """
-
-    state: State
-    title: str
-    goal: State
-    gait: Gait
-    velocity: Velocity
-    faults: tuple[str, ...]
-    warnings: tuple[str, ...]
-    joints_age: float
-    imu_age: float
-    battery: float | None
-    refused: int
-    limited: int
-    unreachable: int
-    policy: str = ''
+    state: State  # what it is doing
+    title: str  # its name, with the way to it as long as it stands up or lies down
+    goal: State  # what it is on the way to
+    gait: Gait  # the gait
+    velocity: Velocity  # velocity that the gait walks
+    faults: tuple[str, ...]  # latched faults with their reasons
+    warnings: tuple[str, ...]  # what is not right but no fault
+    joints_age: float  # time since the joint states in [s]
+    imu_age: float  # time since the attitude in [s]
+    battery: float | None  # charge 0 to 1, None when it is not known
+    refused: int  # samples and commands that could not be used
+    limited: int  # targets of single joints that were too fast and were cut
+    unreachable: int  # steps in which a leg did not reach its target
+    policy: str = ''  # name of the policy that is loaded; empty for none
 
 
 class EventKind(Enum):
@@ -64,50 +47,30 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that people should know.
+    """Something that people should know."""
 
-    Attributes:
-        kind: How it is to be reported.
-        text: What happened, and the remedy if there is one.
-    """
-
-    kind: EventKind
-    text: str
+    kind: EventKind  # how it is to be reported
+    text: str  # what happened, and the remedy if there is one
 
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """A policy that was asked in a step.
+    """A policy that was asked in a step."""
 
-    Attributes:
-        policy: Which one.
-        answer: What it answered.
-        step: How often it was stepped since its reset; 1 for the first time.
-    """
-
-    policy: Policy
-    answer: PolicyStep
-    step: int
+    policy: Policy  # which one
+    answer: PolicyStep  # what it answered
+    step: int  # how often it was stepped since its reset; 1 for the first time
 
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What one step gives.
+    """What one step gives."""
 
-    Attributes:
-        targets: Positions of all joints in [rad]; None as long as no joint state was received.
-        shadow: What the policy would do, in a dry run; None otherwise.
-        title: Name of the state, with the way to it.
-        ready: Whether all measurements were received once that walking needs.
-        events: News.
-        situation: What the motion knew; None when nothing moved.
-        asked: The policy that was asked, followed or watched; None for none.
-    """
-
+    # positions of all joints in [rad]; None as long as no joint state was received
     targets: Targets | None
-    shadow: Targets | None
-    title: str
-    ready: bool
-    events: tuple[Event, ...]
-    situation: Situation | None = None
-    asked: Asked | None = None
+    shadow: Targets | None  # what the policy would do, in a dry run; None otherwise
+    title: str  # name of the state, with the way to it
+    ready: bool  # whether all measurements were received once that walking needs
+    events: tuple[Event, ...]  # news
+    situation: Situation | None = None  # what the motion knew; None when nothing moved
+    asked: Asked | None = None  # the policy that was asked, followed or watched; None for none

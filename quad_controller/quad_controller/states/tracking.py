@@ -22,11 +22,7 @@ class TrackingMonitor:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Begin with a new window.
-
-        Args:
-            names: Of the joints.
-        """
+        """Begin with a new window."""
         self._names = tuple(names)
         self._targets: list[Sequence[float]] = []
         self._measured: list[Sequence[float]] = []
@@ -39,7 +35,6 @@ class TrackingMonitor:
         Args:
             targets: Of all joints in [rad].
             measured: Where they are in [rad].
-            dt: Duration of the step in [s].
         """
         self._targets.append(targets)
         self._measured.append(measured)

@@ -48,7 +48,6 @@ class UnseenJoints:
         """Whether something else has moved them; once, after they were lost.
 
         Args:
-            joints: Where they are.
             targets: Where they were to be in [rad].
         """
         if joints is self._last:  # nothing new was received

@@ -22,12 +22,7 @@ class Pacer:
     """
 
     def __init__(self, period: float, now: float) -> None:
-        """Make the first step due now.
-
-        Args:
-            period: Time between two steps in [s].
-            now: The present.
-        """
+        """Make the first step due now."""
         self._period = period
         self._window = WINDOW * period
         self._due = now
@@ -52,7 +47,6 @@ class Pacer:
         """Schedule the next step.
 
         Args:
-            now: When the step was made.
             arrival: When the feedback arrived that it used, None without.
         """
         error = 0.0 if arrival is None else arrival - self._due

@@ -12,41 +12,24 @@ PERCENTILE = 0.99
 
 @dataclass(frozen=True, slots=True)
 class LoopFigures:
-    """What the loop did over the last window; counts since the start.
+    """What the loop did over the last window; counts since the start."""
 
-    Attributes:
-        steps: Number of steps.
-        overruns: Steps that were left out.
-        rate: Mean number of steps in [1/s].
-        jitter_p50: Median distance of an interval from the period in [s].
-        jitter_p99: Its 99th percentile in [s].
-        jitter_max: The largest one in [s].
-        duration_p99: 99th percentile of the time that a step takes in [s].
-        latency_p50: Median time from feedback to the command that uses it in [s].
-        latency_p99: Its 99th percentile in [s].
-    """
-
-    steps: int
-    overruns: int
-    rate: float
-    jitter_p50: float
-    jitter_p99: float
-    jitter_max: float
-    duration_p99: float
-    latency_p50: float
-    latency_p99: float
+    steps: int  # number of steps
+    overruns: int  # steps that were left out
+    rate: float  # mean number of steps in [1/s]
+    jitter_p50: float  # median distance of an interval from the period in [s]
+    jitter_p99: float  # its 99th percentile in [s]
+    jitter_max: float  # the largest one in [s]
+    duration_p99: float  # 99th percentile of the time that a step takes in [s]
+    latency_p50: float  # median time from feedback to the command that uses it in [s]
+    latency_p99: float  # its 99th percentile in [s]
 
 
 class LoopStatistics:
     """Collects intervals, durations and latencies."""
 
     def __init__(self, period: float, window: int = 1000) -> None:
-        """Start empty.
-
-        Args:
-            period: Nominal time between two steps in [s].
-            window: How many steps are looked back.
-        """
+        """Start empty."""
         self._period = period
         self._intervals: deque[float] = deque(maxlen=window)
         self._durations: deque[float] = deque(maxlen=window)

@@ -33,41 +33,27 @@ class LegGeometry:
     """Lengths in [m], angles in [rad]; "pitch" is the angle of a link from straight down.
 
     A positive pitch turns the link's lower end backward (right-hand rule about y).
-
-    Attributes:
-        joints: Names of the hip, thigh and calf joints.
-        hip: Point on the hip axis that is beside the thigh joint's origin, in the body's frame.
-        thigh_x: Thigh axis ahead of the hip point.
-        thigh_z: Thigh axis above the hip axis.
-        offset_y: Plane of the foot beside the hip axis, positive to the left.
-        thigh_length: Thigh axis to calf axis.
-        calf_length: Calf axis to the foot's centre.
-        thigh_pitch: Pitch of the thigh at zero.
-        calf_pitch: Pitch of the line from calf axis to foot at zero.
-        signs: Sense of the three joints: 1 when positive is right-handed about +x, +y, +y.
-        knee_sign: 1 when the knee bends so that the calf pitches backward, else -1.
-        limits: Ranges of the three joints.
     """
 
-    joints: tuple[str, str, str]
+    joints: tuple[str, str, str]  # names of the hip, thigh and calf joints
+    # point on the hip axis that is beside the thigh joint's origin, in the body's frame
     hip: Vector
-    thigh_x: float
-    thigh_z: float
-    offset_y: float
-    thigh_length: float
-    calf_length: float
-    thigh_pitch: float
-    calf_pitch: float
-    signs: Vector
-    knee_sign: float
-    limits: tuple[JointLimits, JointLimits, JointLimits]
+    thigh_x: float  # thigh axis ahead of the hip point
+    thigh_z: float  # thigh axis above the hip axis
+    offset_y: float  # plane of the foot beside the hip axis, positive to the left
+    thigh_length: float  # thigh axis to calf axis
+    calf_length: float  # calf axis to the foot's centre
+    thigh_pitch: float  # pitch of the thigh at zero
+    calf_pitch: float  # pitch of the line from calf axis to foot at zero
+    signs: Vector  # sense of the three joints: 1 when positive is right-handed about +x, +y, +y
+    knee_sign: float  # 1 when the knee bends so that the calf pitches backward, else -1
+    limits: tuple[JointLimits, JointLimits, JointLimits]  # ranges of the three joints
 
 
 def leg_geometry(description: Description, leg: str) -> LegGeometry:
     """Derive the geometry of a leg from the joints between base_link and its foot.
 
     Args:
-        description: The robot.
         leg: One of :data:`LEGS`; its foot is the link ``<leg>_foot``.
 
     Raises:

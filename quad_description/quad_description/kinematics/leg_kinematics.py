@@ -19,17 +19,12 @@ from .leg import LegGeometry
 
 @dataclass(frozen=True, slots=True)
 class LegSolution:
-    """Joint positions for a foot.
+    """Joint positions for a foot."""
 
-    Attributes:
-        angles: Hip, thigh, calf in [rad], always within the limits.
-        reachable: Whether they bring the foot to where it was requested.
-        margin: Distance of the foot from the edge of the reach in [m], negative outside;
-            joint limits are not counted.
-    """
-
-    angles: Vector
-    reachable: bool
+    angles: Vector  # hip, thigh, calf in [rad], always within the limits
+    reachable: bool  # whether they bring the foot to where it was requested
+    # distance of the foot from the edge of the reach in [m], negative outside; joint limits are
+    # not counted
     margin: float
 
 
@@ -37,7 +32,6 @@ def solve(leg: LegGeometry, foot: Vector) -> LegSolution:
     """Return the joint positions for a foot, the nearest ones when it is out of reach.
 
     Args:
-        leg: The leg.
         foot: Centre of the foot in the body's frame in [m].
     """
     hip, one, two = leg.hip, leg.thigh_length, leg.calf_length
@@ -70,7 +64,6 @@ def foot_position(leg: LegGeometry, angles: Vector) -> Vector:
     """Return the centre of the foot in the body's frame in [m].
 
     Args:
-        leg: The leg.
         angles: Hip, thigh, calf in [rad].
     """
     roll = leg.signs[0] * angles[0]
@@ -87,7 +80,6 @@ def calf_rotation(leg: LegGeometry, angles: Vector) -> Quaternion:
     """Return how calf and foot are turned against the zero pose, in the body's frame.
 
     Args:
-        leg: The leg.
         angles: Hip, thigh, calf in [rad].
     """
     roll = leg.signs[0] * angles[0] / 2
@@ -100,7 +92,6 @@ def jacobian(leg: LegGeometry, angles: Vector) -> tuple[Vector, Vector, Vector]:
     """Return the derivative of the foot's position by each joint, one column after another.
 
     Args:
-        leg: The leg.
         angles: Hip, thigh, calf in [rad].
     """
     roll = leg.signs[0] * angles[0]

@@ -25,38 +25,25 @@ BALANCE_PASSES = 3  # the centre of mass moves with the legs; this many passes s
 
 
 class FootPose(NamedTuple):
-    """Where a foot is.
+    """Where a foot is."""
 
-    Attributes:
-        position: Of its centre in [m].
-        rotation: How it is turned against the zero pose, in what the position is given in.
-    """
-
-    position: Vector
+    position: Vector  # of its centre in [m]
+    # how it is turned against the zero pose, in what the position is given in
     rotation: Quaternion
 
 
 @dataclass(frozen=True, slots=True)
 class Quadruped:
-    """A robot.
+    """A robot."""
 
-    Attributes:
-        description: What the URDF says.
-        names: Commanded joints in the order of the URDF.
-        limits: Their ranges, in the same order.
-        legs: The four legs in the order of :data:`LEGS`.
-        leg_indices: For each leg the places of hip, thigh and calf in ``names``.
-        mass: Weight of all links in [kg].
-        foot_radius: Of the ball that a foot is in [m]; 0 where the URDF has none.
-    """
-
-    description: Description
-    names: tuple[str, ...]
-    limits: tuple[JointLimits, ...]
-    legs: tuple[LegGeometry, ...]
+    description: Description  # what the URDF says
+    names: tuple[str, ...]  # commanded joints in the order of the URDF
+    limits: tuple[JointLimits, ...]  # their ranges, in the same order
+    legs: tuple[LegGeometry, ...]  # the four legs in the order of :data:`LEGS`
+    # for each leg the places of hip, thigh and calf in ``names``
     leg_indices: tuple[tuple[int, int, int], ...]
-    mass: float
-    foot_radius: float
+    mass: float  # weight of all links in [kg]
+    foot_radius: float  # of the ball that a foot is in [m]; 0 where the URDF has none
 
     @property
     def hip_centre(self) -> Vector:
@@ -110,7 +97,6 @@ class Quadruped:
         """Put the legs' joint positions among those of all joints.
 
         Args:
-            solutions: One for each leg.
             others: Positions of all joints; those of the legs in it are replaced.
         """
         return self.with_legs([solution.angles for solution in solutions], others)
@@ -172,9 +158,6 @@ class Quadruped:
 
 def quadruped(urdf: str) -> Quadruped:
     """Make the model of a robot from its URDF.
-
-    Args:
-        urdf: URDF as XML text.
 
     Raises:
         DescriptionError: It is no URDF of a quadruped whose legs turn about x, y and y.

@@ -16,15 +16,10 @@ BASE = 'base_link'
 
 
 class Pose3(NamedTuple):
-    """Where a link is.
+    """Where a link is."""
 
-    Attributes:
-        position: Of its origin in the reference in [m].
-        rotation: From its frame to the reference.
-    """
-
-    position: Vector
-    rotation: Quaternion
+    position: Vector  # of its origin in the reference in [m]
+    rotation: Quaternion  # from its frame to the reference
 
     def point(self, point: Vector) -> Vector:
         """Return in the reference a point of the link in [m]."""
@@ -37,9 +32,7 @@ def link_poses(
     """Return the pose of every link below a base link, in the base's frame.
 
     Args:
-        description: The robot.
         positions: Joint positions by name in [rad] or [m]; joints that are left out are at zero.
-        base: Link whose frame is the reference.
     """
     poses = {base: Pose3((0.0, 0.0, 0.0), IDENTITY)}
     # joints may stand in any order in the file: pass until nothing new is reached

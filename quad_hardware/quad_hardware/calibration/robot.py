@@ -31,16 +31,11 @@ REPORT_TIMEOUT = 4.0  # [s] for a robot to report
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """What the IMU reports.
+    """What the IMU reports."""
 
-    Attributes:
-        attitude: Roll, pitch, yaw [deg].
-        acceleration: Specific force [m/s²]; None where it is not reported.
-        on_the_way: What was reported since the reading before, while the robot was moved.
-    """
-
-    attitude: Vector
-    acceleration: Vector | None
+    attitude: Vector  # roll, pitch, yaw [deg]
+    acceleration: Vector | None  # specific force [m/s²]; None where it is not reported
+    # what was reported since the reading before, while the robot was moved
     on_the_way: Sequence[Report] = ()
 
 
@@ -51,7 +46,6 @@ class LimpRobot:
         """Look for the robot; use it in a with statement.
 
         Args:
-            options: Where it is.
             motors: Ids of those that it has; a board may refuse a command for any other.
         """
         self._motors = frozenset(motors)

@@ -33,9 +33,6 @@ def calibrate_joints(
     """Record zero, direction and, if wanted, both ends of each joint.
 
     Args:
-        console: The person.
-        robot: The robot, limp.
-        servos: What is known so far.
         limits: Record the ends of the travel as well.
 
     Returns:

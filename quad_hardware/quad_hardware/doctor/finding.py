@@ -19,19 +19,12 @@ class Severity(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report.
+    """One line of the report."""
 
-    Attributes:
-        severity: How bad it is.
-        subject: What was looked at.
-        message: What was found.
-        remedy: What to do about it; empty where nothing is to be done.
-    """
-
-    severity: Severity
-    subject: str
-    message: str
-    remedy: str = ''
+    severity: Severity  # how bad it is
+    subject: str  # what was looked at
+    message: str  # what was found
+    remedy: str = ''  # what to do about it; empty where nothing is to be done
 
     def __str__(self) -> str:
         """Return the finding as lines of text."""

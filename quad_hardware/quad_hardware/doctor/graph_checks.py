@@ -25,36 +25,22 @@ _SOURCES = {
 
 @dataclass(slots=True)
 class Observation:
-    """What was received in a while.
+    """What was received in a while."""
 
-    Attributes:
-        duration: How long [s].
-        nodes: Names of nodes.
-        publishers: Names of nodes by topic.
-        counts: Messages by topic.
-        joints: Names in the last /joint_states.
-        urdf: The robot, from /robot_description; empty when there is none.
-        parents: Parent by child of all transforms, static ones included.
-        diagnostics: Level and text of each status that is not well.
-    """
-
-    duration: float
-    nodes: set[str] = field(default_factory=set)
-    publishers: dict[str, list[str]] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)
-    joints: tuple[str, ...] = ()
-    urdf: str = ''
+    duration: float  # how long [s]
+    nodes: set[str] = field(default_factory=set)  # names of nodes
+    publishers: dict[str, list[str]] = field(default_factory=dict)  # names of nodes by topic
+    counts: dict[str, int] = field(default_factory=dict)  # messages by topic
+    joints: tuple[str, ...] = ()  # names in the last /joint_states
+    urdf: str = ''  # the robot, from /robot_description; empty when there is none
+    # parent by child of all transforms, static ones included
     parents: dict[str, str] = field(default_factory=dict)
+    # level and text of each status that is not well
     diagnostics: list[tuple[int, str]] = field(default_factory=list)
 
 
 def check_graph(seen: Observation, port: str) -> Iterator[Finding]:
-    """Judge everything that was received.
-
-    Args:
-        seen: What was received.
-        port: Of the robot.
-    """
+    """Judge everything that was received."""
     bringup = f'ros2 run quad_bringup bringup --port {port}'
     running = [name for name in NODES if name in seen.nodes]
     if not running:

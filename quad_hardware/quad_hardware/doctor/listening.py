@@ -35,11 +35,7 @@ _LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def observe(duration: float) -> Observation:
-    """Listen; rclpy need not be initialised.
-
-    Args:
-        duration: How long [s].
-    """
+    """Listen; rclpy need not be initialised."""
     context = Context()
     init_ros(context=context)
     node = Node('quad_doctor', context=context, enable_rosout=False)

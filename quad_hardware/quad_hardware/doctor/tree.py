@@ -10,12 +10,7 @@ ROOT = 'odom'
 
 
 def links_without_place(links: Iterable[str], parents: Mapping[str, str]) -> list[str]:
-    """Return the links that have no chain of transforms from odom.
-
-    Args:
-        links: Of the robot.
-        parents: Parent by child of all transforms.
-    """
+    """Return the links that have no chain of transforms from odom."""
     return [link for link in links if not _reaches(link, parents)]
 
 

@@ -17,15 +17,10 @@ LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%] below which it is to be charged, 
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """State of the battery.
+    """State of the battery."""
 
-    Attributes:
-        charge: [%]; None while unknown.
-        voltage: [V]; None where it is not reported.
-    """
-
-    charge: float | None = None
-    voltage: float | None = None
+    charge: float | None = None  # [%]; None while unknown
+    voltage: float | None = None  # [V]; None where it is not reported
 
 
 class BatteryFilter:

@@ -39,41 +39,26 @@ class RateSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class EstimatorSettings:
-    """How reports are read.
+    """How reports are read."""
 
-    Attributes:
-        rate_source: Where the angular velocity is from.
-        rate_cutoff: Of the low-pass of differentiated angular velocities [Hz].
-        joint_cutoff: Of the low-pass of differentiated joint velocities [Hz].
-        odometry: How the legs are read.
-        mounting: How the IMU sits on the body.
-    """
-
-    rate_source: RateSource = RateSource.AUTO
-    rate_cutoff: float = 12.0
-    joint_cutoff: float = 12.0
-    odometry: OdometrySettings = field(default_factory=OdometrySettings)
-    mounting: ImuMounting = field(default_factory=ImuMounting)
+    rate_source: RateSource = RateSource.AUTO  # where the angular velocity is from
+    rate_cutoff: float = 12.0  # of the low-pass of differentiated angular velocities [Hz]
+    joint_cutoff: float = 12.0  # of the low-pass of differentiated joint velocities [Hz]
+    odometry: OdometrySettings = field(default_factory=OdometrySettings)  # how the legs are read
+    mounting: ImuMounting = field(default_factory=ImuMounting)  # how the IMU sits on the body
 
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What is looked at now and then.
+    """What is looked at now and then."""
 
-    Attributes:
-        battery: State of the battery.
-        gravity_error: Between accelerometer and attitude [rad]; None while the body accelerates,
-            and without an accelerometer.
-        refused: Reports that could not be.
-        refusal: Why the last of them could not be.
-        imu_problem: Why the IMU is of no use; empty while it works.
-    """
-
-    battery: Battery
+    battery: Battery  # state of the battery
+    # between accelerometer and attitude [rad]; None while the body accelerates, and without an
+    # accelerometer
     gravity_error: float | None
-    refused: int
-    refusal: str
-    imu_problem: str = ''
+    refused: int  # reports that could not be
+    refusal: str  # why the last of them could not be
+    imu_problem: str = ''  # why the IMU is of no use; empty while it works
 
 
 class Estimator:

@@ -40,7 +40,6 @@ class GravityCheck:
         """Take a report.
 
         Args:
-            attitude: Of the body in the world.
             acceleration: Specific force in the body [m/s²]; None when it is not measured.
         """
         if acceleration is not None:

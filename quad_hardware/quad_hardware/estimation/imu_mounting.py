@@ -27,22 +27,16 @@ POSITIVE: Vector = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class ImuMounting:
-    """From what the IMU reports to base_link.
+    """From what the IMU reports to base_link."""
 
-    Attributes:
-        rotation: Of the IMU's axes in base_link, (x, y, z, w).
-        attitude_signs: Of roll, pitch and yaw as they are reported, against REP 103.
-        acceleration_signs: Of the specific force along x, y and z; +9.8 upwards at rest.
-        rate_signs: Of the angular velocity about x, y and z.
-        checked: Somebody has compared it with gravity on this robot.
-        rates_checked: Somebody has compared the signs of the gyro with turning it by hand.
-    """
-
-    rotation: Quaternion = IDENTITY
+    rotation: Quaternion = IDENTITY  # of the IMU's axes in base_link, (x, y, z, w)
+    # of roll, pitch and yaw as they are reported, against REP 103
     attitude_signs: Vector = POSITIVE
+    # of the specific force along x, y and z; +9.8 upwards at rest
     acceleration_signs: Vector = POSITIVE
-    rate_signs: Vector = POSITIVE
-    checked: bool = False
+    rate_signs: Vector = POSITIVE  # of the angular velocity about x, y and z
+    checked: bool = False  # somebody has compared it with gravity on this robot
+    # somebody has compared the signs of the gyro with turning it by hand
     rates_checked: bool = False
 
     def attitude(self, reported: Vector) -> Quaternion:

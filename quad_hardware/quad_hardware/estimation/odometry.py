@@ -55,52 +55,32 @@ class ContactSource(Enum):
 
 @dataclass(frozen=True, slots=True)
 class OdometrySettings:
-    """How the legs are read.
+    """How the legs are read."""
 
-    Attributes:
-        delay: By which the servos follow their commands [s].
-        tolerance: Height above the lowest foot up to which a foot is taken to stand [m].
-        margin: Before and after a swing in which a foot does not count [s].
-        cutoff: Of the low-pass of the velocity that is published [Hz].
-        command_age: Commands older than that are not looked at [s].
-        scale_x: What the way forward is multiplied by.
-        scale_y: What the way sideways is multiplied by.
-    """
-
-    delay: float = 0.04
+    delay: float = 0.04  # by which the servos follow their commands [s]
+    # height above the lowest foot up to which a foot is taken to stand [m]
     tolerance: float = 0.002
-    margin: float = 0.02
-    cutoff: float = 5.0
-    command_age: float = 0.3
-    scale_x: float = 1.0
-    scale_y: float = 1.0
+    margin: float = 0.02  # before and after a swing in which a foot does not count [s]
+    cutoff: float = 5.0  # of the low-pass of the velocity that is published [Hz]
+    command_age: float = 0.3  # commands older than that are not looked at [s]
+    scale_x: float = 1.0  # what the way forward is multiplied by
+    scale_y: float = 1.0  # what the way sideways is multiplied by
 
 
 @dataclass(frozen=True, slots=True)
 class OdometryState:
-    """Where the body is, in the frame in which it began.
+    """Where the body is, in the frame in which it began."""
 
-    Attributes:
-        x: Position of base_link [m].
-        y: Position of base_link [m].
-        height: Of base_link above the ground [m].
-        rotation: From base_link to odom, (x, y, z, w); it began with yaw zero.
-        velocity_x: Forward, in base_link turned level [m/s].
-        velocity_y: To the left, in base_link turned level [m/s].
-        distance: Way so far [m].
-        standing: Feet that are taken to stand, in the order of :data:`quad_description.FEET`.
-        contact_source: How that is known.
-    """
-
-    x: float
-    y: float
-    height: float
-    rotation: Quaternion
-    velocity_x: float
-    velocity_y: float
-    distance: float
+    x: float  # position of base_link [m]
+    y: float  # position of base_link [m]
+    height: float  # of base_link above the ground [m]
+    rotation: Quaternion  # from base_link to odom, (x, y, z, w); it began with yaw zero
+    velocity_x: float  # forward, in base_link turned level [m/s]
+    velocity_y: float  # to the left, in base_link turned level [m/s]
+    distance: float  # way so far [m]
+    # feet that are taken to stand, in the order of :data:`quad_description.FEET`
     standing: tuple[bool, ...]
-    contact_source: ContactSource
+    contact_source: ContactSource  # how that is known
 
     @property
     def velocity_in_base(self) -> Vector:
@@ -150,8 +130,6 @@ class LegOdometry:
 
         Args:
             time: When [s].
-            feet: Where they are measured.
-            attitude: From base_link to the world.
         """
         yaw = yaw_of(attitude)
         if self._yaw0 is None or self._keeps_heading:

@@ -19,38 +19,25 @@ MAX_PERIOD = 0.03  # [s] a pause between two commands does not add up to a jump
 
 @dataclass(frozen=True, slots=True)
 class LimiterSettings:
-    """How fast targets may move.
+    """How fast targets may move."""
 
-    Attributes:
-        speed: Fastest [rad/s]; of the gripper, times its travel in a radian of servo.
-        start_speed: Fastest at the beginning of a stream of commands [rad/s]; never above speed.
-        start_time: After which ``speed`` is reached [s].
-        stream_timeout: A pause that ends a stream [s].
-    """
-
-    speed: float = 12.0
+    speed: float = 12.0  # fastest [rad/s]; of the gripper, times its travel in a radian of servo
+    # fastest at the beginning of a stream of commands [rad/s]; never above speed
     start_speed: float = 2.0
-    start_time: float = 0.5
-    stream_timeout: float = STREAM_TIMEOUT
+    start_time: float = 0.5  # after which ``speed`` is reached [s]
+    stream_timeout: float = STREAM_TIMEOUT  # a pause that ends a stream [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What is sent for a joint command.
+    """What is sent for a joint command."""
 
-    Attributes:
-        targets: Positions [rad], [m] of the first joints, in their order.
-        clamped: Joints that were asked to go beyond their limits.
-        slowed: Joints that were asked to move faster than allowed.
-        outside: Joints that were found beyond their limits and are not back yet.
-        unseen: Joints that begin to move from a place that nobody knows.
-    """
-
-    targets: tuple[float, ...]
-    clamped: tuple[str, ...] = ()
-    slowed: tuple[str, ...] = ()
+    targets: tuple[float, ...]  # positions [rad], [m] of the first joints, in their order
+    clamped: tuple[str, ...] = ()  # joints that were asked to go beyond their limits
+    slowed: tuple[str, ...] = ()  # joints that were asked to move faster than allowed
+    # joints that were found beyond their limits and are not back yet
     outside: tuple[str, ...] = ()
-    unseen: tuple[str, ...] = ()
+    unseen: tuple[str, ...] = ()  # joints that begin to move from a place that nobody knows
 
 
 class CommandLimiter:
@@ -91,11 +78,10 @@ class CommandLimiter:
         """Take a command.
 
         Args:
-            positions: Targets of all joints, or of the legs only, in the order of the URDF
-                [rad], [m].
-            measured: Where the joints are; None where that is not known, which only joints
-                behind the legs may be: what the protocol does not report.
-            now: Time [s].
+            positions: Targets of all joints, or of the legs only, in the order of the URDF [rad],
+                [m].
+            measured: Where the joints are; None where that is not known, which only joints behind
+                the legs may be: what the protocol does not report.
 
         Raises:
             CommandError: A wrong length, a number that is not finite, or a leg of which nobody

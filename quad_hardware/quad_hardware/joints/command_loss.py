@@ -74,10 +74,7 @@ class CommandLoss:
         """Begin without a stream.
 
         Args:
-            joints: The robot's.
             raised: Names the feet that are in the air at targets of the legs [rad].
-            reaction: What it does.
-            timeout: A pause after which a stream has ended [s].
         """
         self.timeout = timeout
         self._legs = joints.names[: joints.leg_count]
@@ -126,7 +123,6 @@ class CommandLoss:
         Args:
             place: Where the joints are [rad]; empty when nobody knows.
             tilt: Of the body [rad]; None when nobody knows.
-            now: Time [s].
 
         Returns:
             Why the robot holds; empty when it goes down.

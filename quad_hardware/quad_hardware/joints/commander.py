@@ -18,27 +18,16 @@ START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed k
 
 @dataclass(slots=True)
 class CommandCounters:
-    """What became of joint commands.
+    """What became of joint commands."""
 
-    Attributes:
-        received: All of them.
-        refused: Of wrong length, not finite, or far from legs that something else has moved.
-        clamped: Went beyond limits and were taken to them.
-        slowed: Asked for more speed than allowed, and were approached.
-        reason: Why the last one was refused, or which joints were clamped.
-        troubled: Something was refused or clamped since the last look.
-        largest_step: Of a target since the last look [rad].
-        loss: What became of the robot when commands broke off; empty while they come.
-    """
-
-    received: int = 0
-    refused: int = 0
-    clamped: int = 0
-    slowed: int = 0
-    reason: str = ''
-    troubled: bool = field(default=False)
-    largest_step: float = 0.0
-    loss: str = ''
+    received: int = 0  # all of them
+    refused: int = 0  # of wrong length, not finite, or far from legs that something else has moved
+    clamped: int = 0  # went beyond limits and were taken to them
+    slowed: int = 0  # asked for more speed than allowed, and were approached
+    reason: str = ''  # why the last one was refused, or which joints were clamped
+    troubled: bool = field(default=False)  # something was refused or clamped since the last look
+    largest_step: float = 0.0  # of a target since the last look [rad]
+    loss: str = ''  # what became of the robot when commands broke off; empty while they come
 
 
 class JointCommander:
@@ -63,8 +52,6 @@ class JointCommander:
         """Begin without a stream.
 
         Args:
-            joints: Of the robot.
-            limiter: How fast targets may move.
             reaction: What the robot does when commands break off while its legs move.
             raised: Names the feet that are in the air at targets of the legs [rad].
             send: Has servo angles sent, by motor id [deg]; returns whether they are.
@@ -123,7 +110,6 @@ class JointCommander:
         Args:
             positions: Targets of the first joints, in the order of the URDF [rad], [m].
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
-            now: Time [s].
         """
         command = self._send(self._commanded, positions, place, now)
         if command is not None:
@@ -138,7 +124,6 @@ class JointCommander:
         Args:
             place: As in :meth:`take`.
             tilt: Of the body [rad]; None when nobody knows.
-            now: Time [s].
         """
         hazard = self._loss.hazard
         if not hazard:

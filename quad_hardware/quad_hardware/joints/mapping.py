@@ -24,25 +24,16 @@ DEGREE = math.pi / 180.0  # [rad]
 
 @dataclass(frozen=True, slots=True)
 class JointServo:
-    """A joint and the servo that moves it.
+    """A joint and the servo that moves it."""
 
-    Attributes:
-        joint: Name in the URDF.
-        motor: Id on the wire.
-        sign: 1 or -1.
-        offset: Position of the joint where the servo is at zero [rad], of the gripper [m].
-        lower: Least position that is sent [rad], [m].
-        upper: Greatest position that is sent [rad], [m].
-        gain: Position a degree of the servo is worth [rad/deg], [m/deg].
-    """
-
-    joint: str
-    motor: int
-    sign: int = 1
+    joint: str  # name in the URDF
+    motor: int  # id on the wire
+    sign: int = 1  # 1 or -1
+    # position of the joint where the servo is at zero [rad], of the gripper [m]
     offset: float = 0.0
-    lower: float = -math.inf
-    upper: float = math.inf
-    gain: float = DEGREE
+    lower: float = -math.inf  # least position that is sent [rad], [m]
+    upper: float = math.inf  # greatest position that is sent [rad], [m]
+    gain: float = DEGREE  # position a degree of the servo is worth [rad/deg], [m/deg]
 
     def __post_init__(self) -> None:
         """Refuse what would move a servo the wrong way or not at all."""
@@ -70,7 +61,6 @@ def servo_of(joint: Joint, motor: int | None = None) -> JointServo:
     """Return the servo of a joint, with sign 1, no offset and the limits of the URDF.
 
     Args:
-        joint: From the URDF.
         motor: Its id, where it is not the one that the vendor's names imply.
 
     Raises:

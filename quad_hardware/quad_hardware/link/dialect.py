@@ -21,34 +21,21 @@ Received = TypeVar('Received')
 
 @dataclass(slots=True)
 class DialectCounters:
-    """What a dialect has seen since its start.
+    """What a dialect has seen since its start."""
 
-    Attributes:
-        states: Reports of the robot.
-        lost: Reports that never came, by their sequence numbers (v2).
-        unanswered: Requests without an answer in time (v1).
-        refused: Frames that the robot refused (v2).
-        unusable: Valid frames whose contents are not.
-    """
-
-    states: int = 0
-    lost: int = 0
-    unanswered: int = 0
-    refused: int = 0
-    unusable: int = 0
+    states: int = 0  # reports of the robot
+    lost: int = 0  # reports that never came, by their sequence numbers (v2)
+    unanswered: int = 0  # requests without an answer in time (v1)
+    refused: int = 0  # frames that the robot refused (v2)
+    unusable: int = 0  # valid frames whose contents are not
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What is to be done now.
+    """What is to be done now."""
 
-    Attributes:
-        send: Bytes to send, maybe none.
-        wake: When to come back at the latest, on the clock of the caller [s].
-    """
-
-    send: bytes
-    wake: float
+    send: bytes  # bytes to send, maybe none
+    wake: float  # when to come back at the latest, on the clock of the caller [s]
 
 
 class Dialect(ABC, Generic[Received]):
@@ -63,12 +50,7 @@ class Dialect(ABC, Generic[Received]):
     """
 
     def __init__(self, protocol: Protocol, now: float) -> None:
-        """Begin a conversation.
-
-        Args:
-            protocol: What the robot speaks.
-            now: Time [s].
-        """
+        """Begin a conversation."""
         self.protocol = protocol
         self.can_release = True
         self._counters = DialectCounters()

@@ -51,9 +51,6 @@ class Driver:
         """Prepare; :meth:`start` begins.
 
         Args:
-            options: Where the robot is.
-            on_state: See above.
-            on_change: See above.
             tap: Returns a session that was opened with a port that records what passes.
         """
         self._options = options

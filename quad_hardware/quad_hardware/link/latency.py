@@ -20,7 +20,6 @@ def latency_timer(path: str, sysfs: Path = SYSFS) -> float | None:
 
     Args:
         path: Device file, or a link to one.
-        sysfs: Where the kernel describes serial ports.
     """
     name = Path(os.path.realpath(path)).name
     try:

@@ -11,15 +11,11 @@ import threading
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """What is to be sent.
+    """What is to be sent."""
 
-    Attributes:
-        angles: Servo angles by motor id [deg]; None for no new ones.
-        torque: Servos hold, or let go; None to leave it.
-    """
-
+    # servo angles by motor id [deg]; None for no new ones
     angles: Mapping[int, float] | None = None
-    torque: bool | None = None
+    torque: bool | None = None  # servos hold, or let go; None to leave it
 
 
 _NONE = Orders()

@@ -31,15 +31,10 @@ WRITE_TIMEOUT = 0.1  # [s] how long a port may take no bytes before it counts as
 
 
 class Port(Interface):
-    """What a conversation needs of a port.
+    """What a conversation needs of a port."""
 
-    Attributes:
-        path: Device file.
-        baud: Speed [bit/s].
-    """
-
-    path: str
-    baud: int
+    path: str  # device file
+    baud: int  # speed [bit/s]
 
     def fileno(self) -> int:
         """Return the file descriptor, for :mod:`select`."""

@@ -32,24 +32,17 @@ FIRMWARE_SIZE, BATTERY_SIZE = 10, 1  # [B]
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """A robot that answered.
+    """A robot that answered."""
 
-    Attributes:
-        port: The open port, owned by whoever holds the connection.
-        protocol: What the robot speaks.
-        firmware: Its version.
-    """
-
-    port: SerialPort
-    protocol: Protocol
-    firmware: str
+    port: SerialPort  # the open port, owned by whoever holds the connection
+    protocol: Protocol  # what the robot speaks
+    firmware: str  # its version
 
 
 def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0) -> Connection:
     """Open a port and request the firmware version, in one protocol after the other.
 
     Args:
-        path: Device file.
         protocols: What to try, in this order.
         baud: Speed [bit/s]; 0 takes each protocol's own.
 
@@ -129,9 +122,6 @@ def send_request(
     """Send a request and wait for its answer.
 
     Args:
-        port: Where the robot is.
-        protocol: What it speaks.
-        request: A READ frame.
         size: Length of the answer [B]; others are passed over.
         timeout: How long to wait [s].
 

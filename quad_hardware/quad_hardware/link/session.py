@@ -32,25 +32,15 @@ from .vendor import VendorDialect, VendorParser, VendorPort
 
 @dataclass(frozen=True, slots=True)
 class LinkOptions:
-    """Where the robot is, and how to talk to it.
+    """Where the robot is, and how to talk to it."""
 
-    Attributes:
-        path: Device file.
-        protocols: What to try, in this order.
-        baud: Speed [bit/s]; 0 takes each protocol's own.
-        model: Whose ranges scale bytes in protocol v1; None asks the firmware.
-        rate: Reports a second [Hz].
-        vendor: Go through the vendor's own library, and try nothing else.
-        vendor_method: Name of its method that writes a servo angle.
-    """
-
-    path: str
-    protocols: tuple[Protocol, ...] = PROTOCOLS
-    baud: int = 0
-    model: Model | None = None
-    rate: int = 50
-    vendor: bool = False
-    vendor_method: str = ''
+    path: str  # device file
+    protocols: tuple[Protocol, ...] = PROTOCOLS  # what to try, in this order
+    baud: int = 0  # speed [bit/s]; 0 takes each protocol's own
+    model: Model | None = None  # whose ranges scale bytes in protocol v1; None asks the firmware
+    rate: int = 50  # reports a second [Hz]
+    vendor: bool = False  # go through the vendor's own library, and try nothing else
+    vendor_method: str = ''  # name of its method that writes a servo angle
 
 
 Found_co = TypeVar('Found_co', covariant=True)
@@ -81,21 +71,13 @@ class FrameParser(Interface[Found_co]):
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A robot that was found.
+    """A robot that was found."""
 
-    Attributes:
-        port: The open port, owned by whoever holds the session.
-        firmware: Version of the robot.
-        parser: Finds frames in its bytes.
-        dialect: How to talk to it.
-        model: Whose ranges scale bytes in protocol v1; None in others.
-    """
-
-    port: Port
-    firmware: str
-    parser: FrameParser[Any]
-    dialect: Dialect[Any]
-    model: Model | None = None
+    port: Port  # the open port, owned by whoever holds the session
+    firmware: str  # version of the robot
+    parser: FrameParser[Any]  # finds frames in its bytes
+    dialect: Dialect[Any]  # how to talk to it
+    model: Model | None = None  # whose ranges scale bytes in protocol v1; None in others
 
 
 def open_session(options: LinkOptions) -> Session:
@@ -133,7 +115,6 @@ def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect[Fra
 
     Args:
         model: Whose ranges scale bytes in protocol v1; None speaks v2.
-        now: Time [s].
         rate: Reports a second [Hz].
     """
     return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)

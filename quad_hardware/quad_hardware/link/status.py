@@ -25,34 +25,18 @@ class LinkState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LinkStatus:
-    """How a link is at one moment.
+    """How a link is at one moment."""
 
-    Attributes:
-        state: What the driver is doing.
-        detail: In words; why, when it is not running.
-        protocol: What the robot speaks; empty while there is none.
-        baud: Speed of the line [bit/s].
-        firmware: Version of the robot.
-        connections: How often a robot was found.
-        age: Since the last report that was taken [s]; infinite before the first.
-        commands: Joint commands handed to the line.
-        dropped: Joint commands that were not sent, because the link was not running.
-        parser: What the parser saw in this connection.
-        dialect: What the dialect saw in this connection.
-        refused: Reports that could not be, and were not taken.
-        latency: Latency timer of the adapter [s]; None where there is none.
-    """
-
-    state: LinkState
-    detail: str
-    protocol: str
-    baud: int
-    firmware: str
-    connections: int
-    age: float
-    commands: int
-    dropped: int
-    parser: ParserCounters
-    dialect: DialectCounters
-    refused: int = 0
-    latency: float | None = None
+    state: LinkState  # what the driver is doing
+    detail: str  # in words; why, when it is not running
+    protocol: str  # what the robot speaks; empty while there is none
+    baud: int  # speed of the line [bit/s]
+    firmware: str  # version of the robot
+    connections: int  # how often a robot was found
+    age: float  # since the last report that was taken [s]; infinite before the first
+    commands: int  # joint commands handed to the line
+    dropped: int  # joint commands that were not sent, because the link was not running
+    parser: ParserCounters  # what the parser saw in this connection
+    dialect: DialectCounters  # what the dialect saw in this connection
+    refused: int = 0  # reports that could not be, and were not taken
+    latency: float | None = None  # latency timer of the adapter [s]; None where there is none

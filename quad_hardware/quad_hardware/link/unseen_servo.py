@@ -27,12 +27,7 @@ class UnseenServo:
     """Keeps the ends of where a servo may be, which move to its target as slowly as it may."""
 
     def __init__(self, span: Span, now: float) -> None:
-        """Begin with a servo that may be anywhere in its range [deg].
-
-        Args:
-            span: Its range.
-            now: Time [s].
-        """
+        """Begin with a servo that may be anywhere in its range [deg]."""
         self._low, self._high = span.low, span.high
         self._target = math.nan
         self._at = now

@@ -75,8 +75,6 @@ class V1Dialect(Dialect[Frame]):
         """Begin a conversation.
 
         Args:
-            now: Time [s].
-            model: Whose ranges scale the bytes.
             rate: Reports a second [Hz].
         """
         super().__init__(V1, now)

@@ -34,7 +34,6 @@ class V2Dialect(Dialect[Frame]):
         """Begin a conversation.
 
         Args:
-            now: Time [s].
             rate: Reports a second [Hz].
         """
         super().__init__(V2, now)

@@ -149,8 +149,6 @@ class VendorDialect(Dialect[object]):
         """Begin a conversation.
 
         Args:
-            dog: The vendor's robot.
-            now: Time [s].
             method: Name of the method that writes the angle [deg] of a motor by its id.
 
         Raises:

@@ -64,10 +64,6 @@ def find_write_method(dog: object, name: str) -> WriteAngle:
 
     Nothing public says its name, and a wrong one would move servos in another unit or not at all.
 
-    Args:
-        dog: The vendor's XgoDog.
-        name: Of the method.
-
     Raises:
         LinkError: It has no method of that name; the message lists what there is.
     """

@@ -56,9 +56,6 @@ class LinkDiagnostic:
         """Describe the link, and begin to look anew.
 
         Args:
-            node: Name of the node.
-            port: Its serial port.
-            status: The link.
             recording: Last file of the black box; empty before one.
         """
         level, message = _LINK_LEVELS[status.state], status.detail
@@ -108,10 +105,6 @@ def robot_diagnostic(
     """Describe battery, servos and IMU.
 
     Args:
-        node: Name of the node.
-        port: Its serial port.
-        state: The newest report.
-        health: How the robot is.
         signs_checked: Somebody has compared the IMU with gravity, and a gyro with turning.
         recording: Last file of the black box with a fault of it; empty before one.
     """

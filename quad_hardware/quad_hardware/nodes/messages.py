@@ -38,13 +38,9 @@ Numbers = Sequence[float]
 
 @dataclass(frozen=True, slots=True)
 class JointStates:
-    """All joints that are reported, in the order of the URDF; efforts are not known.
+    """All joints that are reported, in the order of the URDF; efforts are not known."""
 
-    Attributes:
-        names: Of the joints.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the joints
 
     @property
     def count(self) -> int:
@@ -82,19 +78,12 @@ def joint_numbers(joints: JointSample) -> Numbers:
 
 @dataclass(frozen=True, slots=True)
 class ImuTemplate:
-    """Attitude, angular velocity and specific force.
+    """Attitude, angular velocity and specific force."""
 
-    Attributes:
-        frame: In which they are.
-        orientation: Its standard deviation [rad].
-        acceleration: Its standard deviation [m/s²]; None where it is not measured.
-        rate: Its standard deviation [rad/s]; None where it is not published.
-    """
-
-    frame: str
-    orientation: float
-    acceleration: float | None
-    rate: float | None
+    frame: str  # in which they are
+    orientation: float  # its standard deviation [rad]
+    acceleration: float | None  # its standard deviation [m/s²]; None where it is not measured
+    rate: float | None  # its standard deviation [rad/s]; None where it is not published
     count: ClassVar[int] = 10
 
     def message(self, stamp: Time, numbers: Numbers) -> Imu:
@@ -126,19 +115,12 @@ def imu_numbers(imu: ImuSample) -> Numbers:
 
 @dataclass(frozen=True, slots=True)
 class OdometryTemplate:
-    """The pose in odom and the velocity in base_link (or in the footprint).
+    """The pose in odom and the velocity in base_link (or in the footprint)."""
 
-    Attributes:
-        frame: In which the pose is.
-        child: In which the velocity is.
-        tilt: Standard deviation of the rotation [rad].
-        rate: That of the angular velocity [rad/s]; None where it is not published.
-    """
-
-    frame: str
-    child: str
-    tilt: float
-    rate: float | None
+    frame: str  # in which the pose is
+    child: str  # in which the velocity is
+    tilt: float  # standard deviation of the rotation [rad]
+    rate: float | None  # that of the angular velocity [rad/s]; None where it is not published
     count: ClassVar[int] = 14
 
     def message(self, stamp: Time, numbers: Numbers) -> Odometry:
@@ -181,15 +163,10 @@ def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Nu
 
 @dataclass(frozen=True, slots=True)
 class FootContactsTemplate:
-    """Which feet are taken to stand; one template for each combination.
+    """Which feet are taken to stand; one template for each combination."""
 
-    Attributes:
-        contacts: Whether each does, in the order of the legs.
-        source: How that is known.
-    """
-
-    contacts: tuple[bool, ...]
-    source: str
+    contacts: tuple[bool, ...]  # whether each does, in the order of the legs
+    source: str  # how that is known
     count: ClassVar[int] = 0
 
     def message(self, stamp: Time, _numbers: Numbers) -> FootContacts:
@@ -209,13 +186,9 @@ def foot_contacts_template(state: OdometryState) -> FootContactsTemplate:
 
 @dataclass(frozen=True, slots=True)
 class TransformsTemplate:
-    """odom to base_link and base_link to base_footprint, or the other way round.
+    """odom to base_link and base_link to base_footprint, or the other way round."""
 
-    Attributes:
-        frames: From one to the next.
-    """
-
-    frames: tuple[str, str, str]
+    frames: tuple[str, str, str]  # from one to the next
     count: ClassVar[int] = 14
 
     def message(self, stamp: Time, numbers: Numbers) -> TFMessage:

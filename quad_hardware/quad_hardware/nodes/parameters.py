@@ -40,59 +40,35 @@ _MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for mod
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """Names of the frames, and how they hang together.
+    """Names of the frames, and how they hang together."""
 
-    Attributes:
-        odom: Fixed where the robot began.
-        base: The body.
-        footprint: On the ground below the body.
-        imu: Of the IMU.
-        footprint_is_parent: odom, footprint, base; else odom, base, footprint.
-        publish: Transforms are published.
-    """
-
-    odom: str
-    base: str
-    footprint: str
-    imu: str
-    footprint_is_parent: bool
-    publish: bool
+    odom: str  # fixed where the robot began
+    base: str  # the body
+    footprint: str  # on the ground below the body
+    imu: str  # of the IMU
+    footprint_is_parent: bool  # odom, footprint, base; else odom, base, footprint
+    publish: bool  # transforms are published
 
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
-    """Standard deviations that are published with the IMU.
+    """Standard deviations that are published with the IMU."""
 
-    Attributes:
-        orientation: [rad]
-        rate: Of the differentiated angular velocity [rad/s].
-        gyro: Of the angular velocity of a gyro [rad/s].
-        acceleration: [m/s²]
-    """
-
-    orientation: float
-    rate: float
-    gyro: float
-    acceleration: float
+    orientation: float  # [rad]
+    rate: float  # of the differentiated angular velocity [rad/s]
+    gyro: float  # of the angular velocity of a gyro [rad/s]
+    acceleration: float  # [m/s²]
 
 
 @dataclass(frozen=True, slots=True)
 class NodeSettings:
-    """All parameters.
+    """All parameters."""
 
-    Attributes:
-        robot: Which robot it is, and how it is read and commanded.
-        frames: Names of the frames.
-        deviations: Published with the IMU.
-        diagnostics_period: [s]
-        thread_priority: SCHED_FIFO priority of the thread of its loop; 0 requests none.
-    """
-
-    robot: RobotSettings
-    frames: Frames
-    deviations: Deviations
-    diagnostics_period: float
-    thread_priority: int
+    robot: RobotSettings  # which robot it is, and how it is read and commanded
+    frames: Frames  # names of the frames
+    deviations: Deviations  # published with the IMU
+    diagnostics_period: float  # [s]
+    thread_priority: int  # SCHED_FIFO priority of the thread of its loop; 0 requests none
 
 
 def declare_parameters(node: Node) -> NodeSettings:

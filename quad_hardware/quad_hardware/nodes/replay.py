@@ -66,27 +66,16 @@ robot_description, preset, arm, joints.*, imu.*, odometry.*, odom_frame, publish
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters of the program.
+    """Parameters of the program."""
 
-    Attributes:
-        log: The log.
-        rate: How many seconds of the log go by in one.
-        start: Where it begins, in [s] after the first entry.
-        loop: Begin again at the end.
-        robot: Which robot it is.
-        frames: Names of the frames.
-        deviations: Published with the IMU.
-        diagnostics_period: Time between two /diagnostics messages in [s].
-    """
-
-    log: Path
-    rate: float
-    start: float
-    loop: bool
-    robot: RobotSettings
-    frames: Frames
-    deviations: Deviations
-    diagnostics_period: float
+    log: Path  # the log
+    rate: float  # how many seconds of the log go by in one
+    start: float  # where it begins, in [s] after the first entry
+    loop: bool  # begin again at the end
+    robot: RobotSettings  # which robot it is
+    frames: Frames  # names of the frames
+    deviations: Deviations  # published with the IMU
+    diagnostics_period: float  # time between two /diagnostics messages in [s]
 
 
 class Replay:

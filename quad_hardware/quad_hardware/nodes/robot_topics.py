@@ -43,13 +43,9 @@ def log_link(node: Node, state: LinkState, detail: str) -> None:
 
 
 class ObservedRobot(Interface):
-    """What is published of a robot.
+    """What is published of a robot."""
 
-    Attributes:
-        names: Joints in the order of the URDF.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # joints in the order of the URDF
 
     @property
     def latest(self) -> tuple[Report, RobotState] | None:
@@ -83,10 +79,6 @@ class RobotTopics:
         """Make the publishers.
 
         Args:
-            node: Publishes.
-            robot: The robot.
-            frames: Names of the frames.
-            deviations: Published with the IMU.
             steady: Returns when a time of the robot's states is, on the monotonic clock [s].
         """
         self.link = LinkDiagnostic()

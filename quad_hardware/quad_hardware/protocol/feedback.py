@@ -18,37 +18,21 @@ NO_VALUES: Slots = (0.0,) * SLOTS
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """State of a robot at one moment, in the units of the wire.
+    """State of a robot at one moment, in the units of the wire."""
 
-    Attributes:
-        battery: Charge [%].
-        mode: Mode of the board.
-        faults: Bits of :class:`~.function_table.Fault`.
-        device_time: Clock of the board [ms], wraps at 2³².
-        attitude: Fused roll, pitch, yaw (fixed axes x, y, z) [deg].
-        raw_attitude: Unfused attitude [deg]; not to be used.
-        acceleration: Specific force x, y, z [m/s²]; +9.8 upwards at rest.
-        position: Angles by slot [deg].
-        velocity: Velocities by slot [deg/s].
-        load: Loads by slot [%].
-        temperature: Temperatures by slot [°C].
-        battery_voltage: Voltage of the battery [V].
-        sequence: Counts frames modulo 2¹⁶.
-    """
-
-    battery: int = 100
-    mode: int = 0
-    faults: int = 0
-    device_time: int = 0
-    attitude: Vector = (0.0, 0.0, 0.0)
-    raw_attitude: Vector = (0.0, 0.0, 0.0)
-    acceleration: Vector = (0.0, 0.0, 9.8)
-    position: Slots = NO_VALUES
-    velocity: Slots = NO_VALUES
-    load: Slots = NO_VALUES
-    temperature: Slots = NO_VALUES
-    battery_voltage: float = 0.0
-    sequence: int = 0
+    battery: int = 100  # charge [%]
+    mode: int = 0  # mode of the board
+    faults: int = 0  # bits of :class:`~.function_table.Fault`
+    device_time: int = 0  # clock of the board [ms], wraps at 2³²
+    attitude: Vector = (0.0, 0.0, 0.0)  # fused roll, pitch, yaw (fixed axes x, y, z) [deg]
+    raw_attitude: Vector = (0.0, 0.0, 0.0)  # unfused attitude [deg]; not to be used
+    acceleration: Vector = (0.0, 0.0, 9.8)  # specific force x, y, z [m/s²]; +9.8 upwards at rest
+    position: Slots = NO_VALUES  # angles by slot [deg]
+    velocity: Slots = NO_VALUES  # velocities by slot [deg/s]
+    load: Slots = NO_VALUES  # loads by slot [%]
+    temperature: Slots = NO_VALUES  # temperatures by slot [°C]
+    battery_voltage: float = 0.0  # voltage of the battery [V]
+    sequence: int = 0  # counts frames modulo 2¹⁶
 
     def frame(self) -> Frame:
         """Return the frame that a robot pushes.

@@ -16,17 +16,11 @@ LENGTH_AT, KIND_AT, ADDRESS_AT = 2, 3, 4  # [B] from the start of a frame
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame.
+    """One frame."""
 
-    Attributes:
-        kind: What it is for.
-        address: Register (v1), or ``main << 8 | sub`` (v2).
-        payload: Data; of a READ of protocol v1, one byte: how many to read.
-    """
-
-    kind: Kind
-    address: int
-    payload: bytes = b''
+    kind: Kind  # what it is for
+    address: int  # register (v1), or ``main << 8 | sub`` (v2)
+    payload: bytes = b''  # data; of a READ of protocol v1, one byte: how many to read
 
     def encode(self, protocol: Protocol) -> bytes:
         """Return the bytes on the wire.

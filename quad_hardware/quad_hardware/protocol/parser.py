@@ -15,23 +15,14 @@ _AFTER_CHECKSUM = len(TAIL) + 1
 
 @dataclass(slots=True)
 class ParserCounters:
-    """What a parser has seen since its start.
+    """What a parser has seen since its start."""
 
-    Attributes:
-        bytes: Bytes fed.
-        frames: Valid frames.
-        skipped: Bytes that belong to no valid frame.
-        bad_kind: Headers followed by a kind of frame that is not expected from this side.
-        bad_tail: Candidates without the tail where their length says it is.
-        bad_checksum: Candidates with header, length and tail, and a wrong checksum.
-    """
-
-    bytes: int = 0
-    frames: int = 0
-    skipped: int = 0
-    bad_kind: int = 0
-    bad_tail: int = 0
-    bad_checksum: int = 0
+    bytes: int = 0  # bytes fed
+    frames: int = 0  # valid frames
+    skipped: int = 0  # bytes that belong to no valid frame
+    bad_kind: int = 0  # headers followed by a kind of frame that is not expected from this side
+    bad_tail: int = 0  # candidates without the tail where their length says it is
+    bad_checksum: int = 0  # candidates with header, length and tail, and a wrong checksum
 
     @property
     def damaged(self) -> int:
@@ -57,7 +48,6 @@ class StreamParser:
         """Begin with an empty buffer.
 
         Args:
-            protocol: Envelope of the frames.
             kinds: Kinds that the other side sends: ``ROBOT_KINDS`` or ``HOST_KINDS``.
         """
         self._protocol = protocol

@@ -210,10 +210,6 @@ V1 = Protocol(
 def scatter(address: int, payload: bytes) -> Iterator[tuple[int, bytes]]:
     """Take a write of several bytes apart into the registers that it runs through.
 
-    Args:
-        address: Register of the frame.
-        payload: Its data.
-
     Yields:
         Register and its bytes; a register that the table lacks takes one byte.
     """

@@ -66,15 +66,10 @@ class Model(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Range of a quantity that a byte 0 to 255 spreads over.
+    """Range of a quantity that a byte 0 to 255 spreads over."""
 
-    Attributes:
-        low: Value of byte 0.
-        high: Value of byte 255.
-    """
-
-    low: float
-    high: float
+    low: float  # value of byte 0
+    high: float  # value of byte 255
 
     def encode(self, value: float) -> int:
         """Return the nearest byte; values outside are taken to the nearer end.
@@ -94,27 +89,16 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A run of equal numbers in a payload.
+    """A run of equal numbers in a payload."""
 
-    Attributes:
-        name: Key in what :meth:`Function.unpack` returns.
-        scalar: Number format.
-        offset: First byte in the payload [B].
-        count: How many numbers.
-        scale: Unit of one step on the wire, for integers.
-        unit: Unit of the value.
-        meaning: For the protocol page.
-        layout: Format of the run for :mod:`struct`.
-    """
-
-    name: str
-    scalar: Scalar
-    offset: int = 0
-    count: int = 1
-    scale: float = 1.0
-    unit: str = ''
-    meaning: str = ''
-    layout: str = field(init=False)
+    name: str  # key in what :meth:`Function.unpack` returns
+    scalar: Scalar  # number format
+    offset: int = 0  # first byte in the payload [B]
+    count: int = 1  # how many numbers
+    scale: float = 1.0  # unit of one step on the wire, for integers
+    unit: str = ''  # unit of the value
+    meaning: str = ''  # for the protocol page
+    layout: str = field(init=False)  # format of the run for :mod:`struct`
 
     def __post_init__(self) -> None:
         """Make the format once: states are decoded 50 times a second."""
@@ -156,36 +140,25 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A row of a protocol table.
+    """A row of a protocol table."""
 
-    Attributes:
-        address: What stands in the frame.
-        name: Short name, unique in the table.
-        access: Which kinds of frame carry it.
-        fields: Payload, in the order of offsets.
-        repeated: The fields describe one group of several; a payload holds one group or more.
-        size: Length of the payload [B] where it is longer than its fields (filled with zeros).
-        spans: What a byte 0 to 255 spreads over, for functions of one byte.
-        unit: Unit of the spans.
-        meaning: For the protocol page.
-        variable: Payloads may also be shorter.
-        length: Length of a payload, or of one group of it [B].
-        order: Byte order of the numbers for :mod:`struct`; empty where they are mixed.
-        layout: Format of the whole payload, or of one group of it, without the order.
-    """
-
-    address: int
-    name: str
-    access: Access
-    fields: tuple[Field, ...]
-    meaning: str
+    address: int  # what stands in the frame
+    name: str  # short name, unique in the table
+    access: Access  # which kinds of frame carry it
+    fields: tuple[Field, ...]  # payload, in the order of offsets
+    meaning: str  # for the protocol page
+    # the fields describe one group of several; a payload holds one group or more
     repeated: bool = False
+    # length of the payload [B] where it is longer than its fields (filled with zeros)
     size: int = 0
+    # what a byte 0 to 255 spreads over, for functions of one byte
     spans: Mapping[Model, Span] = field(default_factory=dict)
-    unit: str = ''
-    variable: bool = False
-    length: int = field(init=False)
+    unit: str = ''  # unit of the spans
+    variable: bool = False  # payloads may also be shorter
+    length: int = field(init=False)  # length of a payload, or of one group of it [B]
+    # byte order of the numbers for :mod:`struct`; empty where they are mixed
     order: str = field(init=False)
+    # format of the whole payload, or of one group of it, without the order
     layout: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -275,24 +248,15 @@ class Protocol:
 
     Every frame is ``55 00 | LEN | TYPE | address | payload | CHK | 00 AA``; LEN counts the whole
     frame, CHK is 255 minus the sum of everything from LEN to the payload, modulo 256.
-
-    Attributes:
-        name: Name for people, and of the parameter that chooses it.
-        origin: Where the layout is from.
-        baud: Speed of the line [bit/s], 8N1.
-        address_size: Bytes of an address, the most significant first [B].
-        kinds: Kinds of frame that there are.
-        functions: The table, by address.
-        max_length: Longest frame [B].
     """
 
-    name: str
-    origin: str
-    baud: int
-    address_size: int
-    kinds: frozenset[Kind]
-    functions: Mapping[int, Function]
-    max_length: int = 255
+    name: str  # name for people, and of the parameter that chooses it
+    origin: str  # where the layout is from
+    baud: int  # speed of the line [bit/s], 8N1
+    address_size: int  # bytes of an address, the most significant first [B]
+    kinds: frozenset[Kind]  # kinds of frame that there are
+    functions: Mapping[int, Function]  # the table, by address
+    max_length: int = 255  # longest frame [B]
 
     @property
     def overhead(self) -> int:

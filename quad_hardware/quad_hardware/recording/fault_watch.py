@@ -49,8 +49,6 @@ class FaultWatch:
         """Return what has begun, in words; empty as a rule.
 
         Args:
-            report: A report.
-            state: Its state.
             imu_problem: Why the IMU is of no use; empty while it works.
         """
         begun: list[str] = []

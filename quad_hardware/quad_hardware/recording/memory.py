@@ -33,7 +33,6 @@ class SerialMemory:
         """Begin with nothing.
 
         Args:
-            port: Device file.
             window: How far back it reaches [s].
         """
         self._port, self._window = port, window
@@ -75,7 +74,6 @@ class SerialMemory:
         The robot that was found before, and the state of then, stand at its beginning.
 
         Args:
-            folder: Where to.
             pause: Called after each small piece of work.
 
         Raises:

@@ -34,53 +34,32 @@ _LINE = re.compile(r'\((\d+\.\d+)\) (<|>|open|state) (.*)')
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """Bytes that were read or written at once.
+    """Bytes that were read or written at once."""
 
-    Attributes:
-        time: When [s].
-        data: The bytes.
-        sent: They went to the robot; otherwise they came from it.
-    """
-
-    time: float
-    data: bytes
-    sent: bool
+    time: float  # when [s]
+    data: bytes  # the bytes
+    sent: bool  # they went to the robot; otherwise they came from it
 
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A robot that was found; what follows is the conversation with it.
+    """A robot that was found; what follows is the conversation with it."""
 
-    Attributes:
-        time: When [s].
-        port: Device file.
-        baud: Speed [bit/s].
-        protocol: Name of what it speaks.
-        firmware: Its version.
-        model: Whose ranges scale bytes in protocol v1; None in others.
-    """
-
-    time: float
-    port: str
-    baud: int
-    protocol: str
-    firmware: str
-    model: Model | None
+    time: float  # when [s]
+    port: str  # device file
+    baud: int  # speed [bit/s]
+    protocol: str  # name of what it speaks
+    firmware: str  # its version
+    model: Model | None  # whose ranges scale bytes in protocol v1; None in others
 
 
 @dataclass(frozen=True, slots=True)
 class StateEntered:
-    """The state of the link has changed.
+    """The state of the link has changed."""
 
-    Attributes:
-        time: When [s].
-        state: What the driver does from then on.
-        detail: In words.
-    """
-
-    time: float
-    state: LinkState
-    detail: str
+    time: float  # when [s]
+    state: LinkState  # what the driver does from then on
+    detail: str  # in words
 
 
 Entry: TypeAlias = Transfer | Opened | StateEntered
@@ -95,7 +74,6 @@ def format_event(event: Opened | StateEntered, time: float) -> str:
     """Return the line of what is no transfer, with its end.
 
     Args:
-        event: What happened.
         time: When, on the wall clock [s].
     """
     if isinstance(event, StateEntered):

@@ -66,13 +66,8 @@ class Board:
         """Switch the board on; the robot stays as it is.
 
         Args:
-            plant: The robot.
-            urdf: What it is made of.
-            model: Which one it is.
-            firmware: Version to report; empty for one of the model.
             charge: Of the battery [%].
             mounts: How servos are mounted that are not as the driver expects, by motor id.
-            now: Time [s].
 
         Raises:
             SetupError: The robot has a joint for which the board has no servo.

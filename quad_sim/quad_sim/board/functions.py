@@ -33,11 +33,7 @@ class Functions:
     """Answers frames of protocol v2 and pushes states."""
 
     def __init__(self, board: Board) -> None:
-        """Begin without feedback.
-
-        Args:
-            board: What the functions do something to.
-        """
+        """Begin without feedback."""
         self._board = board
         self._readers: dict[int, Callable[[], Values]] = {
             Code.VERSION: self._version,
@@ -61,12 +57,7 @@ class Functions:
         self._sequence = 0
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
-        """Carry a frame out; return what the board answers.
-
-        Args:
-            frame: What the host sent.
-            now: Time [s].
-        """
+        """Carry a frame out; return what the board answers."""
         try:
             answer = self._carry_out(frame)
         except RefusedError as refused:

@@ -26,15 +26,10 @@ OVERLOAD_TIME = 1.0  # [s] a step of the gait is shorter
 
 @dataclass(slots=True)
 class Battery:
-    """The battery.
+    """The battery."""
 
-    Attributes:
-        charge: [%]
-        current: What is drawn from it [A].
-    """
-
-    charge: float = 100.0
-    current: float = IDLE_CURRENT
+    charge: float = 100.0  # [%]
+    current: float = IDLE_CURRENT  # what is drawn from it [A]
 
     def advance(self, torques: Array, duration: float) -> None:
         """Draw current for a time [s]."""

@@ -47,11 +47,7 @@ class Registers:
     """Answers frames of protocol v1."""
 
     def __init__(self, board: Board) -> None:
-        """Begin with empty registers.
-
-        Args:
-            board: What the registers do something to.
-        """
+        """Begin with empty registers."""
         self._board = board
         self._spans = ANGLE_SPANS[board.model]
         self._writers: dict[int, Callable[[bytes], None]] = {
@@ -75,12 +71,7 @@ class Registers:
         self._memory: dict[int, bytes] = {}
 
     def handle(self, frame: Frame, now: float) -> list[Frame]:
-        """Carry a frame out; return what the board answers.
-
-        Args:
-            frame: What the host sent.
-            now: Time [s].
-        """
+        """Carry a frame out; return what the board answers."""
         if frame.kind is Kind.WRITE:
             self._write(frame)
             return []

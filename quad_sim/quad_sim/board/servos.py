@@ -40,15 +40,10 @@ class _Scale:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """How a servo sits on its joint.
+    """How a servo sits on its joint."""
 
-    Attributes:
-        sign: 1, or -1 for one that turns the other way.
-        offset: What the servo reads where the joint is at zero [deg].
-    """
-
-    sign: int = 1
-    offset: float = 0.0
+    sign: int = 1  # 1, or -1 for one that turns the other way
+    offset: float = 0.0  # what the servo reads where the joint is at zero [deg]
 
     def __post_init__(self) -> None:
         """Refuse what is no mounting.
@@ -94,9 +89,6 @@ class Servos:
         """Connect to a robot.
 
         Args:
-            plant: The robot.
-            joints: Its joints.
-            model: Whose ranges the gripper has.
             mounts: Servos that are not mounted as a driver expects, by motor id.
 
         Raises:
@@ -127,7 +119,6 @@ class Servos:
         """Send servos to angles [deg]; servos that the robot lacks are left out.
 
         Args:
-            angles: By motor id.
             duration: Time of the way [s]; None for the servo's own.
         """
         positions = {
@@ -156,10 +147,8 @@ class Servos:
         """Switch servos on or off; those that the robot lacks or that have failed are left out.
 
         Args:
-            motors: By id.
-            on: Whether they hold.
-            hold: Those that wake hold where they are, as after switching on; else they go to
-                their last target, as when a host gives the torque back.
+            hold: Those that wake hold where they are, as after switching on; else they go to their
+                last target, as when a host gives the torque back.
         """
         names = [
             self._joint[motor]

@@ -20,7 +20,6 @@ class Turn:
         Args:
             angle: How far [rad]; counter-clockwise is positive, more than a turn is allowed.
             yaw: Heading now [rad].
-            now: Time [s].
         """
         self._left = angle
         self._yaw = yaw
@@ -31,7 +30,6 @@ class Turn:
 
         Args:
             yaw: Heading now [rad], which may have wrapped around.
-            now: Time [s].
         """
         self._left -= math.remainder(yaw - self._yaw, 2.0 * math.pi)
         self._yaw = yaw

@@ -28,18 +28,12 @@ STILL = 1e-3
 
 @dataclass(slots=True)
 class Stance:
-    """How the body stands over its feet, and what a host changed of it.
+    """How the body stands over its feet, and what a host changed of it."""
 
-    Attributes:
-        shift: Of the body [m].
-        height: From hip to foot [m].
-        attitude: Roll, pitch, yaw of the body over the ground [rad].
-        feet: Feet that a host moved, from where they stand [m], by leg.
-    """
-
-    shift: tuple[float, float] = (0.0, 0.0)
-    height: float = HEIGHT
-    attitude: Vector = (0.0, 0.0, 0.0)
+    shift: tuple[float, float] = (0.0, 0.0)  # of the body [m]
+    height: float = HEIGHT  # from hip to foot [m]
+    attitude: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw of the body over the ground [rad]
+    # feet that a host moved, from where they stand [m], by leg
     feet: dict[str, Vector] = field(default_factory=dict)
 
 
@@ -54,11 +48,7 @@ class Walker:
     """
 
     def __init__(self, urdf: str) -> None:
-        """Stand, as after switching on.
-
-        Args:
-            urdf: The robot.
-        """
+        """Stand, as after switching on."""
         self._robot = quadruped(urdf)
         self.reset()
 

@@ -89,7 +89,6 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         Args:
             make: Makes an environment whose observations and actions are rows of numbers; a
                 function that other processes can import.
-            num_envs: How many.
             processes: In how many processes; as many as there are cores for None.
 
         Raises:
@@ -130,7 +129,6 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
 
         Args:
             seed: Of the first; that of each other is one more. Or one for each.
-            options: For all.
         """
         seeds = seed if isinstance(seed, list) else self._seeds(seed)
         for worker in self._workers:
@@ -142,9 +140,6 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         self, actions: Floats
     ) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Pass a step in all of them.
-
-        Args:
-            actions: A row for each.
 
         Raises:
             SimulationError: One of them failed, or a process died.
@@ -163,13 +158,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         )
 
     def call(self, name: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:  # noqa: ANN401
-        """Call a method of each of them; return what they return.
-
-        Args:
-            name: Of the method.
-            *arguments: For it.
-            **keywords: For it.
-        """
+        """Call a method of each of them; return what they return."""
         for worker in self._workers:
             worker.order(_Order.CALL, name, arguments, keywords)
         return tuple(answer for _, answer in self._answers())

@@ -30,31 +30,18 @@ def check_range(name: str, span: Range) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Randomization:
-    """Ranges from which each episode draws, all alike likely.
+    """Ranges from which each episode draws, all alike likely."""
 
-    Attributes:
-        friction: Under the feet.
-        trunk_mass: Factor of the mass of the trunk.
-        stiffness: Factor of the servos' stiffness.
-        damping: Factor of their damping.
-        delay: From a target to the servos in [s], less than a period.
-        gyro_bias: Of each axis of the gyro in [rad/s].
-        level_bias: Of measured roll and pitch in [rad].
-        kick: Change of the velocity at once, ahead and to the side, in [m/s].
-        kick_interval: Mean time between two kicks in [s]; 0 for none.
-        noise: Of the sensors.
-    """
-
-    friction: Range = (0.4, 1.3)
-    trunk_mass: Range = (0.9, 1.25)
-    stiffness: Range = (0.8, 1.2)
-    damping: Range = (0.8, 1.2)
-    delay: Range = (0.0, 0.015)
-    gyro_bias: Range = (-0.05, 0.05)
-    level_bias: Range = (-0.02, 0.02)
-    kick: Range = (-0.4, 0.4)
-    kick_interval: float = 4.0
-    noise: Noise = BOARD
+    friction: Range = (0.4, 1.3)  # under the feet
+    trunk_mass: Range = (0.9, 1.25)  # factor of the mass of the trunk
+    stiffness: Range = (0.8, 1.2)  # factor of the servos' stiffness
+    damping: Range = (0.8, 1.2)  # factor of their damping
+    delay: Range = (0.0, 0.015)  # from a target to the servos in [s], less than a period
+    gyro_bias: Range = (-0.05, 0.05)  # of each axis of the gyro in [rad/s]
+    level_bias: Range = (-0.02, 0.02)  # of measured roll and pitch in [rad]
+    kick: Range = (-0.4, 0.4)  # change of the velocity at once, ahead and to the side, in [m/s]
+    kick_interval: float = 4.0  # mean time between two kicks in [s]; 0 for none
+    noise: Noise = BOARD  # of the sensors
 
     def __post_init__(self) -> None:
         """Refuse what nothing can be drawn from."""

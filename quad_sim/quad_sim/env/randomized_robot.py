@@ -56,12 +56,6 @@ class RandomizedRobot:
     ) -> None:
         """Put the robot on the ground.
 
-        Args:
-            preset: The robot.
-            servo: How its servos follow.
-            randomization: What differs in each episode.
-            period: Time of a step in [s].
-
         Raises:
             SetupError: A target may come later than its step ends.
             DescriptionError: There is no such preset.
@@ -107,7 +101,6 @@ class RandomizedRobot:
 
         Args:
             action: What leads beyond a limit is taken to the limit.
-            random: Kicks are drawn from it.
 
         Returns:
             What the step brought about.

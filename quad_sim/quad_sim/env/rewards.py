@@ -15,23 +15,14 @@ from ..plant.state import Array, BaseVelocity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What a step brought about.
+    """What a step brought about."""
 
-    Attributes:
-        velocity: How base_link moves.
-        tilt: Angle between its z axis and up in [rad].
-        down: Direction of gravity in base_link.
-        torques: Of the joints in [N m].
-        velocities: Of the joints in [rad/s].
-        target_speed: Of the targets since the step before in [rad/s].
-    """
-
-    velocity: BaseVelocity
-    tilt: float
-    down: Vector
-    torques: Array
-    velocities: Array
-    target_speed: Array
+    velocity: BaseVelocity  # how base_link moves
+    tilt: float  # angle between its z axis and up in [rad]
+    down: Vector  # direction of gravity in base_link
+    torques: Array  # of the joints in [N m]
+    velocities: Array  # of the joints in [rad/s]
+    target_speed: Array  # of the targets since the step before in [rad/s]
 
     @property
     def power(self) -> float:
@@ -46,31 +37,18 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class RewardWeights:
-    """Weights of the terms of a second, of which a step has its part; a fall counts once.
+    """Weights of the terms of a second, of which a step has its part; a fall counts once."""
 
-    Attributes:
-        tracking: exp(-(error / tracking_width)^2) of the linear velocity.
-        turning: exp(-(error / turning_width)^2) of the turning.
-        vertical: Square of the velocity up and down in [m2/s2].
-        rolling: Square of the turning about x and y in [rad2/s2].
-        level: Square of the sine of the tilt.
-        power: Of the servos' torques, before the damping of their motors, in [W].
-        action_rate: Square of the speed of the targets in [rad2/s2].
-        fall: Of a fall.
-        tracking_width: [m/s]
-        turning_width: [rad/s]
-    """
-
-    tracking: float = 2.0
-    turning: float = 1.0
-    vertical: float = -2.0
-    rolling: float = -0.05
-    level: float = -2.0
-    power: float = -0.02
-    action_rate: float = -0.002
-    fall: float = -5.0
-    tracking_width: float = 0.1
-    turning_width: float = 0.4
+    tracking: float = 2.0  # exp(-(error / tracking_width)^2) of the linear velocity
+    turning: float = 1.0  # exp(-(error / turning_width)^2) of the turning
+    vertical: float = -2.0  # square of the velocity up and down in [m2/s2]
+    rolling: float = -0.05  # square of the turning about x and y in [rad2/s2]
+    level: float = -2.0  # square of the sine of the tilt
+    power: float = -0.02  # of the servos' torques, before the damping of their motors, in [W]
+    action_rate: float = -0.002  # square of the speed of the targets in [rad2/s2]
+    fall: float = -5.0  # of a fall
+    tracking_width: float = 0.1  # [m/s]
+    turning_width: float = 0.4  # [rad/s]
 
     def __post_init__(self) -> None:
         """Refuse numbers of which no reward can be made."""
@@ -85,10 +63,7 @@ class RewardWeights:
         """Return what each term is worth in one step.
 
         Args:
-            motion: What the step brought about.
             commanded: Velocity ahead and to the left in [m/s], turning in [rad/s].
-            period: Time that it took in [s].
-            fallen: The robot has fallen.
         """
         (x, y, up), (roll, pitch, yaw) = motion.velocity.linear, motion.velocity.angular
         wanted_x, wanted_y, wanted_yaw = commanded

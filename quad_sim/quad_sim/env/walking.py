@@ -28,23 +28,14 @@ MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
 
 @dataclass(frozen=True, slots=True)
 class CommandRanges:
-    """Velocities that are commanded.
+    """Velocities that are commanded."""
 
-    Attributes:
-        x: Ahead in [m/s].
-        y: To the left in [m/s].
-        yaw: Turning to the left in [rad/s].
-        time: Between two commands in [s].
-        rest: Share of the commands that are zero.
-        straight: Share of the others along one axis only.
-    """
-
-    x: Range = (-0.35, 0.35)
-    y: Range = (-0.15, 0.15)
-    yaw: Range = (-1.5, 1.5)
-    time: float = 2.0
-    rest: float = 0.15
-    straight: float = 0.4
+    x: Range = (-0.35, 0.35)  # ahead in [m/s]
+    y: Range = (-0.15, 0.15)  # to the left in [m/s]
+    yaw: Range = (-1.5, 1.5)  # turning to the left in [rad/s]
+    time: float = 2.0  # between two commands in [s]
+    rest: float = 0.15  # share of the commands that are zero
+    straight: float = 0.4  # share of the others along one axis only
 
     def __post_init__(self) -> None:
         """Refuse what nothing can be drawn from."""
@@ -94,12 +85,6 @@ class WalkingEnv(gymnasium.Env[Floats, Floats]):
         """Put the robot on the ground.
 
         Args:
-            preset: The robot.
-            servo: How its servos follow.
-            randomization: What differs in each episode.
-            commands: What is commanded.
-            weights: What walking well is worth.
-            period: Time of a step in [s].
             duration: Longest time of an episode in [s].
 
         Raises:

@@ -13,15 +13,11 @@ WINDOW = 20_000  # commands that are looked back
 
 @dataclass(frozen=True, slots=True)
 class CommandTiming:
-    """Of joint commands on the wire; percentiles of nothing are NaN.
+    """Of joint commands on the wire; percentiles of nothing are NaN."""
 
-    Attributes:
-        latencies: Times from the last byte of a state to the first byte of the next command in
-            [s].
-        deviations: Of the times between two commands from their median in [s].
-    """
-
+    # times from the last byte of a state to the first byte of the next command in [s]
     latencies: tuple[float, ...] = ()
+    # of the times between two commands from their median in [s]
     deviations: tuple[float, ...] = ()
 
     def __add__(self, other: CommandTiming) -> CommandTiming:

@@ -59,19 +59,12 @@ SETTINGS: Mapping[FaultKind, Mapping[str, _Setting]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that goes wrong for a time.
+    """Something that goes wrong for a time."""
 
-    Attributes:
-        kind: What.
-        start: From when [s], since the start of the robot.
-        duration: For how long [s]; infinite until it is ended.
-        values: Its details by name.
-    """
-
-    kind: FaultKind
-    start: float = 0.0
-    duration: float = FOREVER
-    values: Mapping[str, float] = field(default_factory=dict)
+    kind: FaultKind  # what
+    start: float = 0.0  # from when [s], since the start of the robot
+    duration: float = FOREVER  # for how long [s]; infinite until it is ended
+    values: Mapping[str, float] = field(default_factory=dict)  # its details by name
 
     def __post_init__(self) -> None:
         """Refuse times and details without sense.
@@ -112,7 +105,6 @@ def make_fault(
     """Return a fault from words.
 
     Args:
-        name: Its kind.
         settings: ``name=value`` each; ``at`` and ``for`` go before the arguments.
         start: From when [s].
         duration: For how long [s].
@@ -152,11 +144,7 @@ class FaultPlan:
     """The faults of a robot, over its time."""
 
     def __init__(self, faults: Iterable[Fault] = ()) -> None:
-        """Plan faults.
-
-        Args:
-            faults: What is to come.
-        """
+        """Plan faults."""
         self._faults = list(faults)
 
     def add(self, fault: Fault) -> None:

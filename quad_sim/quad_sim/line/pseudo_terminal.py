@@ -39,9 +39,6 @@ class PseudoTerminal:
     def __init__(self, link: Path) -> None:
         """Make the device and the link.
 
-        Args:
-            link: Where programs shall find it; what a killed robot left there is replaced.
-
         Raises:
             SetupError: Something else is there, or the link cannot be made.
         """

@@ -24,17 +24,11 @@ QUIET = 0.05  # [s] of silence in a frame after which its rest is not waited for
 
 @dataclass(slots=True)
 class LineStatistics:
-    """What the robot has received.
+    """What the robot has received."""
 
-    Attributes:
-        frames: Valid frames.
-        hurried: Frames that followed the one before too closely, and were not carried out.
-        garbled: Bytes at a baud rate at which the robot does not listen.
-    """
-
-    frames: int = 0
-    hurried: int = 0
-    garbled: int = 0
+    frames: int = 0  # valid frames
+    hurried: int = 0  # frames that followed the one before too closely, and were not carried out
+    garbled: int = 0  # bytes at a baud rate at which the robot does not listen
 
 
 class RobotLine:
@@ -60,12 +54,9 @@ class RobotLine:
         """Connect a board.
 
         Args:
-            board: The robot.
             speeds: What it speaks, by baud rate [bit/s]; both protocols at their own for None.
-            faults: What goes wrong, and when.
-            command_gap: Least time between two frames of the host in protocol v1 [s]; a frame
-                that comes sooner is lost, as the vendor warns.
-            seed: Of the damage on the line.
+            command_gap: Least time between two frames of the host in protocol v1 [s]; a frame that
+                comes sooner is lost, as the vendor warns.
         """
         self.faults = faults or FaultPlan()
         self.statistics = LineStatistics()

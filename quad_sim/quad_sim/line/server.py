@@ -28,19 +28,12 @@ TRUTH_PERIOD = 0.02  # [s] between two looks at where it is
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the robot really is.
+    """Where the robot really is."""
 
-    Attributes:
-        time: Of the robot [s].
-        pose: Of base_link in the world.
-        velocity: Of base_link.
-        foot_contacts: Which feet touch the ground, in the order of the legs.
-    """
-
-    time: float
-    pose: BasePose
-    velocity: BaseVelocity
-    foot_contacts: tuple[bool, ...]
+    time: float  # of the robot [s]
+    pose: BasePose  # of base_link in the world
+    velocity: BaseVelocity  # of base_link
+    foot_contacts: tuple[bool, ...]  # which feet touch the ground, in the order of the legs
 
 
 class Server:
@@ -61,8 +54,6 @@ class Server:
         """Connect robot and terminal.
 
         Args:
-            plant: The robot.
-            line: Its board and serial line.
             terminal: Where programs find it; closing it is up to the caller.
             watch: Is called every 20 ms, between two turns of the loop.
         """

@@ -19,32 +19,20 @@ BITS_PER_BYTE = 10  # 8N1: start, eight data bits, stop
 
 @dataclass(slots=True)
 class LineCounters:
-    """What went over one direction of a line.
+    """What went over one direction of a line."""
 
-    Attributes:
-        bytes: Bytes put in.
-        dropped: Bytes that a fault swallowed.
-        flipped: Bytes that a fault damaged.
-    """
-
-    bytes: int = 0
-    dropped: int = 0
-    flipped: int = 0
+    bytes: int = 0  # bytes put in
+    dropped: int = 0  # bytes that a fault swallowed
+    flipped: int = 0  # bytes that a fault damaged
 
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """Bytes at the end of a line.
+    """Bytes at the end of a line."""
 
-    Attributes:
-        end: When the last of them is there [s].
-        data: What is left of them.
-        seconds_per_byte: How long each took on the line [s].
-    """
-
-    end: float
-    data: bytes
-    seconds_per_byte: float
+    end: float  # when the last of them is there [s]
+    data: bytes  # what is left of them
+    seconds_per_byte: float  # how long each took on the line [s]
 
 
 class Wire:
@@ -54,10 +42,7 @@ class Wire:
         """Lay the wire.
 
         Args:
-            faults: What happens to it.
             muted_by: The fault in which nothing gets through.
-            seed: Of the damage.
-            slow: Whether the fault SLOW delays it.
         """
         self.counters = LineCounters()
         self._faults = faults

@@ -20,17 +20,11 @@ MAX_DELAY = 1.0  # [s]
 
 @dataclass(frozen=True, slots=True)
 class ImuBias:
-    """By how much an IMU is off all the time.
+    """By how much an IMU is off all the time."""
 
-    Attributes:
-        gyro: Of each axis of the gyro in [rad/s].
-        roll: Of the measured attitude in [rad].
-        pitch: Of the measured attitude in [rad].
-    """
-
-    gyro: Vector = (0.0, 0.0, 0.0)
-    roll: float = 0.0
-    pitch: float = 0.0
+    gyro: Vector = (0.0, 0.0, 0.0)  # of each axis of the gyro in [rad/s]
+    roll: float = 0.0  # of the measured attitude in [rad]
+    pitch: float = 0.0  # of the measured attitude in [rad]
 
     def orientation(self, roll: float, pitch: float, yaw: float) -> Quaternion:
         """Return what is measured of an attitude [rad]."""
@@ -60,8 +54,6 @@ class PhysicsBackend(Backend):
         """Observe a robot.
 
         Args:
-            robot: The robot.
-            period: Time that a step takes in [s].
             delay: From targets that are sent to servos that have them in [s].
             bias: Of the IMU; None for none.
 

@@ -19,43 +19,26 @@ SATURATED = 0.98  # share of a limit from which on a servo is at it
 
 @dataclass(frozen=True, slots=True)
 class Metered:
-    """What a robot did in some time.
+    """What a robot did in some time."""
 
-    Attributes:
-        time: How long in [s].
-        x: Way ahead, in the robot's own frame, in [m].
-        y: Way to the left in [m].
-        yaw: Turning in [rad].
-        path: Length of the way over the ground in [m].
-        tilt: Largest tilt in [rad].
-        energy: Mechanical work of the servos in [J]: the sum of all joints' absolute power.
-        weight: Of the robot in [N].
-        torque_saturation: Share of the time that a servo is at its largest torque, mean of all.
-        speed_saturation: Share of the time that a joint is at its largest speed, mean of all.
-    """
-
-    time: float
-    x: float
-    y: float
-    yaw: float
-    path: float
-    tilt: float
-    energy: float
-    weight: float
+    time: float  # how long in [s]
+    x: float  # way ahead, in the robot's own frame, in [m]
+    y: float  # way to the left in [m]
+    yaw: float  # turning in [rad]
+    path: float  # length of the way over the ground in [m]
+    tilt: float  # largest tilt in [rad]
+    energy: float  # mechanical work of the servos in [J]: the sum of all joints' absolute power
+    weight: float  # of the robot in [N]
+    # share of the time that a servo is at its largest torque, mean of all
     torque_saturation: float
-    speed_saturation: float
+    speed_saturation: float  # share of the time that a joint is at its largest speed, mean of all
 
 
 class Meter:
     """Adds up what a robot does between two calls of :meth:`sample`, 20 ms apart or less."""
 
     def __init__(self, robot: Robot, urdf: str) -> None:
-        """Begin now.
-
-        Args:
-            robot: Is looked at only.
-            urdf: What it is made of.
-        """
+        """Begin now."""
         limits = [joint.limits for joint in movable_joints(urdf)]
         self._efforts = np.array([each.effort for each in limits])
         self._speeds = np.array([each.velocity for each in limits])

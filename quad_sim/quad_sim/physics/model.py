@@ -50,8 +50,6 @@ def build_model(
 
     Args:
         urdf: The robot, with base_link as root, imu_link and feet.
-        servo: What drives its hinges.
-        terrain: What it stands on.
         timestep: Of the integration [s].
 
     Returns:
@@ -72,9 +70,8 @@ def mjcf(
         urdf: The robot, as for :func:`build_model`.
         servo: What drives its hinges, but for the interpolation: a trainer sets targets itself.
         timestep: Of the integration [s].
-        start: Position of base_link [m], its orientation (w, x, y, z), and positions of all
-            joints of the model, for the keyframe ``stand``.
-        floor: With level ground.
+        start: Position of base_link [m], its orientation (w, x, y, z), and positions of all joints
+            of the model, for the keyframe ``stand``.
 
     Raises:
         SetupError: The URDF is no such robot.

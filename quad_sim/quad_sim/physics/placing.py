@@ -24,7 +24,6 @@ def start_positions(joints: Sequence[str], pose: Mapping[str, float]) -> Array:
     """Return where the joints are at the start.
 
     Args:
-        joints: Names of all joints.
         pose: Positions of some [rad]; the others stand.
 
     Raises:
@@ -50,10 +49,7 @@ def place(
     until the robot's lowest point touches it.
 
     Args:
-        model: The robot.
         data: Its state; changed in place.
-        terrain: The ground.
-        orientation: Of the base on level ground.
         drop: How far the lowest point is above the ground [m].
     """
     _follow_mimics(model, data)

@@ -61,10 +61,6 @@ class Robot:
         """Put the robot on the ground.
 
         Args:
-            urdf: What it is made of.
-            servo: How its servos follow.
-            terrain: What it stands on.
-            seed: Of the sensors' noise.
             timestep: Of the integration [s].
             pose: Joint positions at the start [rad]; the standing pose for those left out.
             noise: What :meth:`measure` adds to the truth.
@@ -103,7 +99,6 @@ class Robot:
 
         Args:
             pose: Joint positions at the start [rad]; the standing pose for those left out.
-            seed: Of the sensors' noise.
             variation: How robot and ground differ from what they were made as.
             orientation: Of base_link on level ground, (x, y, z, w); another one lets it fall.
             drop: Height of the lowest point above the ground [m], from which it falls.
@@ -150,10 +145,9 @@ class Robot:
         """Switch servos on or off.
 
         Args:
-            on: Whether they hold.
             joints: Their names; all for None.
-            hold: One that is switched on holds the position that it has; else it goes to its
-                last target at once.
+            hold: One that is switched on holds the position that it has; else it goes to its last
+                target at once.
 
         Raises:
             SetupError: There is no such joint.
@@ -306,11 +300,7 @@ class Robot:
         return vector(self._data.body(link).xpos)
 
     def mjcf(self, *, floor: bool) -> str:
-        """Return the robot as MJCF, with the pose of now as keyframe ``stand``.
-
-        Args:
-            floor: With level ground.
-        """
+        """Return the robot as MJCF, with the pose of now as keyframe ``stand``."""
         timestep = float(self._model.opt.timestep)
         return mjcf(self._urdf, self._servo, timestep, self._data.qpos.tolist(), floor=floor)
 

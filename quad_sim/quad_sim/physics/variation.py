@@ -15,19 +15,12 @@ from .model import BASE, BUMPS, FLOOR
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """How a robot and its ground differ from what they were made as.
+    """How a robot and its ground differ from what they were made as."""
 
-    Attributes:
-        friction: Of the ground; None leaves that of the terrain.
-        trunk_mass: Factor of mass and inertia of the trunk.
-        stiffness: Factor of the servos' stiffness.
-        damping: Factor of the joints' damping, and of the servos' gain against speed.
-    """
-
-    friction: float | None = None
-    trunk_mass: float = 1.0
-    stiffness: float = 1.0
-    damping: float = 1.0
+    friction: float | None = None  # of the ground; None leaves that of the terrain
+    trunk_mass: float = 1.0  # factor of mass and inertia of the trunk
+    stiffness: float = 1.0  # factor of the servos' stiffness
+    damping: float = 1.0  # factor of the joints' damping, and of the servos' gain against speed
 
     def __post_init__(self) -> None:
         """Refuse what no robot has."""
@@ -45,11 +38,7 @@ class VariedModel:
     """A model that can be varied again and again; each variation counts from the original."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        """Keep what may change.
-
-        Args:
-            model: Is varied in place.
-        """
+        """Keep what may change."""
         self._model = model
         self._base = int(model.body(BASE).id)
         self._ground = [
@@ -64,12 +53,7 @@ class VariedModel:
         self._present = AS_MADE
 
     def vary(self, data: mujoco.MjData, variation: Variation) -> None:
-        """Let the robot be as a variation says; its servos hold.
-
-        Args:
-            data: Is at its reference position afterwards.
-            variation: How it differs from the original.
-        """
+        """Let the robot be as a variation says; its servos hold."""
         model = self._model
         model.actuator_gainprm[:] = self._gains * variation.stiffness
         model.actuator_biasprm[:] = self._biases

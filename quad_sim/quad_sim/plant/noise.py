@@ -18,23 +18,14 @@ ENCODER_STEP = 2 * math.pi / 4096  # [rad] the servos' magnetic encoder has 12 b
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of the sensors.
+    """Standard deviations of the sensors."""
 
-    Attributes:
-        attitude: Of the fused roll, pitch and yaw [rad].
-        angular_velocity: Of the gyro [rad/s].
-        specific_force: Of the accelerometer [m/s2].
-        position: Of a joint [rad].
-        velocity: Of a joint's speed [rad/s].
-        encoder_step: Least difference of two positions [rad]; 0 for none.
-    """
-
-    attitude: float = 0.0
-    angular_velocity: float = 0.0
-    specific_force: float = 0.0
-    position: float = 0.0
-    velocity: float = 0.0
-    encoder_step: float = 0.0
+    attitude: float = 0.0  # of the fused roll, pitch and yaw [rad]
+    angular_velocity: float = 0.0  # of the gyro [rad/s]
+    specific_force: float = 0.0  # of the accelerometer [m/s2]
+    position: float = 0.0  # of a joint [rad]
+    velocity: float = 0.0  # of a joint's speed [rad/s]
+    encoder_step: float = 0.0  # least difference of two positions [rad]; 0 for none
 
     @property
     def silent(self) -> bool:

@@ -94,10 +94,8 @@ class KinematicRobot:
         """Hold the robot.
 
         Args:
-            urdf: Its joints and their limits.
             pose: Joint positions at the start [rad]; zero for those left out.
             noise: What :meth:`measure` adds.
-            seed: Of the noise.
 
         Raises:
             SetupError: The pose names joints that the robot lacks.

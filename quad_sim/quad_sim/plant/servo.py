@@ -22,22 +22,14 @@ from ..exceptions import SetupError
 
 @dataclass(frozen=True, slots=True)
 class ServoParameters:
-    """What a servo does with its target.
+    """What a servo does with its target."""
 
-    Attributes:
-        stiffness: Torque per position error, k_p [N m/rad].
-        velocity_gain: Torque against speed inside the clamp, k_v [N m s/rad].
-        damping: Torque-speed line of the motor, d [N m s/rad].
-        armature: Inertia of rotor and gear at the joint [kg m2].
-        friction: Dry friction [N m].
-        interpolation: Time over which the servo goes from one target to the next [s]; 0: a step.
-    """
-
-    stiffness: float
-    velocity_gain: float = 0.0
-    damping: float = 0.05
-    armature: float = 0.001
-    friction: float = 0.0
+    stiffness: float  # torque per position error, k_p [N m/rad]
+    velocity_gain: float = 0.0  # torque against speed inside the clamp, k_v [N m s/rad]
+    damping: float = 0.05  # torque-speed line of the motor, d [N m s/rad]
+    armature: float = 0.001  # inertia of rotor and gear at the joint [kg m2]
+    friction: float = 0.0  # dry friction [N m]
+    # time over which the servo goes from one target to the next [s]; 0: a step
     interpolation: float = 0.0
 
     def __post_init__(self) -> None:

@@ -16,15 +16,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class BasePose:
-    """Where base_link is.
+    """Where base_link is."""
 
-    Attributes:
-        position: Of base_link in the world [m].
-        orientation: Of base_link in the world, (x, y, z, w).
-    """
-
-    position: Vector
-    orientation: Quaternion
+    position: Vector  # of base_link in the world [m]
+    orientation: Quaternion  # of base_link in the world, (x, y, z, w)
 
     @property
     def roll_pitch_yaw(self) -> Vector:
@@ -39,48 +34,28 @@ class BasePose:
 
 @dataclass(frozen=True, slots=True)
 class BaseVelocity:
-    """How base_link moves.
+    """How base_link moves."""
 
-    Attributes:
-        linear: Velocity of base_link's origin, in base_link [m/s].
-        angular: Angular velocity, in base_link [rad/s].
-    """
-
-    linear: Vector
-    angular: Vector
+    linear: Vector  # velocity of base_link's origin, in base_link [m/s]
+    angular: Vector  # angular velocity, in base_link [rad/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """What an ideal IMU in imu_link feels.
+    """What an ideal IMU in imu_link feels."""
 
-    Attributes:
-        specific_force: [m/s2]; +g up at rest; behind the low-pass of the chip.
-        angular_velocity: [rad/s].
-        roll_pitch_yaw: Attitude in the world [rad], fixed axes x, y, z.
-    """
-
-    specific_force: Vector
-    angular_velocity: Vector
-    roll_pitch_yaw: Vector
+    specific_force: Vector  # [m/s2]; +g up at rest; behind the low-pass of the chip
+    angular_velocity: Vector  # [rad/s]
+    roll_pitch_yaw: Vector  # attitude in the world [rad], fixed axes x, y, z
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """What the board has measured, noise and encoder steps included.
+    """What the board has measured, noise and encoder steps included."""
 
-    Attributes:
-        time: Of the measurement, since the start [s].
-        imu: What the IMU measures.
-        positions: Of the joints [rad], of the gripper [m]; in the order of the URDF.
-        velocities: [rad/s], [m/s].
-        torques: [N m], [N].
-        foot_forces: Normal force on each foot, in the order of the legs [N].
-    """
-
-    time: float
-    imu: Imu
-    positions: Array
-    velocities: Array
-    torques: Array
-    foot_forces: Array
+    time: float  # of the measurement, since the start [s]
+    imu: Imu  # what the IMU measures
+    positions: Array  # of the joints [rad], of the gripper [m]; in the order of the URDF
+    velocities: Array  # [rad/s], [m/s]
+    torques: Array  # [N m], [N]
+    foot_forces: Array  # normal force on each foot, in the order of the legs [N]

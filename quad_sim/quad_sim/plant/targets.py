@@ -31,7 +31,6 @@ class TargetRamp:
         Args:
             joints: Names and limits, in the order of the values.
             timestep: Time between two calls of :meth:`advance` [s].
-            values: The first set-points [rad]; the array itself is changed from now on.
         """
         self._index = {joint.name: index for index, joint in enumerate(joints)}
         self._lower = np.array([joint.limits.lower for joint in joints])

@@ -17,22 +17,15 @@ MAX_ROUGHNESS = 0.1  # [m] higher than the hips of the robot
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """A plane, level or tilted, with bumps on it or without.
+    """A plane, level or tilted, with bumps on it or without."""
 
-    Attributes:
-        angle: How steep it is [rad].
-        direction: Where it rises to, from the world's x axis counter-clockwise [rad].
-        friction: Coefficient of friction under the feet.
-        roughness: Height of the highest bumps above the plane [m]; 0 for none. There are none
-            where the robot is put down, and only its feet touch them.
-        seed: Of the bumps.
-    """
-
-    angle: float = 0.0
-    direction: float = 0.0
-    friction: float = 0.8
+    angle: float = 0.0  # how steep it is [rad]
+    direction: float = 0.0  # where it rises to, from the world's x axis counter-clockwise [rad]
+    friction: float = 0.8  # coefficient of friction under the feet
+    # Height of the highest bumps above the plane [m]; 0 for none. There are none where the robot
+    # is put down, and only its feet touch them.
     roughness: float = 0.0
-    seed: int = 0
+    seed: int = 0  # of the bumps
 
     def __post_init__(self) -> None:
         """Refuse ground that nothing stands on."""

@@ -44,19 +44,12 @@ NO_CLIP = 100.0  # where observations are clipped anyway, and no action is ever
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What the metadata of a file say beside the contract.
+    """What the metadata of a file say beside the contract."""
 
-    Attributes:
-        step_periods: Time between two steps in [s], by key.
-        observation_sizes: Width of the observation, by key.
-        action_sizes: Number of actions, by key.
-        unknown: Keys that look as if they mattered, with their values.
-    """
-
-    step_periods: Mapping[str, float]
-    observation_sizes: Mapping[str, float]
-    action_sizes: Mapping[str, float]
-    unknown: Mapping[str, str]
+    step_periods: Mapping[str, float]  # time between two steps in [s], by key
+    observation_sizes: Mapping[str, float]  # width of the observation, by key
+    action_sizes: Mapping[str, float]  # number of actions, by key
+    unknown: Mapping[str, str]  # keys that look as if they mattered, with their values
 
 
 def read_declared(values: Mapping[str, str]) -> Declared:

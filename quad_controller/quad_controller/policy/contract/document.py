@@ -21,20 +21,15 @@ Values = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class ContractDocument:
-    """Values of a contract, as far as they are known.
+    """Values of a contract, as far as they are known."""
 
-    Attributes:
-        values: Nested keys; terms of the observation are in their order.
-        origins: Where each value comes from, by its path (``action.scale``).
-        hints: Why a path is open that the reader could not fill.
-        refusals: What stands in the file and cannot be run here.
-        ignored: Keys of the file that change nothing here, or that nobody understood.
-    """
-
-    values: Values
+    values: Values  # nested keys; terms of the observation are in their order
+    # where each value comes from, by its path (``action.scale``)
     origins: Mapping[str, str] = field(default_factory=dict)
+    # why a path is open that the reader could not fill
     hints: Mapping[str, str] = field(default_factory=dict)
-    refusals: tuple[str, ...] = ()
+    refusals: tuple[str, ...] = ()  # what stands in the file and cannot be run here
+    # keys of the file that change nothing here, or that nobody understood
     ignored: tuple[str, ...] = ()
 
     def over(self, base: ContractDocument) -> ContractDocument:
@@ -98,10 +93,6 @@ def document_of(values: Values, origin: str) -> ContractDocument:
 
 def read_yaml(text: str, origin: str) -> ContractDocument:
     """Read a document from YAML.
-
-    Args:
-        text: The YAML.
-        origin: Where it is from, for messages.
 
     Raises:
         PolicyError: It is no YAML, or no mapping.

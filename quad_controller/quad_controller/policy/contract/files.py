@@ -17,7 +17,6 @@ def read_contract_file(path: Path, joints: Sequence[str] = ()) -> ContractDocume
     """Read a file: our own YAML, or that of a training tool.
 
     Args:
-        path: The file.
         joints: Names of the joints in the policy's order, where they are known already.
 
     Raises:

@@ -59,12 +59,7 @@ def load_tagged(text: str, origin: str) -> Values:
 
 
 def read_deploy(values: Mapping[str, Any], origin: str) -> ContractDocument:
-    """Read ``deploy.yaml`` of unitree_rl_lab.
-
-    Args:
-        values: The file.
-        origin: Its name, for messages.
-    """
+    """Read ``deploy.yaml`` of unitree_rl_lab."""
     observations = _mapping(values, 'observations')
     frames = bool(observations.get('use_gym_history'))
     terms = {
@@ -98,8 +93,6 @@ def read_env(values: Mapping[str, Any], origin: str, joints: Sequence[str]) -> C
     """Read ``params/env.yaml`` of a training with Isaac Lab.
 
     Args:
-        values: The file.
-        origin: Its name, for messages.
         joints: Names of the joints in the policy's order; empty while nobody knows them. Patterns
             of the file are matched with them.
     """

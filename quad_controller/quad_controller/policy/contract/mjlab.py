@@ -44,9 +44,6 @@ FILE = 'metadata'
 def read_metadata(values: Mapping[str, str]) -> ContractDocument:
     """Read the metadata of a file.
 
-    Args:
-        values: Keys and texts.
-
     Raises:
         PolicyError: A text is not a number, a list, or YAML.
     """

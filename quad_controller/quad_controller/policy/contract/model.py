@@ -100,60 +100,37 @@ class HistoryStart(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ObservationTerm:
-    """One term of the observation.
+    """One term of the observation."""
 
-    Attributes:
-        name: How its tool calls it.
-        source: What it is made of.
-        width: Numbers of one step.
-        scale: For each number.
-        offset: For each number, added after the scale.
-        clip: Lowest and highest value before the scale; None for none.
-        history: Steps that are observed, 1 for the present one only.
-        frame: Of a velocity.
-        relative: Whether joint positions count from the default pose.
-        quaternion: Order of an orientation.
-        phase_period: Of the clock in [s].
-        phase_threshold: A command whose norm is smaller has no phase.
-        values: What a constant, or the scan of a flat ground, is.
-        feet: Links of the feet whose contacts these are, in their order.
-    """
-
-    name: str
-    source: Source
-    width: int
-    scale: tuple[float, ...]
-    offset: tuple[float, ...]
+    name: str  # how its tool calls it
+    source: Source  # what it is made of
+    width: int  # numbers of one step
+    scale: tuple[float, ...]  # for each number
+    offset: tuple[float, ...]  # for each number, added after the scale
+    # lowest and highest value before the scale; None for none
     clip: tuple[float, float] | None = None
-    history: int = 1
-    frame: BodyFrame = BodyFrame.BASE
-    relative: bool = True
-    quaternion: QuaternionOrder = QuaternionOrder.XYZW
-    phase_period: float = 1.0
-    phase_threshold: float = 0.0
-    values: tuple[float, ...] = ()
-    feet: tuple[str, ...] = ()
+    history: int = 1  # steps that are observed, 1 for the present one only
+    frame: BodyFrame = BodyFrame.BASE  # of a velocity
+    relative: bool = True  # whether joint positions count from the default pose
+    quaternion: QuaternionOrder = QuaternionOrder.XYZW  # order of an orientation
+    phase_period: float = 1.0  # of the clock in [s]
+    phase_threshold: float = 0.0  # a command whose norm is smaller has no phase
+    values: tuple[float, ...] = ()  # what a constant, or the scan of a flat ground, is
+    feet: tuple[str, ...] = ()  # links of the feet whose contacts these are, in their order
 
 
 @dataclass(frozen=True, slots=True)
 class ActionContract:
-    """What becomes of an answer: ``target = clip(action) * scale + offset``.
+    """What becomes of an answer: ``target = clip(action) * scale + offset``."""
 
-    Attributes:
-        scale: In [rad] for each joint.
-        offset: In [rad] for each joint; as a rule the default pose.
-        clip: Range of each raw action; what was clipped is the last action. None for none.
-        target_clip: Range of each target in [rad]; None for none.
-        low_pass: Cut-off of a filter of the targets in [Hz]; 0 for none.
-        output: Name of the output that holds it; empty where there is one only.
-    """
-
-    scale: tuple[float, ...]
-    offset: tuple[float, ...]
+    scale: tuple[float, ...]  # in [rad] for each joint
+    offset: tuple[float, ...]  # in [rad] for each joint; as a rule the default pose
+    # Range of each raw action; what was clipped is the last action. None for none.
     clip: tuple[tuple[float, float], ...] | None = None
+    # range of each target in [rad]; None for none
     target_clip: tuple[tuple[float, float], ...] | None = None
-    low_pass: float = 0.0
-    output: str = ''
+    low_pass: float = 0.0  # cut-off of a filter of the targets in [Hz]; 0 for none
+    output: str = ''  # name of the output that holds it; empty where there is one only
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,39 +165,23 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class PolicyContract:
-    """All that has to agree between a policy and the robot that runs it.
+    """All that has to agree between a policy and the robot that runs it."""
 
-    Attributes:
-        joint_names: Joints in the order of observations and actions.
-        default_positions: Of the joints in [rad].
-        period: Between two steps of the policy in [s].
-        terms: Of the observation, in their order.
-        clip: The whole observation stays within plus and minus this; None for no limit.
-        history_layout: How steps lie in it.
-        newest: Where the newest step is.
-        history_start: What a history begins with.
-        action: What becomes of an answer.
-        recurrence: Inputs that are outputs of the step before.
-        commands: What it was trained for; None where nobody said.
-        gains: Of its training; None where nobody said.
-        robot: What it was trained for, for people.
-        kind: How it was made, for people.
-    """
-
-    joint_names: tuple[str, ...]
-    default_positions: tuple[float, ...]
-    period: float
-    terms: tuple[ObservationTerm, ...]
-    action: ActionContract
+    joint_names: tuple[str, ...]  # joints in the order of observations and actions
+    default_positions: tuple[float, ...]  # of the joints in [rad]
+    period: float  # between two steps of the policy in [s]
+    terms: tuple[ObservationTerm, ...]  # of the observation, in their order
+    action: ActionContract  # what becomes of an answer
+    # the whole observation stays within plus and minus this; None for no limit
     clip: float | None = None
-    history_layout: HistoryLayout = HistoryLayout.PER_TERM
-    newest: Newest = Newest.LAST
-    history_start: HistoryStart = HistoryStart.REPEAT
-    recurrence: tuple[RecurrentState, ...] = ()
-    commands: CommandRanges | None = None
-    gains: Gains | None = None
-    robot: str = ''
-    kind: str = ''
+    history_layout: HistoryLayout = HistoryLayout.PER_TERM  # how steps lie in it
+    newest: Newest = Newest.LAST  # where the newest step is
+    history_start: HistoryStart = HistoryStart.REPEAT  # what a history begins with
+    recurrence: tuple[RecurrentState, ...] = ()  # inputs that are outputs of the step before
+    commands: CommandRanges | None = None  # what it was trained for; None where nobody said
+    gains: Gains | None = None  # of its training; None where nobody said
+    robot: str = ''  # what it was trained for, for people
+    kind: str = ''  # how it was made, for people
 
     @property
     def width(self) -> int:

@@ -36,12 +36,7 @@ HINTS = {
 
 
 def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
-    """Read ``config.json`` of a training.
-
-    Args:
-        values: The file.
-        origin: Its name, for messages.
-    """
+    """Read ``config.json`` of a training."""
     contract: Values = {'period': values.get('ctrl_dt')}
     if 'action_scale' in values:
         contract['action'] = {'scale': values['action_scale']}

@@ -28,12 +28,7 @@ LAYOUTS = {'time': 'frames', 'term': 'per_term'}
 
 
 def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
-    """Read a ``config.yaml`` or ``base.yaml``.
-
-    Args:
-        values: The file.
-        origin: Its name, for messages.
-    """
+    """Read a ``config.yaml`` or ``base.yaml``."""
     config: Mapping[str, Any] = values
     robot = ''
     if len(values) == 1:
