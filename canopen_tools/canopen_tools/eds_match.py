@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import IntEnum
+from typing import NamedTuple
 
 from arm_canopen.config.model.identity import Identity
 from arm_canopen.config.read.eds import Eds
@@ -14,9 +13,7 @@ from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.device_profile import PROFILE_MASK, profile_number
 from arm_canopen.standard.objects import Index
 
-MAJOR_SHIFT = (
-    16  # of 0x1018:03: above it the revision of the CANopen behaviour (CiA 301, 7.5.2.19)
-)
+MAJOR_SHIFT = 16  # of 0x1018:03: above it is the revision of the behaviour (CiA 301, 7.5.2.19)
 
 
 class NoMatchError(CanopenError):
@@ -27,23 +24,15 @@ class SeveralMatchError(NoMatchError):
     """Several EDS fit a device equally well."""
 
 
-class Likeness(IntEnum):
-    """How well an EDS fits; the best one counts."""
-
-    OTHER_REVISION = 1
-    SAME_MAJOR = 2
-    SAME_REVISION = 3
-
-
-WORDS = {
-    Likeness.OTHER_REVISION: 'vendor and product agree; the revision differs: compare the manual',
-    Likeness.SAME_MAJOR: 'vendor, product and major revision agree',
-    Likeness.SAME_REVISION: 'vendor, product and revision agree',
-}
+WORDS = (
+    'vendor and product agree; the revision differs: compare the manual',
+    'vendor, product and major revision agree',
+    'vendor, product and revision agree',
+)
+"""How well an EDS fits; the last one is the best."""
 
 
-@dataclass(frozen=True, slots=True)
-class Match:
+class Match(NamedTuple):
     """An EDS for a device."""
 
     eds: Eds
@@ -54,9 +43,7 @@ def eds_identity(eds: Eds) -> Identity:
     """Return whom an EDS describes: by the defaults of 0x1018, else by its [DeviceInfo]."""
 
     def number(subindex: int) -> int:
-        entry = eds.dictionary.get(Index.IDENTITY, subindex)
-        value = entry.default if entry is not None else None
-        return value if isinstance(value, int) and value else eds.numbers[subindex - 1]
+        return eds.dictionary.number(Index.IDENTITY, subindex) or eds.numbers[subindex - 1]
 
     return Identity(
         device_type=profile_number(eds.dictionary),
@@ -92,7 +79,7 @@ def match_eds(identity: Identity, candidates: Sequence[Eds]) -> Match:
         ]
         raise NoMatchError(f'no EDS fits ({"; ".join(known) or "none is given"})')
     best = max(likeness for likeness, _ in fitting)
-    chosen = [eds for likeness, eds in fitting if likeness is best]
+    chosen = [eds for likeness, eds in fitting if likeness == best]
     contents = {eds.path.read_bytes() for eds in chosen}
     if len(contents) > 1:
         names = ', '.join(str(eds.path) for eds in chosen)
@@ -100,7 +87,8 @@ def match_eds(identity: Identity, candidates: Sequence[Eds]) -> Match:
     return Match(chosen[0], WORDS[best])
 
 
-def _likeness(identity: Identity, eds: Eds) -> Likeness | None:
+def _likeness(identity: Identity, eds: Eds) -> int | None:
+    """Return how well an EDS fits, as a number of WORDS; None where it is of another device."""
     described = eds_identity(eds)
     profile = identity.device_type & PROFILE_MASK
     if profile and described.device_type and profile != described.device_type:
@@ -111,7 +99,7 @@ def _likeness(identity: Identity, eds: Eds) -> Likeness | None:
     ):
         return None
     if described.revision_number == identity.revision_number:
-        return Likeness.SAME_REVISION
+        return 2
     if described.revision_number >> MAJOR_SHIFT == identity.revision_number >> MAJOR_SHIFT:
-        return Likeness.SAME_MAJOR
-    return Likeness.OTHER_REVISION
+        return 1
+    return 0

@@ -89,24 +89,6 @@ class LssMaster:
         self._put(lss_bytes(LssCommand.IDENTIFY_UNCONFIGURED), LssCommand.UNCONFIGURED_IDENTIFIED)
         return await self._answered(self._scan_timeout)
 
-    async def identify(self, low: LssAddress, high: LssAddress) -> bool:
-        """Return whether there is a device in a range of revision and serial numbers.
-
-        Args:
-            low: Vendor id, product code, and the lowest revision and serial number.
-            high: The highest revision and serial number; vendor and product are those of ``low``.
-        """
-        for command, number in (
-            (LssCommand.IDENTIFY_VENDOR, low.vendor),
-            (LssCommand.IDENTIFY_PRODUCT, low.product),
-            (LssCommand.IDENTIFY_REVISION_LOW, low.revision),
-            (LssCommand.IDENTIFY_REVISION_HIGH, high.revision),
-            (LssCommand.IDENTIFY_SERIAL_LOW, low.serial),
-            (LssCommand.IDENTIFY_SERIAL_HIGH, high.serial),
-        ):
-            self._put(lss_number(command, number), LssCommand.IDENTIFIED)
-        return await self._answered(self._timeout)
-
     async def fast_scan(self) -> LssAddress | None:
         """Find a device without a node id, and switch it to the configuration state.
 

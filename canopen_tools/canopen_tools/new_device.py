@@ -99,9 +99,8 @@ class NewDevice:
 
     def number(self, index: int, subindex: int = 0) -> int:
         """Return what an object holds, by the device or else the EDS; 0 where nobody says it."""
-        entry = self.eds.dictionary.get(index, subindex)
-        default = entry.default if entry is not None else 0
-        return self.values.get((index, subindex), default if isinstance(default, int) else 0)
+        default = self.eds.dictionary.number(index, subindex) or 0
+        return self.values.get((index, subindex), default)
 
     def source(self, *indices: int) -> str:
         """Return who says what these objects hold, in words."""

@@ -20,6 +20,7 @@ from tool_environment import REPOSITORY
 from arm_canopen.config import BusConfig, load_bus, load_eds
 from arm_canopen.config.model import SdoWrite
 from arm_canopen.standard.nmt import NmtCommand
+from canopen_tools.cli.diff import expected_objects
 from canopen_tools.cli.main import main
 from canopen_tools.dcf.concise import (
     device_writes,
@@ -28,7 +29,6 @@ from canopen_tools.dcf.concise import (
 )
 from canopen_tools.dcf.master import master_dcf
 from canopen_tools.eds_lint.lint import lint_eds
-from canopen_tools.expected import expected_objects
 
 PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 

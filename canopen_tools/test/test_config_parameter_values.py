@@ -16,8 +16,8 @@ from arm_canopen.config import BusConfig, load_bus
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.master.events import Severity
 from arm_canopen.standard.dictionary import ObjectDictionary
+from canopen_tools.cli.diff import expected_objects
 from canopen_tools.dcf.concise import device_writes, encode_concise
-from canopen_tools.expected import expected_objects
 
 NAME = 'joint'
 BUS = """

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from arm_canopen.can import Frame
 from arm_canopen.standard.lss import (
     BIT_RATES,
     decode_lss,
@@ -15,11 +16,12 @@ from arm_canopen.standard.lss import (
     FastScan,
     lss_bytes,
     lss_number,
+    LSS_REQUEST,
     LssAddress,
     LssCommand,
     LssMessage,
 )
-from canopen_tools.monitor.lss import lss_text
+from canopen_tools.monitor import FrameDescriber
 
 
 @pytest.mark.parametrize(
@@ -52,7 +54,7 @@ def test_any_8_bytes_are_a_message(data: bytes) -> None:
 def test_other_lengths_are_none(data: bytes) -> None:
     """A message has 8 bytes; the monitor has words for what is none."""
     assert decode_lss(data) is None
-    assert lss_text(data)
+    assert FrameDescriber().describe(Frame(LSS_REQUEST, data)).text
 
 
 @given(

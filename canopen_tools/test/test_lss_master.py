@@ -77,21 +77,6 @@ def test_devices_are_selected_by_their_address() -> None:
         network.run(network.master.select(FIRST._replace(serial=1)))
 
 
-@pytest.mark.parametrize(
-    ('low', 'high', 'found'),
-    [
-        (FIRST, FIRST, True),
-        (FIRST._replace(serial=0), FIRST._replace(serial=0xFFFF), True),
-        (FIRST._replace(revision=0x10003), FIRST._replace(revision=0x20000), False),
-        (FIRST._replace(vendor=1), FIRST, False),
-    ],
-)
-def test_a_range_is_identified(low: LssAddress, high: LssAddress, found: bool) -> None:
-    """Devices with an id of their own answer to ranges of revision and serial numbers."""
-    network = LssNetwork([FIRST], [5])
-    assert network.run(network.master.identify(low, high)) is found
-
-
 def test_several_devices_in_configuration_are_noticed() -> None:
     """One node id must not be given to two devices."""
     network = LssNetwork([FIRST, SECOND])

@@ -5,22 +5,33 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
 from arm_canopen.can import open_bus
-from arm_canopen.config.model.boot_plan import BootWrite, consumer_to_read, HeldConsumers
-from arm_canopen.exceptions import SdoAbortError
+from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.config.model.boot_plan import (
+    BootWrite,
+    consumer_to_read,
+    held_after_boot,
+    HeldConsumers,
+)
+from arm_canopen.exceptions import CodecError, SdoAbortError
+from arm_canopen.standard.datatypes import DataType, encode
+from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.objects import Index
 from arm_canopen.standard.sdo_abort import abort_text
 
-from ..expected import expected_defaults, expected_objects
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text
 from .arguments import add_node_arguments, SubParsers, UsageError
 from .output import print_line, print_table
 from .session import Session
 from .target import find_target, Target, warn_of_master
+
+FROM_EDS = ('device_type', 'vendor_id', 'product_code')
+"""The identity that the EDS has; the rest is in bus.yml."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +117,34 @@ def _objects(target: Target, consumers: HeldConsumers, *, defaults: bool) -> lis
         for item in expected_defaults(target.dictionary)
         if (item.index, item.subindex) not in known
     ]
+
+
+def expected_objects(
+    config: BusConfig, node: NodeConfig, consumers: HeldConsumers | None = None
+) -> list[BootWrite]:
+    """Return everything that bus.yml decides of a device: its identity, and what boot leaves.
+
+    Consumers are what the device has in 0x1016, by sub-index; None: those of its EDS.
+    """
+    return [*_identity(node), *held_after_boot(config, node, consumers)]
+
+
+def expected_defaults(dictionary: ObjectDictionary) -> Iterator[BootWrite]:
+    """Yield what every object that can be read and written holds by its EDS."""
+    for entry in dictionary:
+        if entry.default is None or not (entry.access.readable and entry.access.writable):
+            continue
+        try:
+            data = encode(entry.data_type, entry.default)
+        except CodecError:
+            continue
+        yield BootWrite(*entry.address, data, 'EDS')
+
+
+def _identity(node: NodeConfig) -> Iterator[BootWrite]:
+    for attribute, index, subindex, value in node.identity.objects:
+        key = 'EDS' if attribute in FROM_EDS else attribute
+        yield BootWrite(index, subindex, encode(DataType.UNSIGNED32, value), key)
 
 
 def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:

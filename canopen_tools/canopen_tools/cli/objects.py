@@ -21,7 +21,7 @@ from .output import print_line, warn
 from .session import Session
 from .target import find_target, Target, warn_of_master
 
-SHORT_TYPES: dict[str, DataType] = {
+SHORT_TYPES: dict[str | None, DataType] = {
     'bool': DataType.BOOLEAN,
     **{f'i{bits}': DataType[f'INTEGER{bits}'] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
     **{f'u{bits}': DataType[f'UNSIGNED{bits}'] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
@@ -64,14 +64,14 @@ def add_parser(parsers: SubParsers) -> None:
     writer.set_defaults(run=write)
     for parser in (reader, writer):
         parser.add_argument(
-            '--type', choices=SHORT_TYPES, help='type of the object, when no file has it'
+            '--type', choices=list(SHORT_TYPES), help='type of the object, when no file has it'
         )
 
 
 def read(options: argparse.Namespace) -> int:
     """Read objects; return the exit code."""
     target = find_target(options)
-    entries = [target.entry(path, _type(options)) for path in options.objects]
+    entries = [target.entry(path, SHORT_TYPES.get(options.type)) for path in options.objects]
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
@@ -87,7 +87,7 @@ def read(options: argparse.Namespace) -> int:
 def write(options: argparse.Namespace) -> int:
     """Write an object and read it back; return the exit code."""
     target = find_target(options)
-    entry = target.entry(options.object, _type(options))
+    entry = target.entry(options.object, SHORT_TYPES.get(options.type))
     data = _data(target, entry, options)
     with open_bus(options.can) as bus:
         session = Session(bus, target.bus)
@@ -113,10 +113,6 @@ def write(options: argparse.Namespace) -> int:
         warn(f'the device holds another value than {_meaning(entry, data)}, which was written')
         return 1
     return 0
-
-
-def _type(options: argparse.Namespace) -> DataType | None:
-    return SHORT_TYPES.get(options.type or '')
 
 
 def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> bytes:

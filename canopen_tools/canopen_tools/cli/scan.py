@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from arm_canopen.can import Frame, open_bus
 from arm_canopen.config import load_bus
 from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.config.model.identity import Identity
+from arm_canopen.config.model.identity import Identity, IDENTITY_OBJECTS
 from arm_canopen.exceptions import SdoError
 from arm_canopen.master import SdoClient
 from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
@@ -31,14 +31,8 @@ SECOND_ANSWER = 0.02  # [s] for that of another device with the same node id
 GROUP = 8  # devices that are queried at a time, so that no transmit queue fills up
 GROUP_PAUSE = 0.01  # [s]
 
-IDENTITY: tuple[tuple[str, str, int, int], ...] = (
-    ('device_type', 'device type', Index.DEVICE_TYPE, 0),
-    ('vendor_id', 'vendor', Index.IDENTITY, 1),
-    ('product_code', 'product', Index.IDENTITY, 2),
-    ('revision_number', 'revision', Index.IDENTITY, 3),
-    ('serial_number', 'serial', Index.IDENTITY, 4),
-)
-"""Attribute of Identity, title, index and sub-index (CiA 301, 7.5.2.1 and 7.5.2.19)."""
+TITLES = ('device type', 'vendor', 'product', 'revision', 'serial')
+"""Of the columns for IDENTITY_OBJECTS."""
 
 PROFILES: dict[int, str] = {
     301: '',
@@ -206,7 +200,7 @@ def _identify(session: Session, device: Found) -> None:
 
 
 def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
-    for attribute, _, index, subindex in IDENTITY:
+    for attribute, index, subindex in IDENTITY_OBJECTS:
         if session.masters:
             session.await_quiet(device.node_id)
 
@@ -232,7 +226,7 @@ def _show(found: dict[int, Found], config: BusConfig | None, *, queried: bool) -
         warn(f'no device answers: {hint}' if queried else 'no device has sent a frame')
         return 1
     named = config is not None
-    head = ('node', *(('name',) if named else ()), 'state', *(t for _, t, _, _ in IDENTITY))
+    head = ('node', *(('name',) if named else ()), 'state', *TITLES)
     differences = {
         device.node_id: list(_differences(device, queried=queried)) for device in devices
     }
@@ -261,7 +255,7 @@ def _state(device: Found, *, queried: bool) -> str:
 
 
 def _cells(device: Found) -> Iterable[str]:
-    for attribute, _, _, _ in IDENTITY:
+    for attribute, _, _ in IDENTITY_OBJECTS:
         number = device.numbers.get(attribute)
         if attribute not in device.numbers:
             yield ''
@@ -281,7 +275,7 @@ def _differences(device: Found, *, queried: bool) -> Iterator[str]:
     if queried and not device.is_there:
         yield 'not on the bus'
     expected: Identity = device.config.identity
-    for attribute, title, _, _ in IDENTITY:
+    for title, (attribute, _, _) in zip(TITLES, IDENTITY_OBJECTS, strict=True):
         wanted, number = getattr(expected, attribute), device.numbers.get(attribute)
         if wanted and number is not None and number != wanted:
             yield f'expected {title} 0x{wanted:08X}'

@@ -48,9 +48,8 @@ def check_info(path: Path, ini: IniFile, dictionary: ObjectDictionary, findings:
                 f'write {title}={number}',
             )
     for key, title, subindex in IDENTITY_KEYS:
-        named, entry = _number(info, key), dictionary.get(Index.IDENTITY, subindex)
-        default = entry.default if entry is not None else None
-        if named and isinstance(default, int) and default and named != default:
+        named, default = _number(info, key), dictionary.number(Index.IDENTITY, subindex)
+        if named and default and named != default:
             findings.warning(
                 Place(path, info.line_of(key), key='[DeviceInfo]'),
                 f'{title} is 0x{named:X}, but 0x1018:{subindex:02X} has 0x{default:X} as default; '

@@ -30,7 +30,7 @@ from operator_input import HeldKeys, Keyboard, ReleaseSource, status_text, Style
 
 from .checks import AxisFacts, doubts, motion_mode, obstacles, read_facts
 from .dialogue import agrees, FirstMotionError, say
-from .interruptions import Interruptions
+from .interruptions import uninterrupted_end
 from .movers import CyclicMover, Mover, ProfileMover
 
 PERIOD = 0.03  # [s] between two looks at the drive
@@ -69,7 +69,7 @@ class Record:
     facts: AxisFacts  # what the drive says about itself
 
 
-def move(request: Request, axis: DriveConfig, interruptions: Interruptions) -> Record | None:
+def move(request: Request, axis: DriveConfig) -> Record | None:
     """Boot, check, ask, move; the drive is disabled and the bus is left when it returns.
 
     Returns:
@@ -79,7 +79,7 @@ def move(request: Request, axis: DriveConfig, interruptions: Interruptions) -> R
     events: deque[Event] = deque(maxlen=100)
     master = CanopenMaster.from_bus_yml(request.path, bus=request.can, on_event=events.append)
     # once the drive is to be stopped, no further signal may end that
-    with interruptions.uninterrupted_end(master):
+    with uninterrupted_end(master):
         drive = _booted(master, axis.name)
         facts = read_facts(master, axis, request.speed.value)
         position = drive.position

@@ -7,7 +7,7 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 import math
 import time
-from typing import Protocol
+from typing import TypeAlias
 
 from arm_canopen import CanopenError, CanopenMaster
 from arm_canopen.config.model.drive import DriveConfig
@@ -16,30 +16,6 @@ from arm_canopen.standard.objects import AXIS_OFFSET, Index
 from first_motion import MotionPlan
 
 from .slow_motion import PERMIT, SlowMotion
-
-
-class Mover(Protocol):
-    """Moves an enabled drive to the target of a plan, and halts it; no call waits."""
-
-    @property
-    def busy(self) -> bool:
-        """Whether the drive still carries out what was ordered last."""
-
-    @property
-    def problem(self) -> str:
-        """Why it cannot go on, in words; else empty."""
-
-    def go(self) -> None:
-        """Go to the target."""
-
-    def keep_going(self) -> None:
-        """Confirm that it may go on; to be called at least every 0.1 s."""
-
-    def halt(self) -> None:
-        """Come to rest."""
-
-    def close(self) -> None:
-        """Leave the drive as it was found."""
 
 
 class ProfileMover:
@@ -93,7 +69,7 @@ class ProfileMover:
         self._orders.append(self._going)
 
     def keep_going(self) -> None:
-        """Nothing: the drive goes on by itself."""
+        """Do nothing; the drive goes on by itself."""
 
     def halt(self) -> None:
         """Order bit 8 of the controlword, also while a target is on its way."""
@@ -130,7 +106,7 @@ class CyclicMover:
         self.keep_going()
 
     def keep_going(self) -> None:
-        """Renew the permission."""
+        """Renew the permission; to be called at least every 0.1 s."""
         self._source.permit(time.monotonic() + PERMIT)
 
     def halt(self) -> None:
@@ -140,3 +116,7 @@ class CyclicMover:
     def close(self) -> None:
         """Detach the source."""
         self._master.detach(self._source)
+
+
+Mover: TypeAlias = ProfileMover | CyclicMover
+"""Moves an enabled drive to the target of a plan, and halts it; no call waits."""

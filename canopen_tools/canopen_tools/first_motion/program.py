@@ -24,7 +24,7 @@ from first_motion import (
 
 from .correction import apply
 from .dialogue import agrees, ask_seen, choose, FirstMotionError, say
-from .interruptions import Interrupted, Interruptions
+from .interruptions import Interrupted, interruptions
 from .motion import move, Record, Request
 
 
@@ -40,22 +40,21 @@ def run(request: Request) -> int:
     """
     _require_small(request)
     try:
-        with Interruptions() as interruptions:
-            while True:
-                code = _once(request, interruptions)
-                if code is not None:
-                    return code
+        with interruptions():
+            while (code := _once(request)) is None:
+                pass
+            return code
     except Interrupted as interruption:
         if interruption.number != signal.SIGHUP:
             say('interrupted')
         return 128 + interruption.number
 
 
-def _once(request: Request, interruptions: Interruptions) -> int | None:
+def _once(request: Request) -> int | None:
     """Make one motion and conclude; return the exit code, or None for another one."""
     config = load_bus(request.path)
     node, axis = _find(config, request)
-    record = move(request, axis, interruptions)
+    record = move(request, axis)
     if record is None:
         say('nothing was moved')
         return 1

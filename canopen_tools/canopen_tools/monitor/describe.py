@@ -13,16 +13,15 @@ from arm_canopen.config.model import BusConfig, NodeConfig
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, NODE_ID_MAX
 from arm_canopen.standard.emcy import Emergency
-from arm_canopen.standard.lss import LSS_REQUEST, LSS_RESPONSE
+from arm_canopen.standard.lss import LSS_REQUEST, LSS_RESPONSE, LssMessage
 from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState, parse_heartbeat
 from arm_canopen.standard.objects import Index
+from arm_canopen.standard.time_of_day import decode_time_of_day
 
 from .description import Description, FrameKind
-from .lss import lss_text
 from .object_names import ObjectNames
 from .pdo_text import PdoDescriber
 from .sdo_follower import SdoFollower
-from .time_text import time_of_day_text
 
 _Handler: TypeAlias = Callable[[Frame], Description]
 _NODE_MASK = 0x7F
@@ -135,7 +134,12 @@ class FrameDescriber:
 
     @staticmethod
     def _time(frame: Frame) -> Description:
-        return Description(FrameKind.TIME, 'TIME', '', time_of_day_text(frame.data))
+        try:
+            moment = decode_time_of_day(frame.data)
+        except CodecError as error:
+            return Description(FrameKind.TIME, 'TIME', '', str(error))
+        text = moment.strftime('%Y-%m-%d %H:%M:%S.') + f'{moment.microsecond // 1000:03d}'
+        return Description(FrameKind.TIME, 'TIME', '', text)
 
     def _emcy(self, node_id: int, frame: Frame) -> Description:
         try:
@@ -180,12 +184,13 @@ class FrameDescriber:
 
 
 def _lss(label: str, frame: Frame) -> Description:
-    return Description(FrameKind.LSS, label, '', lss_text(frame.data))
+    """Describe an LSS message, also one of a wrong length; its parameters stay bytes."""
+    data = frame.data
+    text = LssMessage(data[0], data[1:]).text if data else 'empty message'
+    return Description(FrameKind.LSS, label, '', text)
 
 
 def _cob_id(node: NodeConfig, index: Index) -> int | None:
     """Return the COB-ID that the EDS gives a service, None when it gives none."""
-    entry = node.dictionary.get(index)
-    if entry is None or not isinstance(entry.default, int) or entry.default & COB_ID_INVALID:
-        return None
-    return entry.default & CAN_ID_MASK or None
+    value = node.dictionary.number(index)
+    return None if value is None or value & COB_ID_INVALID else value & CAN_ID_MASK or None
