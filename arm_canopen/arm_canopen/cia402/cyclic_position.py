@@ -23,13 +23,6 @@ class CyclicPosition(Mode):
     bits = NO_BITS
 
     def __init__(self, units: Units, target: Writer, limits: Callable[[], ProfileLimits]) -> None:
-        """Take the way to the target object.
-
-        Args:
-            units: Units of the drive.
-            target: Writer of 0x607A (or 0x60C1:1).
-            limits: Gives the profile limits of the drive.
-        """
         self._units = units
         self._target = target
         self._limits = limits

@@ -61,13 +61,7 @@ class Drive:
     def __init__(
         self, node: RemoteNode, scheduler: Scheduler, config: DriveConfig | None = None
     ) -> None:
-        """Bind the axis to its device.
-
-        Args:
-            node: The device.
-            scheduler: Time.
-            config: Settings of the axis; None for the first one.
-        """
+        """Bind the axis to its device; the first one unless ``config`` is another."""
         self.node = node
         self.config = config or node.config.drive
         self.view = DriveView(node, scheduler, self.config, self.warn)
@@ -180,11 +174,8 @@ class Drive:
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
         """Stop and disable the drive, because its cycle failed; never raises.
 
-        The other drives of the bus go on.
-
-        Args:
-            error: Why; one that the drive itself could not have caused is a defect.
-            output: An RPDO of its device that cannot be sent.
+        The other drives go on. An error that the drive itself could not have caused is a defect;
+        ``output`` is an RPDO of its device that cannot be sent.
         """
         text = str(error)
         if not isinstance(error, CanopenError):

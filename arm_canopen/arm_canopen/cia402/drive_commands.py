@@ -33,24 +33,19 @@ TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive 
 
 
 class DriveCommands:
-    """The commands of one drive. Each returns what was reached, or raises DriveError.
-
-    Attributes:
-        drive: The drive.
-        stops: Those that stop it.
-        offered: Those without arguments by name, for :meth:`request`.
-    """
+    """The commands of one drive. Each returns what was reached, or raises DriveError."""
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        self.drive = drive
+        self.drive = drive  # the drive
         self._steps = DriveSequences(drive, scheduler)
-        self.stops = StopCommands(drive, self._steps, scheduler)
+        self.stops = StopCommands(drive, self._steps, scheduler)  # those that stop it
         self._stopping: dict[str, Sequence] = {
             'disable': self.stops.disable,
             'halt': self.stops.halt,
             'quick_stop': self.stops.quick_stop,
             'shutdown': self.stops.shutdown,
         }
+        # those without arguments by name, for :meth:`request`
         self.offered: dict[str, Sequence] = {
             'init': self.init,
             'enable': self.enable,
@@ -142,10 +137,9 @@ class DriveCommands:
         return f'target {target:g} in mode {mode.number.title}'
 
     def deliver(self, command: Callable[[], str]) -> Promise[str]:
-        """Command a target or a move; done when the drive has it, and no halt keeps it.
+        """Run ``command``, which sets a target or a move.
 
-        Args:
-            command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
+        Done when the drive has it, and no halt keeps it.
         """
         return self._scheduler.spawn(self._delivered(command))
 
@@ -188,13 +182,9 @@ class DriveCommands:
             raise steps.refused('was stopped before it had taken the target')
 
     async def arrive(self, command: Callable[[], str], timeout: float) -> str:
-        """Command a target or a move, and wait until the drive stands there.
+        """Run ``command``, which sets a target or a move, and wait until the drive stands there.
 
-        One that is late is halted.
-
-        Args:
-            command: Calls :meth:`set_target` or :meth:`move`, and returns its answer.
-            timeout: How long the motion may take in [s].
+        One that is later than ``timeout`` in [s] is halted.
 
         Raises:
             DriveError: It is late, was stopped before, or got another target or mode.
@@ -310,9 +300,8 @@ class DriveCommands:
     ) -> str:
         """Enable the drive if it is not, home it, and select the mode of before again.
 
-        Args:
-            method: Homing method for 0x6098; None takes what is in the drive.
-            on_progress: Called with each phase when it begins.
+        By a method of 0x6098, None for the one in the drive; ``on_progress`` gets each phase when
+        it begins.
         """
         drive, steps = self.drive, self._steps
         await steps.ready()

@@ -26,29 +26,18 @@ NOT_TAKEN = (
 
 
 class DriveControl:
-    """The goal, the modes and the controlword of an axis.
-
-    Attributes:
-        goal: State that the cycle leads to, None before the first command.
-        modes: The modes that this bus.yml makes possible.
-        mode: The mode that is commanded.
-        halt: What keeps it halted.
-    """
+    """The goal, the modes and the controlword of an axis."""
 
     def __init__(self, view: DriveView, warn: Callable[[str], None]) -> None:
-        """Build the modes.
-
-        Args:
-            view: The state of the axis.
-            warn: Takes a warning in words.
-        """
         self._view = view
         self._objects = view.objects
         self._warn = warn
+        # state that the cycle leads to, None before the first command
         self.goal: DriveState | None = None
-        self.halt = Halt()
+        self.halt = Halt()  # what keeps it halted
+        # the modes that this bus.yml makes possible
         self.modes = build_modes(view.objects, view.units, lambda: view.parameters, warn)
-        self.mode: Mode = self.modes[OperationMode.NO_MODE]
+        self.mode: Mode = self.modes[OperationMode.NO_MODE]  # the mode that is commanded
         self._mode_shown = self._mode_led = self.mode
         self._controlword = 0
         self._quirks = quirks_of(view.config.quirks)
@@ -227,11 +216,6 @@ class DriveControl:
     def step(self, command: Command, now: float, period: float) -> tuple[Command, int]:
         """Advance the mode by a cycle, and let targets leave before what makes them act.
 
-        Args:
-            command: What leads to the goal.
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-
         Returns:
             The command of this cycle, and the bits of mode and halt in its controlword.
         """
@@ -269,11 +253,7 @@ class DriveControl:
         """Let targets leave a cycle before the mode and the command that make them act.
 
         RPDOs carry objects in any distribution, so that of one cycle a drive may see the edge
-        before the target.
-
-        Returns:
-            The command of this cycle, and whether it, or the mode, makes targets act that have
-            left before.
+        before the target. The flag: this command, or the mode, makes targets act that have left.
         """
         if self._mode_led is not self.mode:
             self._mode_led = self.mode
@@ -288,9 +268,8 @@ class DriveControl:
     def _hold_without_target(self, *, edge: bool) -> int:
         """Preload what may act on the drive later, and keep up a halt while modes change.
 
-        Args:
-            edge: The drive is enabled, or its mode switched, by what leaves in this cycle; the
-                targets stay as they left in the one before.
+        With ``edge`` the drive is enabled, or its mode switched, by what leaves in this cycle:
+        targets stay as they left in the one before.
         """
         held = self.holding_mode
         if not edge and not self._keeps_target:

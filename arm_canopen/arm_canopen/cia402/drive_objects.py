@@ -18,12 +18,7 @@ class DriveObjects:
     """What the master reads from and writes to a drive in each cycle, in device units."""
 
     def __init__(self, node: RemoteNode, channel: int = 0) -> None:
-        """Bind each object to its PDO; what the drive has but no PDO carries goes by SDO.
-
-        Args:
-            node: The device.
-            channel: Number of the axis, from 0.
-        """
+        """Bind each object to its PDO; what the drive has but no PDO carries goes by SDO."""
         self._node = node
         self._offset = AXIS_OFFSET * channel
         self._statusword = node.objects.reader(self.at(Index.STATUSWORD))
@@ -172,12 +167,7 @@ class DriveObjects:
         return None if writer.by_sdo and (entry is None or not entry.access.writable) else writer
 
     def held_position(self, mode: OperationMode, offsets: Mapping[int, int]) -> int | None:
-        """Position that a cyclic mode commands by RPDO in [inc], None when none carries it.
-
-        Args:
-            mode: The mode.
-            offsets: What the drive was read to hold in its offsets.
-        """
+        """Position that a cyclic mode commands by RPDO in [inc], None when none carries it."""
         interpolated = mode is OperationMode.INTERPOLATED_POSITION
         place = (Index.INTERPOLATION_DATA, 1) if interpolated else (Index.TARGET_POSITION, 0)
         value = self._node.image.commanded(self.at(place[0]), place[1])

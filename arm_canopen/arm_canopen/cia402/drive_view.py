@@ -17,8 +17,7 @@ from ..standard.emcy import error_code_text
 from ..standard.objects import Index
 from .drive_objects import DriveObjects
 from .modes import Actual
-from .parameter_cache import ParameterCache
-from .parameters import DriveParameters
+from .parameters import DriveParameters, ParameterCache
 from .units import clamp, INT16_MAX, INT32_MAX, Units
 from .velocity_estimate import VelocityEstimate
 
@@ -58,14 +57,6 @@ class DriveView:
         config: DriveConfig,
         warn: Callable[[str], None],
     ) -> None:
-        """Bind the axis to its device.
-
-        Args:
-            node: The device.
-            scheduler: Time.
-            config: Settings of the axis.
-            warn: Takes a warning in words.
-        """
         self.node = node
         self.config = config
         self.name = config.name or node.name
@@ -181,12 +172,7 @@ class DriveView:
         return '' if emergency is None else error_code_text(emergency.code)
 
     def describe(self, *, halted: bool = False, failure: str = '') -> str:
-        """Describe the axis in a sentence.
-
-        Args:
-            halted: The master halts it.
-            failure: Why the master stopped it; else empty.
-        """
+        """Describe the axis in a sentence."""
         node = self.node
         if not node.online:
             detail = f' ({node.phase_detail})' if node.phase_detail else ''

@@ -22,12 +22,6 @@ class FeedForward:
     """
 
     def __init__(self, objects: DriveObjects, units: Units) -> None:
-        """Bind the objects.
-
-        Args:
-            objects: Objects of the axis.
-            units: Its units.
-        """
         self._units = units
         self._velocity = objects.target_writer(Index.VELOCITY_OFFSET)
         self._torque = objects.target_writer(Index.TORQUE_OFFSET)

@@ -53,11 +53,9 @@ class Halt:
         self.held = False
 
     def leave(self, now: float, delivery: Promise[None]) -> None:
-        """End it when the drive has taken the target that was commanded at this time in [s].
+        """End it when the drive has taken the target that was commanded at ``now`` in [s].
 
-        Args:
-            now: Steady time in [s].
-            delivery: Of the target; where the drive refuses it, the halt goes on.
+        Where the drive refuses its delivery, the halt goes on.
         """
         if self.held:
             self._leaving_since = now
@@ -76,11 +74,6 @@ class Halt:
 
     def advance(self, now: float, period: float, mode: Mode) -> bool:
         """End it where that is due, for a drive that acts on a mode.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-            mode: The mode.
 
         Returns:
             False when the drive has not taken its new target in time, and stays halted.

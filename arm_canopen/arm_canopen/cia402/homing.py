@@ -34,15 +34,11 @@ async def home(
     method: int | None = None,
     on_progress: Callable[[HomingProgress], None] | None = None,
 ) -> str:
-    """Home a drive that is enabled; it is left in mode 6.
+    """Home a drive that is enabled, by a method of 0x6098 or, with None, the one in the drive.
 
-    Ended from outside, bit 4 is cleared, which interrupts the homing. A method that is given is
-    for this time only: whatever happens, 0x6098 gets back the one that the drive had.
-
-    Args:
-        steps: Steps of the drive.
-        method: Value for 0x6098; None takes what is in the drive.
-        on_progress: Called with each phase when it begins.
+    It is left in mode 6. Ended from outside, bit 4 is cleared, which interrupts the homing. A
+    method that is given is for this time only: whatever happens, 0x6098 gets back the one that the
+    drive had.
 
     Returns:
         What was done, in words.

@@ -25,14 +25,7 @@ def build_modes(
     parameters: Callable[[], DriveParameters],
     warn: Callable[[str], None],
 ) -> dict[OperationMode, Mode]:
-    """Return the modes of a drive by number.
-
-    Args:
-        objects: Its objects.
-        units: Its units.
-        parameters: Returns what it has reported about itself.
-        warn: Takes a warning in words.
-    """
+    """Return the modes of a drive by number."""
     modes: list[Mode] = [NoMode(), Homing()]
     modes += _profile_modes(objects, units, parameters, warn)
     modes += _cyclic_modes(objects, units, parameters)

@@ -23,20 +23,14 @@ NO_BITS = 0  # bits are plain numbers in the cycle, where operators of IntFlag c
 
 
 class Actual(NamedTuple):
-    """Where a drive is, or is held.
+    """Where a drive is, or is held."""
 
-    Attributes:
-        position_inc: In [inc], as the drive reports it, so that no factor in bus.yml can make
-            the target another one.
-        velocity: In user units per second; a moving drive is braked from it.
-        velocity_dev: The same in device units, as the drive reports it.
-        torque: 0x6077 in device units, 0 when it is unknown.
-    """
-
+    # in [inc], as the drive reports it, so that no factor in bus.yml can make the target another
+    # one
     position_inc: int
-    velocity: float = 0.0
-    velocity_dev: int = 0
-    torque: int = 0
+    velocity: float = 0.0  # in user units per second; a moving drive is braked from it
+    velocity_dev: int = 0  # the same in device units, as the drive reports it
+    torque: int = 0  # 0x6077 in device units, 0 when it is unknown
 
 
 def fitting(target: Writer, value: int) -> int:
@@ -97,20 +91,10 @@ class Mode(ABC):
 
     @abstractmethod
     def step(self, now: float, period: float, statusword: int) -> int:
-        """Advance one cycle in which the drive accepts targets, and return the bits of this mode.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-            statusword: 0x6041 as the drive sent it.
-        """
+        """Advance a cycle in which the drive accepts targets; return the bits of this mode."""
 
     def withdraw(self, delivery: Promise[None], error: DriveError) -> bool:
-        """Take back a target that the drive does not have yet, by its promise.
-
-        Args:
-            delivery: Of the target; it is rejected.
-            error: Why.
+        """Take back a target that the drive does not have yet, and reject its promise.
 
         Returns:
             Whether that was possible; else it is on its way.
@@ -126,11 +110,7 @@ class Mode(ABC):
         return True
 
     def reached(self, statusword: int) -> bool:
-        """Whether the drive is where the last target is, as far as the mode knows.
-
-        Args:
-            statusword: 0x6041 as the drive sent it.
-        """
+        """Whether the drive is where the last target is, as far as the mode knows."""
         return bool(statusword & TARGET_REACHED)
 
     @property
@@ -179,16 +159,12 @@ class NoMode(Mode):
 
 
 class Homing(Mode):
-    """Mode 6: bit 4 starts the method of 0x6098.
-
-    Attributes:
-        started: Whether bit 4 is set.
-    """
+    """Mode 6: bit 4 starts the method of 0x6098."""
 
     number = OperationMode.HOMING
 
     def __init__(self) -> None:
-        self.started = False
+        self.started = False  # whether bit 4 is set
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Have nothing to preload: without bit 4 nothing moves."""

@@ -43,19 +43,10 @@ class MotionGroup:
     A drive belongs to one source at most. It is released when a client commands a single target,
     another mode or a stop, and when it faults or is lost; its source does not get it back by
     itself.
-
-    Attributes:
-        drives: The drives.
     """
 
     def __init__(self, drives: Sequence[Drive], report: Report) -> None:
-        """Take the drives.
-
-        Args:
-            drives: The drives of the bus.
-            report: Takes events.
-        """
-        self.drives = {drive.name: drive for drive in drives}
+        self.drives = {drive.name: drive for drive in drives}  # the drives
         self._report = report
         self._attachments: list[Attachment] = []
         for drive in drives:
@@ -87,12 +78,7 @@ class MotionGroup:
         self._attachments = [entry for entry in self._attachments if entry.source is not source]
 
     def cycle(self, now: float, period: float) -> None:
-        """Run one cycle: states in, sources, targets out.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-        """
+        """Run one cycle: states in, sources, targets out; times in [s]."""
         # whatever is wrong with one drive is reported, and stops it; the others are served
         for drive in self.drives.values():
             try:

@@ -4,19 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from ..config.model.checks.drive_units import is_coarse
 from ..config.model.drive import DriveConfig
 from ..config.model.factor_group import ACCELERATION_ADDRESSES, FACTOR_ADDRESSES, FactorGroup
 from ..exceptions import CodecError, SdoAbortError, SdoError
 from ..master.remote_node import RemoteNode
+from ..master.scheduler import Promise, Scheduler, Task
 from ..standard.drive import OperationMode
 from ..standard.objects import AXIS_OFFSET, Index
 from .setpoint_profile import ProfileLimits
 from .target_offset import OFFSET_OBJECTS
 from .units import Units
 
+RETRY_PERIOD = 1.0  # [s] after which what a drive did not answer is read again
 READ_TIMEOUT = 0.5  # [s] nothing waits for these answers, so a slow device has its time
 SPEED_SHARE = 0.1  # share of 0x607F with which drives without 0x6081 move
 RANGE_TIME = 10.0  # [s] in which those without 0x607F, too, cross their range (0x607D)
@@ -47,72 +50,125 @@ REFRESHED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class DriveParameters:
-    """Parameters of one drive; None where the drive does not have them.
+    """Parameters of one drive; None where the drive does not have them."""
 
-    Attributes:
-        supported_modes: Bits of 0x6502.
-        homing_method: 0x6098.
-        position_limits: Software limits 0x607D in user units, lower first.
-        speed_limit: 0x607F in user units per second.
-        effort_limit: 0x6072 in user units.
-        following_window: 0x6065 in user units; None where nothing is monitored, too.
-        profile: Limits for profiles of the master's own, from 0x6081, 0x6083, 0x6084 and 0x607F.
-        quick_stop_deceleration: 0x6085 in user units per second squared.
-        torque_slope: Greatest change of a torque that the master ramps, in user units per second,
-            from 0x6087.
-        profile_velocity_inc: 0x6081 in device units; None when the drive has none, or a PDO
-            carries it.
-        offsets: What the drive adds to the targets of its cyclic modes (0x60B0 to 0x60B2) in
-            device units, by object of the first axis.
-        units: In words, where the units come from.
-    """
-
-    supported_modes: int | None = None
-    homing_method: int = 0
+    supported_modes: int | None = None  # bits of 0x6502
+    homing_method: int = 0  # 0x6098
+    # software limits 0x607D in user units, lower first
     position_limits: tuple[float, float] | None = None
-    speed_limit: float | None = None
-    effort_limit: float | None = None
+    speed_limit: float | None = None  # 0x607F in user units per second
+    effort_limit: float | None = None  # 0x6072 in user units
+    # 0x6065 in user units; None where nothing is monitored, too
     following_window: float | None = None
+    # limits for profiles of the master's own, from 0x6081, 0x6083, 0x6084 and 0x607F
     profile: ProfileLimits = DEFAULT_PROFILE
+    # 0x6085 in user units per second squared
     quick_stop_deceleration: float = DEFAULT_ACCELERATION
+    # greatest change of a torque that the master ramps, in user units per second, from 0x6087
     torque_slope: float = DEFAULT_TORQUE_SLOPE_DEV
+    # 0x6081 in device units; None when the drive has none, or a PDO carries it
     profile_velocity_inc: int | None = None
+    # what the drive adds to the targets of its cyclic modes (0x60B0 to 0x60B2) in device units, by
+    # object of the first axis
     offsets: Mapping[int, int] = field(default_factory=dict)
-    units: str = 'bus.yml'
+    units: str = 'bus.yml'  # in words, where the units come from
 
     def supports(self, mode: OperationMode) -> bool:
         """Whether the drive has a mode; one without 0x6502 is believed to have all."""
         return self.supported_modes is None or bool(self.supported_modes & mode.support_bit)
 
 
-class ParameterReader:
-    """Reads these objects of one axis, as far as its EDS has them."""
+class ParameterCache:
+    """The parameters of one axis: read after each boot, and again after each change."""
 
-    def __init__(self, node: RemoteNode, config: DriveConfig, units: Units) -> None:
-        """Take the axis.
-
-        Args:
-            node: The device.
-            config: Settings of the axis.
-            units: Its units; they become the drive's own where bus.yml gives none.
-        """
+    def __init__(
+        self,
+        node: RemoteNode,
+        config: DriveConfig,
+        units: Units,
+        scheduler: Scheduler,
+        warn: Callable[[str], None],
+    ) -> None:
+        """Its units become the drive's own where bus.yml gives none."""
+        self.parameters = DriveParameters()  # what the drive reported last
+        self.known = False  # they were read since its device was booted
         self._node = node
         self._config = config
         self._units = units
         self._offset = AXIS_OFFSET * config.channel
+        self._units_from = ''  # they do not change while a device runs
+        self._scheduler = scheduler
+        self._warn = warn
+        self._reading: Task[None] | None = None
+        self._outdated = False
+        node.sdo.on_download.append(self._object_downloaded)
+
+    def begin(self) -> None:
+        """Read those of a device that was booted."""
+        self._reading = self._scheduler.background(self._keep_reading())
+
+    def forget(self, reason: str) -> None:
+        """The device is lost; what comes back may be another one."""
+        self.known = self._outdated = False
         self._units_from = ''
+        if self._reading is not None:
+            self._reading.cancel(SdoError(reason))
 
-    def forget(self) -> None:
-        """Read the units again; they do not change while a device runs."""
-        self._units_from = ''
+    async def factor_group(self) -> FactorGroup:
+        """Read what the drive says about its increments; SdoError when it does not answer."""
+        return await self._factor_group(FACTOR_ADDRESSES)
 
-    async def read(self) -> DriveParameters:
-        """Read all of them.
+    def _object_downloaded(
+        self, index: int, subindex: int, data: bytes, end: Promise[None]
+    ) -> None:
+        """One of the objects may be changed through this master, by whomever."""
+        if index - self._offset in REFRESHED:
+            end.when_done(self._object_written)
 
-        Raises:
-            SdoError: The drive does not answer. Its limits are then unknown, which is not the same
-                as that it has none.
-        """
+    def _object_written(self, end: Promise[None]) -> None:
+        if not self.known or end.error is not None:
+            return
+        self._outdated = True
+        if self._reading is None or self._reading.done:
+            self._reading = self._scheduler.background(self._keep_reading())
+
+    async def _keep_reading(self) -> None:
+        reason = await self._refresh()
+        if reason and self.known:
+            self._warn(f'its limits were changed, and the new ones cannot be read: {reason}')
+        elif reason:
+            self._warn(f'its parameters are unknown, so it takes no commands: {reason}')
+        while reason or self._outdated:
+            if reason:
+                await self._scheduler.timer(RETRY_PERIOD)
+            reason = await self._refresh()
+
+    async def _refresh(self) -> str:
+        """Read the parameters; return why that could not be done, or nothing."""
+        self._outdated = False
+        try:
+            self.parameters = await self._read_all()
+        except SdoError as error:  # its limits are then unknown, not absent
+            return str(error)
+        if not self.known:
+            self._warn_of_silence()
+        self.known = True
+        return ''
+
+    def _warn_of_silence(self) -> None:
+        """Warn, after a boot, of parameters with which targets would move nothing."""
+        used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
+        if used and self.parameters.profile_velocity_inc == 0:
+            self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
+        scale = self._units.position_scale
+        if self._config.scale_from_factor_group and is_coarse(scale):
+            self._warn(
+                f'1.0 rad is {scale:g} increments by its factor group: targets between two of '
+                'them are refused'
+            )
+
+    async def _read_all(self) -> DriveParameters:
+        """Read them, as far as the EDS has them."""
         self._units_from = self._units_from or await self._read_units()
         units = self._units
         slope = await self._read(Index.TORQUE_SLOPE)
@@ -137,14 +193,6 @@ class ParameterReader:
             offsets={index: await self._read(index) or 0 for index in OFFSET_OBJECTS.values()},
             units=self._units_from,
         )
-
-    async def factor_group(self) -> FactorGroup:
-        """Read what the drive says about its increments.
-
-        Raises:
-            SdoError: It does not answer.
-        """
-        return await self._factor_group(FACTOR_ADDRESSES)
 
     async def _factor_group(self, addresses: Sequence[tuple[int, int]]) -> FactorGroup:
         held = {address: await self._read(*address) for address in addresses}

@@ -28,19 +28,12 @@ FULL_AFTER = 0.1  # [s] after which bit 12 is no late answer any more, but a ful
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A set-point of mode 1, and how the drive shall take it (CiA 402-2, 10.3).
+    """A set-point of mode 1, and how the drive shall take it (CiA 402-2, 10.3)."""
 
-    Attributes:
-        target: Position in user units; a distance when it is relative.
-        relative: From the last set-point on (bit 6).
-        immediate: At once, ending the move that runs (bit 5); else after it.
-        blend: Pass the set-point before at speed instead of stopping there (bit 9).
-    """
-
-    target: float
-    relative: bool = False
-    immediate: bool = True
-    blend: bool = False
+    target: float  # position in user units; a distance when it is relative
+    relative: bool = False  # from the last set-point on (bit 6)
+    immediate: bool = True  # at once, ending the move that runs (bit 5); else after it
+    blend: bool = False  # pass the set-point before at speed instead of stopping there (bit 9)
 
     @property
     def bits(self) -> int:
@@ -69,18 +62,12 @@ class Handshake(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A move that waits for the drive.
+    """A move that waits for the drive."""
 
-    Attributes:
-        value: What is written to 0x607A.
-        move: The move.
-        destination: Where it ends in user units.
-        delivery: Done when the drive has the value.
-    """
-
-    value: int
-    move: Move
-    destination: float
+    value: int  # what is written to 0x607A
+    move: Move  # the move
+    destination: float  # where it ends in user units
+    # done when the drive has the value
     delivery: Promise[None] = field(default_factory=Promise, compare=False)
 
 
@@ -105,14 +92,10 @@ class ProfilePosition(Mode):
         *,
         target_leads: bool,
     ) -> None:
-        """Take the way to 0x607A.
+        """With ``target_leads`` the value leaves a cycle ahead.
 
-        Args:
-            units: Units of the drive.
-            target: Writer of 0x607A.
-            warn: Takes a warning in words.
-            target_leads: The mapping does not make sure that a drive sees 0x607A before bit 4 of
-                the same cycle, so the value leaves a cycle ahead.
+        The mapping then does not make sure that a drive sees 0x607A before bit 4 of the same
+        cycle.
         """
         self._target_leads = target_leads
         self._units = units

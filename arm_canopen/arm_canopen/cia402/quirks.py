@@ -11,18 +11,12 @@ from ..exceptions import DriveError
 
 @dataclass(frozen=True, slots=True)
 class Quirks:
-    """How one kind of drive deviates.
+    """How one kind of drive deviates."""
 
-    Attributes:
-        state_timeout: Time for all steps to a state in [s], as ros2_canopen has it.
-        mode_timeout: Time for 0x6061 to follow 0x6060 in [s].
-        homed_without_arrival: The end of homing is bit 12 alone; bit 10 never comes.
-        no_mode_zero: 0x6060 = 0 is refused, so the mode that the drive has is kept selected.
-    """
-
-    state_timeout: float = 5.0
-    mode_timeout: float = 5.0
-    homed_without_arrival: bool = False
+    state_timeout: float = 5.0  # time for all steps to a state in [s], as ros2_canopen has it
+    mode_timeout: float = 5.0  # time for 0x6061 to follow 0x6060 in [s]
+    homed_without_arrival: bool = False  # the end of homing is bit 12 alone; bit 10 never comes
+    # 0x6060 = 0 is refused, so the mode that the drive has is kept selected
     no_mode_zero: bool = False
 
 

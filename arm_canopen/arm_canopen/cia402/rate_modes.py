@@ -27,12 +27,6 @@ class DriveRamped(Mode):
     bits = NO_BITS
 
     def __init__(self, units: Units, target: Writer) -> None:
-        """Take the way to the target object.
-
-        Args:
-            units: Units of the drive.
-            target: Its writer.
-        """
         self._units = units
         self._target = target
         self._delivery = completed()
@@ -113,13 +107,7 @@ class MasterRamped(Mode):
     cyclic = True
 
     def __init__(self, units: Units, target: Writer, slope: Callable[[], float]) -> None:
-        """Take the way to the target object.
-
-        Args:
-            units: Units of the drive.
-            target: Its writer.
-            slope: Gives the greatest rate of change in user units per second.
-        """
+        """``slope`` returns the greatest rate of change in user units per second."""
         self._units = units
         self._target = target
         self._slope = slope

@@ -24,13 +24,7 @@ class Recovery:
         scheduler: Scheduler,
         enable_in: Callable[[OperationMode], Promise[str]],
     ) -> None:
-        """Take the drive and the time.
-
-        Args:
-            drive: The drive.
-            scheduler: Time.
-            enable_in: Begins a command that enables the drive in a mode.
-        """
+        """``enable_in`` begins a command that enables the drive in a mode."""
         self._drive = drive
         self._scheduler = scheduler
         self._enable_in = enable_in

@@ -32,17 +32,12 @@ SETTLE_CYCLES = 3  # of SYNC after which an answer shows what a command has done
 
 
 class DriveSequences:
-    """Steps of one drive, to be awaited in the thread of the network.
-
-    Attributes:
-        drive: The drive.
-        quirks: Where it deviates from the standard.
-        needs_mode: It refuses mode 0, or Operation enabled in that.
-    """
+    """Steps of one drive, to be awaited in the thread of the network."""
 
     def __init__(self, drive: Drive, scheduler: Scheduler) -> None:
-        self.drive = drive
-        self.quirks = quirks_of(drive.config.quirks)
+        self.drive = drive  # the drive
+        self.quirks = quirks_of(drive.config.quirks)  # where it deviates from the standard
+        # it refuses mode 0, or Operation enabled in that
         self.needs_mode = self.quirks.no_mode_zero
         self._keeps_mode_under_halt = False
         self._scheduler = scheduler
@@ -55,8 +50,7 @@ class DriveSequences:
     async def ready(self, *, to_stop: bool = False) -> None:
         """Wait for state and parameters of a drive that has just come up.
 
-        Args:
-            to_stop: A drive whose state is not fresh is ready, too.
+        With ``to_stop`` a drive whose state is not fresh is ready, too.
 
         Raises:
             DriveError: It is offline, is being stopped or could not be, or does not send them.
@@ -112,11 +106,7 @@ class DriveSequences:
             raise
 
     async def _begin_enabling(self) -> None:
-        """Leave what stopped it before behind, and have it hold where it is.
-
-        Raises:
-            DriveError: It is being stopped again, or does not take the value that holds it.
-        """
+        """Leave what stopped it before behind, and have it hold where it is."""
         drive = self.drive
         if drive.stop.running:
             raise self.refused('is being stopped')
@@ -131,11 +121,7 @@ class DriveSequences:
     async def _select_where_required(self, timeout: float) -> None:
         """Select the mode of bus.yml for a drive that refuses Operation enabled without one.
 
-        Args:
-            timeout: Within which an enabled drive shows that in [s].
-
-        Raises:
-            DriveError: It does not take that mode.
+        An enabled drive shows within ``timeout`` in [s] that it does.
         """
         drive, control = self.drive, self.drive.control
         mode = self._configured_mode()
@@ -190,11 +176,7 @@ class DriveSequences:
             await self.switch(mode)
 
     async def _preload(self, mode: Mode | None, consequence: str) -> None:
-        """Write the holding value of a mode whose target goes by SDO, whatever the drive has.
-
-        Raises:
-            DriveError: The drive does not confirm it, and might act on what stands there.
-        """
+        """Write the holding value of a mode whose target goes by SDO, whatever the drive has."""
         if mode is None or not mode.by_sdo:
             return
         try:
@@ -222,8 +204,7 @@ class DriveSequences:
     async def halt(self, timeout: float) -> None:
         """Halt a drive that is enabled, and wait until it stands.
 
-        Args:
-            timeout: How long that may take in [s], beside the time of the ramp.
+        The ``timeout`` in [s] is beside the time of the ramp.
 
         Raises:
             DriveError: It does not come to rest; it stays halted.
@@ -281,11 +262,7 @@ class DriveSequences:
             await self.reach(DriveState.OPERATION_ENABLED)
 
     async def _show(self, mode: Mode) -> None:
-        """Select a mode, and wait until 0x6061 shows it.
-
-        Raises:
-            DriveError: It does not in time, or an older target would act without the halt.
-        """
+        """Select a mode, and wait until 0x6061 shows it."""
         drive, control = self.drive, self.drive.control
         timeout = self.quirks.mode_timeout
 
@@ -317,14 +294,7 @@ class DriveSequences:
             )
 
     async def _end_halt_at_rest(self, acting: Mode) -> None:
-        """Take bit 8 back where the drive stands; no older target acts then.
-
-        Args:
-            acting: The mode that the drive is in.
-
-        Raises:
-            DriveError: It is a torque mode, or the drive does not take the target that holds it.
-        """
+        """Take bit 8 back where the drive stands; no older target acts then."""
         control = self.drive.control
         if acting.number in TORQUE_MODES:
             raise self.refused(
@@ -346,11 +316,7 @@ class DriveSequences:
             raise DriveError(f'{self.drive.name} stays halted: {NOT_TAKEN}')
 
     async def _clear_buffer(self) -> None:
-        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06).
-
-        Raises:
-            DriveError: The drive does not answer; with a closed buffer it would not move.
-        """
+        """Empty the buffer of mode 7, and open it, where the drive has one (0x60C4:06)."""
         drive = self.drive
         index = drive.objects.at(Index.INTERPOLATION_CONFIGURATION)
         entry = drive.node.config.dictionary.get(index, BUFFER_CLEAR)
@@ -387,13 +353,9 @@ class DriveSequences:
     async def until(
         self, condition: Callable[[], bool], timeout: float, what: str, remedy: str = ''
     ) -> None:
-        """Wait for a condition.
+        """Wait for a condition, ``what`` in words, for at most ``timeout`` in [s].
 
-        Args:
-            condition: What is waited for.
-            timeout: How long in [s].
-            what: It, in words.
-            remedy: What helps where it takes longer and nothing else is known to keep the drive.
+        The ``remedy`` helps where it takes longer and nothing else is known to keep the drive.
 
         Raises:
             DriveError: It does not hold in time, or the drive faults or is lost before.

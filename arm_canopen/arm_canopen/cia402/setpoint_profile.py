@@ -16,18 +16,12 @@ import math
 
 @dataclass(frozen=True, slots=True)
 class ProfileLimits:
-    """Limits of a profile, in user units.
+    """Limits of a profile, in user units."""
 
-    Attributes:
-        velocity: Largest speed towards a single target in [unit/s].
-        acceleration: Largest acceleration in [unit/s^2].
-        deceleration: Largest deceleration in [unit/s^2].
-        speed_limit: Largest speed along a stream of targets in [unit/s], where that is more.
-    """
-
-    velocity: float
-    acceleration: float
-    deceleration: float
+    velocity: float  # largest speed towards a single target in [unit/s]
+    acceleration: float  # largest acceleration in [unit/s^2]
+    deceleration: float  # largest deceleration in [unit/s^2]
+    # largest speed along a stream of targets in [unit/s], where that is more
     speed_limit: float = 0.0
 
 
@@ -70,19 +64,13 @@ class TargetLine:
 
 
 class SetpointProfile:
-    """Moves a set-point to a target that may change at any time, without a step in velocity.
-
-    Attributes:
-        position: Set-point of this cycle.
-        velocity: Its rate in [unit/s].
-        target: Where it goes; None brakes to a stop.
-    """
+    """Moves a set-point to a target that may change at any time, without a step in velocity."""
 
     def __init__(self, position: float, velocity: float = 0.0) -> None:
         """Start at a position with a rate in [unit/s], and brake."""
-        self.position = position
-        self.velocity = velocity
-        self.target: float | None = None
+        self.position = position  # set-point of this cycle
+        self.velocity = velocity  # its rate in [unit/s]
+        self.target: float | None = None  # where it goes; None brakes to a stop
         self._line: TargetLine | None = None
 
     @property
@@ -102,12 +90,7 @@ class SetpointProfile:
             self._line.extend(target)
 
     def follow(self, position: float, period: float) -> None:
-        """Take the set-point of a stream, and remember its rate for a smooth stop.
-
-        Args:
-            position: Set-point of this cycle.
-            period: Time since the last one in [s].
-        """
+        """Take the set-point of a stream, and remember its rate for a smooth stop."""
         self.velocity = (position - self.position) / period
         self.position = position
         self.go(None)
@@ -117,10 +100,6 @@ class SetpointProfile:
 
         The speed is never above the one from which the target can still be met by braking: of
         ``v * period + v^2 / (2 * deceleration) = distance`` the positive root.
-
-        Args:
-            period: Length of the cycle in [s].
-            limits: Limits to keep.
 
         Returns:
             The new set-point.

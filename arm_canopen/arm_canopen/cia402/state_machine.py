@@ -68,14 +68,10 @@ _UNCONTROLLED = (_S.UNKNOWN, _S.NOT_READY_TO_SWITCH_ON, _S.FAULT_REACTION_ACTIVE
 
 
 def next_command(state: DriveState, target: DriveState) -> Command:
-    """Return the command that leads from a state towards a target, by the shortest way.
+    """Return the command that leads from a state towards one of :data:`TARGETS`.
 
-    In a fault, and where the drive goes on by itself, it is DISABLE_VOLTAGE: a fault is never left
-    as a side effect of wanting another state, only by an explicit reset.
-
-    Args:
-        state: State that the drive shows.
-        target: One of :data:`TARGETS`.
+    By the shortest way. In a fault, and where the drive goes on by itself, it is DISABLE_VOLTAGE:
+    a fault is never left as a side effect of wanting another state, only by an explicit reset.
 
     Raises:
         ValueError: The target cannot be commanded.
@@ -102,11 +98,7 @@ def fault_reset(state: DriveState, elapsed: float) -> int:
     """Return the controlword that resets a fault by its rising edge, again and again.
 
     Each level lasts long enough for a drive that looks at the controlword less often than the
-    master sends it.
-
-    Args:
-        state: State that the drive shows.
-        elapsed: Time since the begin of the reset in [s].
+    master sends it; ``elapsed`` is the time since the first in [s].
     """
     if state is not DriveState.FAULT or int(elapsed / RESET_PULSE) % 2:
         return Command.DISABLE_VOLTAGE

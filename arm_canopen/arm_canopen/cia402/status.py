@@ -14,41 +14,23 @@ from .drive_view import DriveView, FAULTY
 
 @dataclass(frozen=True, slots=True)
 class DriveStatus:
-    """How a drive was at one moment.
+    """How a drive was at one moment."""
 
-    Attributes:
-        name: Name of the axis.
-        node: The device below it.
-        state: State of the power drive system.
-        mode: Mode of operation in words.
-        statusword: 0x6041 in words.
-        warning: The statusword shows a warning or an internal limit.
-        error: 0x603F in words, empty when none is known.
-        failure: Why the master stopped it, until it is enabled again; else empty.
-        fresh: State, position and velocity are young enough to act on.
-        age: Age of the oldest of them in [s]; infinite while they are unknown.
-        position: Actual position in user units.
-        velocity: Actual velocity in user units per second.
-        setpoint: Position last commanded in user units.
-        following_error: Set-point that was sent before the position was measured, minus that.
-        summary: All of it in a sentence.
-    """
-
-    name: str
-    node: NodeStatus
-    state: DriveState
-    mode: str
-    statusword: str
-    warning: bool
-    error: str
-    failure: str
-    fresh: bool
-    age: float
-    position: float
-    velocity: float
-    setpoint: float
-    following_error: float
-    summary: str
+    name: str  # name of the axis
+    node: NodeStatus  # the device below it
+    state: DriveState  # state of the power drive system
+    mode: str  # mode of operation in words
+    statusword: str  # 0x6041 in words
+    warning: bool  # the statusword shows a warning or an internal limit
+    error: str  # 0x603F in words, empty when none is known
+    failure: str  # why the master stopped it, until it is enabled again; else empty
+    fresh: bool  # state, position and velocity are young enough to act on
+    age: float  # age of the oldest of them in [s]; infinite while they are unknown
+    position: float  # actual position in user units
+    velocity: float  # actual velocity in user units per second
+    setpoint: float  # position last commanded in user units
+    following_error: float  # set-point that was sent before the position was measured, minus that
+    summary: str  # all of it in a sentence
 
     @property
     def faulted(self) -> bool:
@@ -57,12 +39,7 @@ class DriveStatus:
 
 
 def drive_status(drive: Drive, now: float) -> DriveStatus:
-    """Take a snapshot of a drive.
-
-    Args:
-        drive: The drive.
-        now: Steady time in [s].
-    """
+    """Take a snapshot of a drive."""
     return axis_status(
         drive.view,
         now,
@@ -82,16 +59,7 @@ def axis_status(
     failure: str = '',
     summary: str = '',
 ) -> DriveStatus:
-    """Take a snapshot of an axis, whoever commands it.
-
-    Args:
-        view: Its state.
-        now: Steady time in [s].
-        setpoint: Position last commanded in user units.
-        following_error: Set-point that was sent before the position was measured, minus that.
-        failure: Why the master stopped it; else empty.
-        summary: All of it in a sentence; without one, that of the view.
-    """
+    """Take a snapshot of an axis, whoever commands it."""
     word = view.statusword
     return DriveStatus(
         name=view.name,

@@ -19,19 +19,13 @@ from .stop_commands import BRAKED_TIMEOUT
 
 @dataclass(frozen=True, slots=True)
 class StopReport:
-    """What became of the drives, by name.
+    """What became of the drives, by name."""
 
-    Attributes:
-        stopped: They moved, and stand now; still under power.
-        standing: They did not move visibly, and no target of before moves them any more.
-        unpowered: They are not enabled, so nothing moves them.
-        failed: Why it is not known that they stand, each with its name.
-    """
-
-    stopped: tuple[str, ...]
+    stopped: tuple[str, ...]  # they moved, and stand now; still under power
+    # they did not move visibly, and no target of before moves them any more
     standing: tuple[str, ...]
-    unpowered: tuple[str, ...]
-    failed: tuple[str, ...]
+    unpowered: tuple[str, ...]  # they are not enabled, so nothing moves them
+    failed: tuple[str, ...]  # why it is not known that they stand, each with its name
 
     def __str__(self) -> str:
         """Return it in a sentence, what is worst first."""
@@ -57,10 +51,6 @@ async def stop_all(commands: Sequence[DriveCommands], scheduler: Scheduler) -> S
     """Halt all drives, whatever moves them, and wait until each stands or has no power.
 
     One that does not come to rest keeps no other from it.
-
-    Args:
-        commands: Those of the drives.
-        scheduler: Time.
     """
     ends = [scheduler.spawn(_stopped(each, scheduler)) for each in commands]
     outcomes = [await end for end in ends]
@@ -88,11 +78,7 @@ async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[_Outc
 
 
 async def _to_its_end(halt: Promise[str], commands: DriveCommands, scheduler: Scheduler) -> None:
-    """Wait for a stop, or for the one that has taken its place.
-
-    Raises:
-        CanopenError: The drive does not come to rest, or nobody can know.
-    """
+    """Wait for a stop, or for the one that has taken its place."""
     while True:
         try:
             await halt
@@ -107,11 +93,7 @@ async def _to_its_end(halt: Promise[str], commands: DriveCommands, scheduler: Sc
 
 
 async def _at_rest(commands: DriveCommands, scheduler: Scheduler) -> None:
-    """Wait for the end of what a halt leaves alone: a quick stop, the reaction to a fault.
-
-    Raises:
-        DriveError: It does not end, or the drive is not seen any more.
-    """
+    """Wait for the end of what a halt leaves alone: a quick stop, the reaction to a fault."""
     drive = commands.drive
     view = drive.view
 

@@ -105,11 +105,7 @@ class StopCommands:
                 raise
 
     async def _at_rest(self) -> str:
-        """Describe the drive when it was seen to stand.
-
-        Raises:
-            DriveError: It moves on, or is not seen.
-        """
+        """Describe the drive when it was seen to stand."""
         view = self._drive.view
         timeout = STOP_TIMEOUT + self._drive.stop.ramp_time()
         with view.looking(), suppress(TimeoutError):
@@ -123,14 +119,7 @@ class StopCommands:
             raise self._steps.refused('is not known to stand, as it was never booted')
 
     async def _ready_to_stop(self, reason: str) -> bool:
-        """Take the drive from whatever moves it, or would do so when it comes back.
-
-        Returns:
-            Whether it can be braked by PDOs; it cannot while a quick stop already runs.
-
-        Raises:
-            DriveError: It was never booted, or is faulted.
-        """
+        """Take the drive from what moves it, now or later; True where PDOs can brake it."""
         drive = self._drive
         drive.interrupted = None
         drive.released(Refusal(RefusalCause.COMMANDED, reason))

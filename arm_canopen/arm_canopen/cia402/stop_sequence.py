@@ -40,12 +40,9 @@ class BrakingWatch:
         self._least = math.inf
 
     def fails(self, now: float, view: DriveView, deceleration: float) -> bool:
-        """Return whether the axis was seen not to slow down for too long.
+        """Return whether the axis was seen for too long not to slow down.
 
-        Args:
-            now: Steady time in [s].
-            view: The state of the drive.
-            deceleration: Of the stop, in user units per second squared.
+        The ``deceleration`` of the stop is in user units per second squared.
         """
         if not view.speed_known:
             self.clear()
@@ -63,22 +60,13 @@ class StopSequence:
     is commanded by SDO; then no RPDO carries its controlword any more, which might enable it
     again. Where the SDO fails, the RPDO leaves again if it can. What its TPDOs do not show is read
     by SDO. A drive that a quick stop does not slow down loses its power.
-
-    Attributes:
-        goal: State that the drive is led to, whatever else is commanded; None while it does not
-            run.
     """
 
     def __init__(
         self, view: DriveView, scheduler: Scheduler, report: Callable[[Severity, str], None]
     ) -> None:
-        """Bind it to the drive; nothing runs before :meth:`begin`.
-
-        Args:
-            view: The state of the drive.
-            scheduler: Time.
-            report: Receives what goes wrong.
-        """
+        """Nothing runs before :meth:`begin`."""
+        # state that the drive is led to, whatever else is commanded; None while it does not run
         self.goal: DriveState | None = None
         self._view = view
         self._log = report

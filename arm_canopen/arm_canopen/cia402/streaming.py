@@ -55,11 +55,7 @@ class TargetStream:
             self._watch = self._scheduler.background(self._watch_for_pause())
 
     def end(self, by: str) -> None:
-        """Keep streams out.
-
-        Args:
-            by: The command, in words.
-        """
+        """Keep streams out, because of a command in words."""
         self._ended_by = by
         if self._watch is not None:
             self._watch.cancel(DriveError('the stream was ended by a command'))

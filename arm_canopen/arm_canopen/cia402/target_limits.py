@@ -36,14 +36,6 @@ def check_target(
 ) -> None:
     """Refuse a target that the drive would not go to: beyond its limits, or without any effect.
 
-    Args:
-        name: Name of the drive.
-        mode: The mode.
-        parameters: Its parameters.
-        units: Its units.
-        target: The target in user units.
-        position: Where the axis is.
-
     Raises:
         DriveError: It is such a target; the message has the reason.
     """

@@ -27,12 +27,7 @@ class OffsetTarget:
     """
 
     def __init__(self, target: Writer, offset: Callable[[], int]) -> None:
-        """Bind it.
-
-        Args:
-            target: Writer of the target object.
-            offset: Returns what the offset object holds in device units.
-        """
+        """``offset`` returns what the offset object holds in device units."""
         self._target = target
         self._read = offset
         self._offset = 0

@@ -14,12 +14,7 @@ INT32_MAX = 2**31 - 1
 
 
 def clamp(value: float, largest: int) -> int:
-    """Return the nearest integer that a signed object holds.
-
-    Args:
-        value: A finite number.
-        largest: INT16_MAX or INT32_MAX.
-    """
+    """Return the nearest integer that a signed object holds, by its INT16_MAX or INT32_MAX."""
     return max(-largest - 1, min(largest, round(value)))
 
 

@@ -11,30 +11,17 @@ FLICKER_INC = 1  # [inc] by which an encoder at rest may change
 
 
 class VelocityEstimate:
-    """The rate of 0x6064 over a short window.
-
-    Attributes:
-        window: Its length in [s].
-    """
+    """The rate of 0x6064 over a short window."""
 
     def __init__(self, poll_period: float = 0.0) -> None:
-        """Begin without positions.
-
-        Args:
-            poll_period: Time between two positions that are read by SDO in [s]; 0 where a PDO
-                carries them.
-        """
-        self.window = max(WINDOW, 2.5 * poll_period)
+        """``poll_period`` of positions that are read by SDO in [s]; 0 where a PDO carries them."""
+        self.window = max(WINDOW, 2.5 * poll_period)  # its length in [s]
         self._positions: deque[tuple[float, float]] = deque()
 
     def note(self, now: float, position_inc: float, stamp: float | None = None) -> None:
-        """Add a position in [inc].
+        """Add a position in [inc] at a steady time in [s].
 
-        Args:
-            now: Steady time in [s].
-            position_inc: The position.
-            stamp: Steady time in [s] at which it came; one that has not come anew for a window
-                counts as still there.
+        One whose ``stamp`` has not changed for a window counts as still there.
         """
         positions = self._positions
         if stamp is not None:

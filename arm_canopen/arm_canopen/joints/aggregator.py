@@ -23,17 +23,11 @@ class JointSample(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class JointSet:
-    """States of many joints at one moment.
+    """States of many joints at one moment."""
 
-    Attributes:
-        stamp: The moment in [ns], on the clock of the samples.
-        names: The joints, in URDF order.
-        samples: Their states.
-    """
-
-    stamp: int
-    names: list[str]
-    samples: list[JointSample]
+    stamp: int  # the moment in [ns], on the clock of the samples
+    names: list[str]  # the joints, in URDF order
+    samples: list[JointSample]  # their states
 
 
 class JointAggregator:
@@ -46,11 +40,6 @@ class JointAggregator:
     """
 
     def __init__(self, joints: Sequence[RobotJoint]) -> None:
-        """Start empty.
-
-        Args:
-            joints: The movable joints of the robot, in its order.
-        """
         self._joints = list(joints)
         self._samples: dict[str, JointSample] = {}
         self._arrivals: dict[str, float] = {}  # steady time in [s]
@@ -61,13 +50,7 @@ class JointAggregator:
         self._began: float | None = None  # steady time of the first sample in [s]
 
     def update(self, name: str, stamp: int, sample: JointSample, now: float) -> list[JointSet]:
-        """Take a sample.
-
-        Args:
-            name: The joint.
-            stamp: Its moment in [ns].
-            sample: Its state.
-            now: Steady time in [s].
+        """Add a sample of a joint, with its moment in [ns].
 
         Returns:
             The sets that are ready now: none, one, or two when this sample both ended a round and
@@ -89,11 +72,7 @@ class JointAggregator:
         return ready
 
     def silent(self, now: float) -> list[str]:
-        """Name the joints that nobody reports, or not any more.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Name the joints that nobody reports, or not any more."""
         return [
             joint.name
             for joint in self._joints

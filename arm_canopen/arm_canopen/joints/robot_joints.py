@@ -13,22 +13,14 @@ from ..exceptions import CanopenError
 
 @dataclass(frozen=True, slots=True)
 class RobotJoint:
-    """A joint with one variable.
+    """A joint with one variable."""
 
-    Attributes:
-        name: Name in the URDF.
-        mimic: What it follows, None when it moves by itself.
-    """
-
-    name: str
-    mimic: Mimic | None = None
+    name: str  # name in the URDF
+    mimic: Mimic | None = None  # what it follows, None when it moves by itself
 
 
 def movable_joints(robot_description: str) -> list[RobotJoint]:
-    """Return the revolute, continuous and prismatic joints in the order of the URDF.
-
-    Args:
-        robot_description: URDF as XML text.
+    """Return the revolute, continuous and prismatic joints in the order of the URDF, XML text.
 
     Raises:
         CanopenError: It is no URDF, or has no movable joint.

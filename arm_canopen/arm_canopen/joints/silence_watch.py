@@ -16,12 +16,6 @@ class SilenceWatch:
     """
 
     def __init__(self, joints: Iterable[str], now: float) -> None:
-        """Begin to wait for all joints.
-
-        Args:
-            joints: Their names.
-            now: Steady time in [s].
-        """
         self._absent_since: dict[str, float] = dict.fromkeys(joints, now)
         self._silent: frozenset[str] = frozenset()
 
@@ -32,10 +26,8 @@ class SilenceWatch:
     def look(self, silent: Iterable[str], published: Iterable[str], now: float) -> list[str]:
         """Return the joints that are missing; call it every few seconds.
 
-        Args:
-            silent: Joints without states now.
-            published: Joints whose states have a publisher in the graph.
-            now: Steady time in [s].
+        The ``silent`` have no states now; those of the ``published`` have a publisher in the
+        graph.
         """
         before, self._silent = self._silent, frozenset(silent)
         there = set(published)

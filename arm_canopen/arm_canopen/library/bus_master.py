@@ -71,19 +71,7 @@ def frames_per_cycle(config: BusConfig) -> int:
 
 
 class BusMaster:
-    """The master of one bus, without anything that shows it to others.
-
-    Attributes:
-        config: The bus.
-        can: Its CAN interface.
-        network: Its devices.
-        thread: The thread of the cycle, which owns all of this once it was started.
-        load: How busy the bus is.
-        commands: Commands of the drives, by name.
-        black_box: Writes the last frames when a fault happens; None without.
-        started: The cycle was started, so that the devices are ours to stop.
-        on_operational: Called in the thread of the cycle when the last device has booted.
-    """
+    """The master of one bus, without anything that shows it to others."""
 
     def __init__(
         self,
@@ -103,12 +91,13 @@ class BusMaster:
             beside_master: Start although another master is found, and command no device of its.
             black_box: How the last frames are written when a fault happens; None for not at all.
         """
-        self.config = config
-        self.can = can
+        self.config = config  # the bus
+        self.can = can  # its CAN interface
         can.limit_queue(QUEUED_CYCLES * frames_per_cycle(config))
         self._report_event = report
         self._beside_master = beside_master
-        self.load = BusLoad(config.master.bitrate, time.monotonic())
+        self.load = BusLoad(config.master.bitrate, time.monotonic())  # how busy the bus is
+        # writes the last frames when a fault happens; None without
         self.black_box: BlackBox | None = None
         self._transmit: Callable[[Frame], None] = self._send
         receive: Callable[[Frame], None] = self.load.count
@@ -117,8 +106,10 @@ class BusMaster:
             self.black_box = BlackBox(f'can_{can.name}', recording, black_box)
             self._transmit = recording.sending(self._send)
             receive = recording.receiving(self.load.count)
+        # its devices
         self.network = Network(config, self._transmit, self._report, beside_master=beside_master)
         self.network.on_frame = receive
+        # the thread of the cycle, which owns all of this once it was started
         self.thread = NetworkThread(can, self.network)
         scheduler = self.network.scheduler
         drives = [
@@ -127,12 +118,14 @@ class BusMaster:
             if device.config.is_drive
             for axis in device.config.axes
         ]
+        # commands of the drives, by name
         self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
         self._group = MotionGroup(drives, self._report)
         self.network.on_cycle = self._group.cycle
         self.thread.on_defect = self._stop_without_cycle
-        self.started = False
+        self.started = False  # the cycle was started, so that the devices are ours to stop
         self._leaving = False
+        # called in the thread of the cycle when the last device has booted
         self.on_operational: Callable[[], None] = lambda: None
         self._operational: set[str] = set()
 
@@ -156,11 +149,7 @@ class BusMaster:
         return describe(found) if found else ''
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Boot the devices and start the cycle.
-
-        Args:
-            begin: Called first in the thread of the cycle, which may want a priority.
-        """
+        """Boot the devices and start the cycle, after ``begin`` in its thread."""
         self.started = True
         if self.black_box is not None:
             self.black_box.start()
@@ -226,8 +215,7 @@ class BusMaster:
     def _stop_without_cycle(self) -> str:
         """Send a quick stop to each drive that may have power; nobody waits for an answer.
 
-        Returns:
-            What was sent, to which drives it is all that stops them, and which did not get it.
+        Return what was sent, to which drives it is all that stops them, and which did not get it.
         """
         if self.black_box is not None:
             self.black_box.fault('', f'{OWNER} has ended by a defect')

@@ -30,13 +30,7 @@ class BusRecording:
     """
 
     def __init__(self, config: BusConfig, bus_name: str, window: float) -> None:
-        """Take the memory.
-
-        Args:
-            config: The bus.
-            bus_name: Name of the CAN interface.
-            window: How far back it reaches in [s].
-        """
+        """The ``window`` is how far back it reaches in [s]."""
         self._config = config
         self._bus_name = bus_name
         self._window = window
@@ -76,9 +70,7 @@ class BusRecording:
     def save(self, folder: Path, pause: Pause) -> Path:
         """Write the frames of the window in the order of their times.
 
-        Args:
-            folder: Where to.
-            pause: Called after each small piece of work.
+        ``pause`` is called after each small piece of work.
 
         Raises:
             OSError: The file cannot be written.

@@ -57,11 +57,7 @@ class ReplayedAxis:
         self._commanded = False
 
     def observe(self, report: Callable[[Severity, str], None]) -> None:
-        """Take state and position of this cycle; report a fault that is new.
-
-        Args:
-            report: Takes what happens to the axis.
-        """
+        """Take state and position of this cycle; report a fault that is new."""
         view = self.view
         before = view.state
         view.observe()
@@ -106,12 +102,6 @@ class BusReplay:
     """
 
     def __init__(self, config: BusConfig, report: Report) -> None:
-        """Build it.
-
-        Args:
-            config: The bus.
-            report: Takes events.
-        """
         self.network = network = Network(config, _send_nothing, report, beside_master=True)
         self.load = BusLoad(config.master.bitrate, 0.0)
         self.counters = BusCounters()
@@ -180,11 +170,7 @@ class BusReplay:
         self._update_when_due(frame.timestamp)
 
     def advance(self, now: float) -> None:
-        """Let time pass, so that what does not come any more is missed.
-
-        Args:
-            now: Time of the log in [s].
-        """
+        """Let time pass to ``now`` of the log in [s], so that what is silent is missed."""
         while self.now < now:
             step = min(now, self.now + STEP)
             self.network.advance(step)

@@ -38,12 +38,6 @@ class CanopenDrive:
     """
 
     def __init__(self, commands: DriveCommands, thread: NetworkThread) -> None:
-        """Take the drive.
-
-        Args:
-            commands: Its commands.
-            thread: The thread of its network.
-        """
         drive = commands.drive
         self.name = drive.name
         self.sdo = DeviceSdo(drive.node, thread)
@@ -92,18 +86,11 @@ class CanopenDrive:
         return self._request('recover')
 
     def home(self, method: int | None = None) -> str:
-        """Home, then select the mode of before again.
-
-        Args:
-            method: Homing method for 0x6098; None takes what is in the drive.
-        """
+        """Home by a method of 0x6098, or the drive's own, and select the mode of before again."""
         return self._run('home', partial(self._commands.home, method))
 
     def select_mode(self, mode: OperationMode | int) -> str:
-        """Switch the mode of operation; return when the drive shows it.
-
-        Args:
-            mode: The mode, or its number in 0x6060.
+        """Switch the mode of operation, by its number in 0x6060; return when the drive shows it.
 
         Raises:
             DriveError: It is no mode of CiA 402, or the drive refuses it.
@@ -127,11 +114,7 @@ class CanopenDrive:
         return self._request('shutdown')
 
     def set_target(self, target: float) -> str:
-        """Command a position, velocity or effort, by the mode; return when the drive has it.
-
-        Args:
-            target: In user units.
-        """
+        """Command a position, velocity or effort in user units; return when the drive has it."""
         return self._deliver(lambda: self._commands.set_target(target))
 
     def move_to(

@@ -144,10 +144,7 @@ class CanopenMaster:
         """Listen for another master, start the cycle, and wait until all devices are operational.
 
         Called again, it waits for devices that were missing or got lost; they are booted whenever
-        they come.
-
-        Args:
-            timeout: How long to wait in [s]; None for ten boot time-outs of the slowest device.
+        they come. The ``timeout`` is in [s], by default ten boot time-outs of the slowest device.
 
         Raises:
             OtherMasterError: Another master leads this bus.

@@ -24,21 +24,11 @@ class DeviceSdo:
     """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
-        """Take the device.
-
-        Args:
-            device: The device.
-            thread: The thread of its network.
-        """
         self._device = device
         self._thread = thread
 
     def read(self, target: int | str, subindex: int = 0) -> Value:
-        """Read an object.
-
-        Args:
-            target: Its index or name.
-            subindex: Sub-index, where an index is given.
+        """Read an object by its name, or by its index and sub-index.
 
         Raises:
             ObjectError: The EDS has no such object.
@@ -50,12 +40,7 @@ class DeviceSdo:
         return decode(entry.data_type, data)
 
     def write(self, target: int | str, value: Value, subindex: int = 0) -> None:
-        """Write an object; return when the device has it.
-
-        Args:
-            target: Its index or name.
-            value: The value, of the type of the object.
-            subindex: Sub-index, where an index is given.
+        """Write an object by its name, or index and sub-index; return when the device has it.
 
         Raises:
             ObjectError: The EDS has no such object.
@@ -81,12 +66,6 @@ class CanopenDevice:
     """
 
     def __init__(self, device: RemoteNode, thread: NetworkThread) -> None:
-        """Take the device.
-
-        Args:
-            device: The device.
-            thread: The thread of its network.
-        """
         self.name = device.name
         self.sdo = DeviceSdo(device, thread)
         self._device = device

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The network: boot-up, NMT, SDO queues, SYNC cycle, process image.
 
-The names here are for those who talk to devices without a network around them.
+Times are on the steady clock in [s]. The names here are for those who talk to devices without a
+network around them.
 """
 
 from .other_master import MasterFrames

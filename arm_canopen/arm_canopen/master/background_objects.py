@@ -20,23 +20,12 @@ DOUBLED_MAX = 5  # times
 
 
 class BackgroundReader:
-    """An object that no TPDO carries; it is polled by SDO.
-
-    Attributes:
-        value: The value, None while unknown.
-        timestamp: Steady time of its last answer in [s].
-        stale_after: Age in [s] from which the value is too old to act on.
-    """
+    """An object that no TPDO carries; it is polled by SDO."""
 
     def __init__(self, stale_after: float) -> None:
-        """Start unknown.
-
-        Args:
-            stale_after: See above.
-        """
-        self.value: Number | None = None
-        self.timestamp = 0.0
-        self.stale_after = stale_after
+        self.value: Number | None = None  # the value, None while unknown
+        self.timestamp = 0.0  # steady time of its last answer in [s]
+        self.stale_after = stale_after  # age in [s] from which the value is too old to act on
 
     @property
     def source(self) -> Source:
@@ -71,17 +60,12 @@ class WritableObjects(Protocol):
 
 
 class QueuedWrite(NamedTuple):
-    """A value that waits for its transfer.
+    """A value that waits for its transfer."""
 
-    Attributes:
-        value: The value.
-        written: Done when the device has it.
-        pause: Time in [s] in which no other one follows, so that a value that changes all the
-            time does not fill the bus.
-    """
-
-    value: Number
-    written: Promise[None]
+    value: Number  # the value
+    written: Promise[None]  # done when the device has it
+    # time in [s] in which no other one follows, so that a value that changes all the time does not
+    # fill the bus
     pause: float = 0.0
 
 

@@ -52,16 +52,6 @@ class BootProcess:
         *,
         request_state: Callable[[int], object],
     ) -> None:
-        """Take what is needed of the network.
-
-        Args:
-            node: The device.
-            bus: The bus that it belongs to.
-            scheduler: Time.
-            send_nmt: Sends an NMT command to a node id.
-            startup: Decides when a device may be started.
-            request_state: Requests the NMT state of a node id, as node guarding does.
-        """
         self._node = node
         self._scheduler = scheduler
         self._send_nmt = send_nmt
@@ -81,11 +71,9 @@ class BootProcess:
         self._restored = False
 
     async def run(self, *, announced: bool, pause: float = 0.0) -> None:
-        """Boot the device; returns when it is operational.
+        """Boot the device after ``pause`` in [s]; return when it is operational.
 
-        Args:
-            announced: A boot-up message came, so there is no need to look for the device.
-            pause: Time to wait before in [s].
+        One that has ``announced`` itself by its boot-up message need not be looked for.
         """
         self._startup.forget(self._node)
         if pause > 0.0:

@@ -31,16 +31,7 @@ class BootManager:
         send: Send,
         send_nmt: SendNmt,
     ) -> None:
-        """Listen to the devices; nothing is booted before :meth:`start`.
-
-        Args:
-            bus: The bus.
-            nodes: All devices.
-            scheduler: Time.
-            startup: Says when a device may be started.
-            send: Hands a frame to the bus.
-            send_nmt: Sends an NMT command to a node id.
-        """
+        """Listen to the devices; nothing is booted before :meth:`start`."""
         self._scheduler = scheduler
         self._tasks: dict[str, Task[None]] = {}
         self._processes: dict[str, BootProcess] = {}
@@ -57,13 +48,7 @@ class BootManager:
             node.on_dropped_out = partial(self._dropped_out, node)
 
     def start(self, node: RemoteNode, *, announced: bool = False, pause: float = 0.0) -> None:
-        """Boot a device, anew if a boot is on its way.
-
-        Args:
-            node: The device.
-            announced: A boot-up message came, so there is no need to look for the device.
-            pause: Time to wait before in [s].
-        """
+        """Boot a device, as of :meth:`BootProcess.run`; anew if a boot is on its way."""
         self._end(node)
         boot = self._processes[node.name].run(announced=announced, pause=pause)
         self._tasks[node.name] = self._scheduler.background(boot)

@@ -19,12 +19,7 @@ class BusSender:
     """Sends frames; a bus that refuses them is reported once, until it works again."""
 
     def __init__(self, send: Callable[[Frame], None], report: Report) -> None:
-        """Begin with a bus that works.
-
-        Args:
-            send: Hands a frame to the bus; may raise BusError.
-            report: Takes events.
-        """
+        """``send`` may raise BusError."""
         self._send = send
         self._report = report
         self._failed = False

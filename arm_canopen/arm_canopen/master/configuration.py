@@ -51,13 +51,7 @@ class Configurator:
         *,
         on_write: Callable[[str], None],
     ) -> None:
-        """Take what is needed.
-
-        Args:
-            node: The device.
-            bus: The bus that it belongs to.
-            on_write: Called with each object before it is written.
-        """
+        """``on_write`` is called with each object before it is written."""
         self._node = node
         self._bus = bus
         self._sdo_timeout = bus.master.boot_timeout

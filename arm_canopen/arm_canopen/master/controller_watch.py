@@ -34,27 +34,14 @@ _REPORTS: dict[ControllerState, tuple[Severity, str]] = {
 
 
 class ControllerWatch:
-    """Follows the error state of the controller, and reports changes.
-
-    Attributes:
-        state: Its state, error active until a frame shows another.
-        transmit_errors: Its transmit error counter, as far as it reports it.
-        receive_errors: Its receive error counter.
-        error_frames: Number of error frames.
-        last_error: The last one in words, empty before the first.
-    """
+    """Follows the error state of the controller, and reports changes."""
 
     def __init__(self, report: Report) -> None:
-        """Begin without errors.
-
-        Args:
-            report: Takes events.
-        """
-        self.state = ControllerState.ACTIVE
-        self.transmit_errors = 0
-        self.receive_errors = 0
-        self.error_frames = 0
-        self.last_error = ''
+        self.state = ControllerState.ACTIVE  # its state, error active until a frame shows another
+        self.transmit_errors = 0  # its transmit error counter, as far as it reports it
+        self.receive_errors = 0  # its receive error counter
+        self.error_frames = 0  # number of error frames
+        self.last_error = ''  # the last one in words, empty before the first
         self._report = report
         self._alone = False
 

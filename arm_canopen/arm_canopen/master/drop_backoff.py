@@ -10,14 +10,10 @@ STABLE_TIME = 10.0  # [s] in operation after which a drop is the first one again
 
 
 class DropBackoff:
-    """Doubles the pause with each drop that follows soon on the one before.
-
-    Attributes:
-        drops: Drops in a row.
-    """
+    """Doubles the pause with each drop that follows soon on the one before."""
 
     def __init__(self) -> None:
-        self.drops = 0
+        self.drops = 0  # drops in a row
         self._booted_at = 0.0
 
     def booted(self, now: float) -> None:

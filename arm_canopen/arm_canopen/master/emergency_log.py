@@ -24,20 +24,13 @@ class EmergencyLog:
 
     One that comes again and again, or many that alternate, are a flood: it is reported once in
     :data:`REPEAT_PERIOD`, with the number of its messages, until none has come for that long.
-
-    Attributes:
-        history: The last EMCYs, the newest at the end, with the steady time of each in [s]; of a
-            flood each one once.
-        last: Last one that was no reset, None when the device reported its end.
     """
 
     def __init__(self, report: Callable[[EventKind, Severity, str], None]) -> None:
-        """Begin without any.
-
-        Args:
-            report: Takes the events of the device.
-        """
+        # the last EMCYs, the newest at the end, with the steady time of each in [s]; of a flood
+        # each one once
         self.history: deque[tuple[float, Emergency]] = deque(maxlen=HISTORY)
+        # last one that was no reset, None when the device reported its end
         self.last: Emergency | None = None
         self._report = report
         self._came: dict[str, float] = {}

@@ -36,19 +36,12 @@ class EventKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened on the network.
+    """Something that happened on the network."""
 
-    Attributes:
-        kind: What happened.
-        severity: How much it matters.
-        node: Name of the device, empty when it concerns the bus.
-        text: The event in words.
-    """
-
-    kind: EventKind
-    severity: Severity
-    node: str
-    text: str
+    kind: EventKind  # what happened
+    severity: Severity  # how much it matters
+    node: str  # name of the device, empty when it concerns the bus
+    text: str  # the event in words
 
     def __str__(self) -> str:
         """Write it as a log line."""

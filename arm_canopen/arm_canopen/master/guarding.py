@@ -20,14 +20,7 @@ class Guarding:
     """Requests the state of one device, again and again, and counts the missing answers."""
 
     def __init__(self, node_id: int, guard_time: float, retry_factor: int, send: Send) -> None:
-        """Prepare; nothing is sent before :meth:`start`.
-
-        Args:
-            node_id: The device.
-            guard_time: Time between two questions in [s].
-            retry_factor: Questions without an answer after which it counts as lost.
-            send: Hands a frame to the bus.
-        """
+        """Nothing is sent before :meth:`start`; ``guard_time`` is in [s]."""
         self._request = guarding_request(node_id)
         self._guard_time = guard_time
         self._retry_factor = retry_factor
@@ -54,11 +47,7 @@ class Guarding:
         return True
 
     def advance(self, now: float) -> bool:
-        """Send a request when it is due; return whether the device counts as lost.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Send a request when it is due; return whether the device counts as lost."""
         if self._due is None or now < self._due:
             return False
         if self._unanswered >= self._retry_factor:

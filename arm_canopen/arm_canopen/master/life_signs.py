@@ -14,25 +14,15 @@ from .guarding import Guarding
 
 
 class LifeSigns:
-    """The error control of one device.
-
-    Attributes:
-        last: Steady time of the last heartbeat, or of the last answer, in [s].
-        silent: It was started and has never shown one, though it is supervised; it has to show one
-            before it is started again.
-        missed: How often in a row one was missing when it was due.
-    """
+    """The error control of one device."""
 
     def __init__(self, config: NodeConfig, send: Send) -> None:
-        """Prepare; nobody is supervised before :meth:`start`.
-
-        Args:
-            config: The device.
-            send: Hands a frame to the bus.
-        """
-        self.last = 0.0
+        """Nothing is supervised before :meth:`start`."""
+        self.last = 0.0  # steady time of the last heartbeat, or of the last answer, in [s]
+        # it was started and has never shown one, though it is supervised; it has to show one
+        # before it is started again
         self.silent = False
-        self.missed = 0
+        self.missed = 0  # how often in a row one was missing when it was due
         self._config = config
         self._since = self._awaited_from = 0.0
         self._timeout = math.inf
@@ -65,10 +55,7 @@ class LifeSigns:
     def take(self, state: NmtState, frame: Frame, *, supervised: bool) -> bool:
         """Take a sign; return whether it is a new one, by the toggle bit of node guarding.
 
-        Args:
-            state: The NMT state in it.
-            frame: The frame that carries it.
-            supervised: The device is online, so that its toggle bit means something.
+        The toggle bit counts for a supervised device only, which is online.
         """
         guarding = self._guarding if supervised and state is not NmtState.BOOT_UP else None
         if guarding is not None and not guarding.receive(frame.data):

@@ -55,23 +55,14 @@ class Verb(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """A transition that a client may request.
+    """A transition that a client may request."""
 
-    Attributes:
-        number: Its id in lifecycle_msgs/Transition.
-        verb: What it does.
-        start: The state in which it is possible.
-        through: The state while it runs.
-        success: The state after it.
-        failure: The state when it fails.
-    """
-
-    number: int
-    verb: Verb
-    start: LifecycleState
-    through: LifecycleState
-    success: LifecycleState
-    failure: LifecycleState
+    number: int  # its id in lifecycle_msgs/Transition
+    verb: Verb  # what it does
+    start: LifecycleState  # the state in which it is possible
+    through: LifecycleState  # the state while it runs
+    success: LifecycleState  # the state after it
+    failure: LifecycleState  # the state when it fails
 
 
 _S = LifecycleState
@@ -89,24 +80,14 @@ Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
 
 
 class Managed:
-    """One managed entity: its state, and the work of its transitions.
-
-    Attributes:
-        name: Its name, for messages.
-        state: Its state.
-        on_change: Called before and after a transition, with it, the state that was left, the one
-            that was entered, and whether the transition has ended.
-    """
+    """One managed entity: its state, and the work of its transitions."""
 
     def __init__(self, name: str, work: Work) -> None:
-        """Begin unconfigured.
-
-        Args:
-            name: Its name.
-            work: The coroutine of each transition; a CanopenError that it raises is its failure.
-        """
-        self.name = name
-        self.state = LifecycleState.UNCONFIGURED
+        """A CanopenError that ``work`` of a transition raises is its failure."""
+        self.name = name  # its name, for messages
+        self.state = LifecycleState.UNCONFIGURED  # its state
+        # called before and after a transition, with it, the state that was left, the one that was
+        # entered, and whether the transition has ended
         self.on_change: Callable[[Transition, LifecycleState, LifecycleState, bool], None] = (
             lambda transition, before, after, ended: None
         )

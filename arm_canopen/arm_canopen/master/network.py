@@ -42,24 +42,7 @@ CycleHook: TypeAlias = Callable[[float, float], None]
 
 
 class Network:
-    """Master of one bus: boots its devices, keeps watch over them and runs the SYNC cycle.
-
-    Attributes:
-        config: The bus.
-        nodes: Its devices by name.
-        scheduler: Time and coroutines of the network.
-        on_cycle: Called in each cycle before the RPDOs leave, with time and period in [s].
-        on_feedback: Called after each update, with the time of the SYNC in [s] whose TPDOs the
-            drives have taken.
-        next_update: When :meth:`update` is due in [s]; infinite when it is done in this cycle.
-        on_frame: Called with each received frame, for statistics.
-        on_node_lost: Called with a device that shows no sign of life any more; boots it again.
-        send: Sends a frame; a bus that refuses it is reported once until it works again.
-        missed_pdos: TPDOs that did not answer a SYNC, over all devices.
-        controller: The CAN controller as its error frames show it.
-        unknown_frames: Frames with an identifier that nobody on this bus should use.
-        state: NMT state of the master; only in Operational it sends SYNC and RPDOs.
-    """
+    """Master of one bus: boots its devices, keeps watch over them and runs the SYNC cycle."""
 
     def __init__(
         self,
@@ -70,29 +53,31 @@ class Network:
         *,
         beside_master: bool = False,
     ) -> None:
-        """Build the network; nothing is sent before :meth:`start`.
+        """Nothing is sent before :meth:`start`; ``send`` may raise BusError.
 
-        Args:
-            config: The bus.
-            send: Hands a frame to the bus; may raise BusError.
-            report: Takes events.
-            wall_clock: Time of day for TIME.
-            beside_master: Another master leads other devices on this bus, so that no NMT command
-                is for all nodes.
+        With ``beside_master`` another master leads other devices on this bus, so that no NMT
+        command is for all nodes.
         """
         master = config.master
-        self.config = config
-        self.scheduler = Scheduler()
+        self.config = config  # the bus
+        self.scheduler = Scheduler()  # time and coroutines of the network
         self.scheduler.on_defect = self._report_defect
+        # called in each cycle before the RPDOs leave, with time and period in [s]
         self.on_cycle: CycleHook = lambda now, period: None
+        # called after each update, with the time of the SYNC in [s] whose TPDOs the drives have
+        # taken
         self.on_feedback: Callable[[float], None] = lambda sync_time: None
+        # called with each received frame, for statistics
         self.on_frame: Callable[[Frame], None] = lambda frame: None
-        self.missed_pdos = 0
-        self.controller = ControllerWatch(report)
-        self.unknown_frames = 0
+        self.missed_pdos = 0  # TPDOs that did not answer a SYNC, over all devices
+        self.controller = ControllerWatch(report)  # the CAN controller as its error frames show it
+        self.unknown_frames = 0  # frames with an identifier that nobody on this bus should use
+        # sends a frame; a bus that refuses it is reported once until it works again
         self.send = BusSender(send, report).send
         self._report = report
+        # NMT state of the master; only in Operational it sends SYNC and RPDOs
         self.state = NmtState.OPERATIONAL if master.start else NmtState.PRE_OPERATIONAL
+        # when :meth:`update` is due in [s]; infinite when it is done in this cycle
         self.next_update = NEVER
         self._sync = SyncRound(self._round_complete, master.sync_window, master.sync_period)
         self._sync_time = 0.0
@@ -108,6 +93,7 @@ class Network:
         )
         self._broadcasts = not beside_master
         self._nmt = NmtSender(self.scheduler, self.send, master.nmt_inhibit_time, self._note_nmt)
+        # its devices by name
         self.nodes = {
             node.name: RemoteNode(node, self.scheduler, self._sync, self.send, report)
             for node in config.nodes
@@ -119,6 +105,7 @@ class Network:
         self._boots = BootManager(
             config, nodes, self.scheduler, self._startup, send=self.send, send_nmt=self.send_nmt
         )
+        # called with a device that shows no sign of life any more; boots it again
         self.on_node_lost: Callable[[RemoteNode], None] = self._boots.start
         self._unconfigured_clients: dict[int, SdoClient] = {}
         self._handlers: dict[int, Callable[[Frame], None]] = {}
@@ -173,12 +160,7 @@ class Network:
             self.send(Frame(CobId.SYNC, self._sync_counter.next()))
 
     def cycle(self, now: float, period: float) -> None:
-        """Begin the cycle whose SYNC has just been sent.
-
-        Args:
-            now: Steady time in [s].
-            period: Time to the next cycle in [s].
-        """
+        """Begin the cycle whose SYNC has just been sent."""
         if self._round_open:
             self._contain_each(self._count_missed)
         self._round_open = self._syncs
@@ -201,10 +183,6 @@ class Network:
         Due at :attr:`next_update`: when all TPDOs of the SYNC have come, or half a period after
         it without those that are missing. The heartbeat leaves from here, so that devices stop by
         themselves when nobody updates their set-points.
-
-        Args:
-            now: Steady time of the cycle in [s].
-            period: Time to the next cycle in [s].
         """
         self.next_update = NEVER
         updated = self._contain(partial(self.on_cycle, now, period))
@@ -235,11 +213,7 @@ class Network:
                 node.fail(error, output)
 
     def _contain(self, step: Callable[[], object]) -> bool:
-        """Let a step of the cycle that fails keep no other one from being done.
-
-        Returns:
-            Whether it has been done.
-        """
+        """Let a step of the cycle that fails keep no other one from being done."""
         try:
             step()
         except Exception as error:  # noqa: BLE001
@@ -362,13 +336,9 @@ class Network:
             self._note_nmt(*parsed)
 
     def note_pause(self, late: float, now: float) -> None:
-        """Say that a cycle came late, before its consequences show.
+        """Report that a cycle came so many [s] late, before its consequences show.
 
         On a busy computer once in a while, with what there was since.
-
-        Args:
-            late: How late in [s].
-            now: Steady time in [s].
         """
         watched = self.config.master.heartbeat_timeout
         if now - self._pause_reported < DEFECT_PERIOD and not 0 < watched < late:

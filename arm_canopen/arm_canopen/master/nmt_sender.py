@@ -36,13 +36,9 @@ class NmtSender:
         inhibit_time: float,
         on_sent: Callable[[NmtCommand, int], None],
     ) -> None:
-        """Begin with nothing sent.
+        """``inhibit_time`` is the shortest time between two commands in [s], 0 for none.
 
-        Args:
-            scheduler: Time.
-            send: Hands a frame to the bus.
-            inhibit_time: Shortest time between two commands in [s]; 0 for none.
-            on_sent: Called with each command and its node id when it leaves.
+        ``on_sent`` gets each command and its node id when it leaves.
         """
         self._scheduler = scheduler
         self._send = send

@@ -42,26 +42,17 @@ class Evidence(IntEnum):
 
 @dataclass(frozen=True, slots=True, order=True)
 class MasterFrame:
-    """A kind of frame that only the master of a bus sends.
+    """A kind of frame that only the master of a bus sends."""
 
-    Attributes:
-        evidence: How clearly it shows its sender.
-        text: What it is, in words.
-    """
-
-    evidence: Evidence
-    text: str
+    evidence: Evidence  # how clearly it shows its sender
+    text: str  # what it is, in words
 
 
 class MasterFrames:
     """Reads from frames of others what only the master of this bus would send."""
 
     def __init__(self, config: BusConfig | None) -> None:
-        """Note which frames are those of the master.
-
-        Args:
-            config: The bus; None where no file describes it.
-        """
+        """Note which frames are the master's, by ``config`` where a file describes the bus."""
         self._frames: dict[int, MasterFrame] = {}
         sync = MasterFrame(Evidence.SYNC, f'SYNC (0x{CobId.SYNC:03X})')
         if config is None:
@@ -96,13 +87,7 @@ class OtherMasterWatch:
     """Says once of each kind of frame that somebody else sends what only the master sends."""
 
     def __init__(self, config: BusConfig, report: Report, *, expected: bool) -> None:
-        """Begin without frames.
-
-        Args:
-            config: The bus.
-            report: Takes events.
-            expected: The other master is meant to be there.
-        """
+        """``expected``: the other master is meant to be there."""
         self._frames = MasterFrames(config)
         self._report = report
         self._severity = Severity.WARNING if expected else Severity.ERROR
@@ -123,12 +108,7 @@ class OtherMasterWatch:
 def listen(
     bus: Bus, config: BusConfig, clock: Callable[[], float] = time.monotonic
 ) -> Counter[MasterFrame]:
-    """Listen for another master, without a word.
-
-    Args:
-        bus: An open bus that nobody else reads.
-        config: What this master is about to do on it.
-        clock: The steady clock in [s].
+    """Listen for another master on a bus that nobody else reads, without a word.
 
     Returns:
         Its frames by kind, and how many of each; empty when there is none.

@@ -11,24 +11,14 @@ from .process_image import ReceivedTpdo
 
 
 class PdoWatch:
-    """Counts the TPDOs that do not come, and reports once when they have stopped.
-
-    Attributes:
-        missed: TPDOs that did not answer a SYNC.
-    """
+    """Counts the TPDOs that do not come, and reports once when they have stopped."""
 
     def __init__(
         self,
         inputs: Sequence[ReceivedTpdo],
         report: Callable[[EventKind, Severity, str], None],
     ) -> None:
-        """Begin with nothing awaited.
-
-        Args:
-            inputs: The TPDOs of the device.
-            report: Takes what is wrong with them.
-        """
-        self.missed = 0
+        self.missed = 0  # TPDOs that did not answer a SYNC
         self._report = report
         self._inputs = inputs
         self._every_sync = [entry for entry in inputs if entry.every_sync]

@@ -35,38 +35,21 @@ def limits_of(data_type: DataType) -> Limits:
 
 
 class SyncRound:
-    """Counts the TPDOs that answer one SYNC, over all devices.
-
-    Attributes:
-        pending: How many expected TPDOs have not yet come.
-        late: How many have come after the synchronous window was over.
-        complete: Called when the last one has come.
-        period: Time between two SYNCs in [s]; 0 where this master sends none.
-    """
+    """Counts the TPDOs that answer one SYNC, over all devices."""
 
     def __init__(
         self, complete: Callable[[], None], window: float = 0.0, period: float = 0.0
     ) -> None:
-        """Start before the first SYNC.
-
-        Args:
-            complete: Called when the last expected TPDO has come.
-            window: Time after SYNC in which they should come in [s] (0x1007); 0 for no limit.
-            period: Time between two SYNCs in [s]; 0 where this master sends none.
-        """
-        self.period = period
-        self.pending = 0
-        self.late = 0
-        self.complete = complete
+        """They should come within the ``window`` after SYNC in [s] (0x1007); 0 for no limit."""
+        self.period = period  # time between two SYNCs in [s]; 0 where this master sends none
+        self.pending = 0  # how many expected TPDOs have not yet come
+        self.late = 0  # how many have come after the synchronous window was over
+        self.complete = complete  # called when the last one has come
         self._window = window
         self._sync_time = 0.0
 
     def start(self, now: float) -> None:
-        """A SYNC is about to be sent; each :class:`ReceivedTpdo` returns whether it is expected.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """A SYNC is about to be sent; each :class:`ReceivedTpdo` adds itself if expected."""
         self.pending = 0
         self._sync_time = now
 
@@ -79,31 +62,22 @@ class SyncRound:
 
 
 class ReceivedTpdo:
-    """One TPDO of the device.
-
-    Attributes:
-        config: Its configuration.
-        codec: Its compiled mapping.
-        values: Last values in mapping order, None before the first.
-        timestamp: Steady time of arrival of the last in [s].
-        count: Number of PDOs received.
-        length_errors: Number of PDOs that were too short.
-        on_short: Called with this input and the length when one is too short.
-        awaited: It was expected after the last SYNC and has not come.
-        stale_after: Age in [s] from which its values are too old to act on; infinite for a TPDO
-            that has no time to come in, and may well be silent.
-    """
+    """One TPDO of the device."""
 
     def __init__(self, config: PdoConfig, sync: SyncRound) -> None:
-        self.config = config
-        self.codec = PdoCodec(config.mapping)
+        self.config = config  # its configuration
+        self.codec = PdoCodec(config.mapping)  # its compiled mapping
+        # last values in mapping order, None before the first
         self.values: tuple[Number, ...] | None = None
-        self.timestamp = 0.0
-        self.count = 0
-        self.length_errors = 0
+        self.timestamp = 0.0  # steady time of arrival of the last in [s]
+        self.count = 0  # number of PDOs received
+        self.length_errors = 0  # number of PDOs that were too short
         self.listener: Callable[[ReceivedTpdo], None] | None = None
+        # called with this input and the length when one is too short
         self.on_short: Callable[[ReceivedTpdo, int], None] = lambda entry, length: None
-        self.awaited = False
+        self.awaited = False  # it was expected after the last SYNC and has not come
+        # age in [s] from which its values are too old to act on; infinite for a TPDO that has no
+        # time to come in, and may well be silent
         self.stale_after = longest_silence(config, sync.period)
         self._sync = sync
         self._unpack = self.codec.unpack
@@ -161,25 +135,19 @@ class ReceivedTpdo:
 
 
 class SentRpdo:
-    """One RPDO of the device.
-
-    Attributes:
-        config: Its configuration.
-        codec: Its compiled mapping.
-        values: Next values in mapping order.
-        cyclic: It leaves in every cycle; otherwise when somebody published one of its objects.
-        due: It was published, and leaves with the next cycle.
-        kept_back_by: Axes that are commanded by SDO; while there are any, it does not leave.
-    """
+    """One RPDO of the device."""
 
     def __init__(self, config: PdoConfig, start: StartValue, *, cyclic: bool = True) -> None:
-        self.config = config
+        self.config = config  # its configuration
+        # it leaves in every cycle; otherwise when somebody published one of its objects
         self.cyclic = cyclic
-        self.due = False
+        self.due = False  # it was published, and leaves with the next cycle
+        # axes that are commanded by SDO; while there are any, it does not leave
         self.kept_back_by: set[object] = set()
         self._repeat_time = REPEAT_SHARE * (config.event_time or 0.0)
         self._left_at: float | None = None
-        self.codec = PdoCodec(config.mapping)
+        self.codec = PdoCodec(config.mapping)  # its compiled mapping
+        # next values in mapping order
         self.values: list[Number] = [start(mapped) for mapped in config.mapping]
         self._cob_id = config.cob_id
         self._pack = self.codec.pack
@@ -334,12 +302,7 @@ class OutputWriter:
 
 
 class ProcessImage:
-    """All PDOs of one device that are in use.
-
-    Attributes:
-        tpdos: Those that it sends.
-        rpdos: Those that it gets, in the order in which they are sent.
-    """
+    """All PDOs of one device that are in use."""
 
     def __init__(
         self,
@@ -362,10 +325,12 @@ class ProcessImage:
             send_last: Returns of an index whether RPDOs with that object leave after the others:
                 commands, which must not overtake their data.
         """
+        # those that it sends
         self.tpdos = [ReceivedTpdo(pdo, sync) for pdo in tpdos if pdo.enabled and pdo.mapping]
         used = [
             SentRpdo(pdo, start, cyclic=cyclic) for pdo in rpdos if pdo.enabled and pdo.mapping
         ]
+        # those that it gets, in the order in which they are sent
         self.rpdos = sorted(
             used, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
@@ -403,11 +368,6 @@ class ProcessImage:
         That is so where one RPDO alone carries the command, and each RPDO with the value is that
         one or a faster one: event-driven, and sent before it. Several synchronous RPDOs are
         applied at SYNC in an order that is the device's own affair.
-
-        Args:
-            index: Object with the value.
-            subindex: Its sub-index.
-            command: Object with the command, such as the controlword.
         """
         commands = [entry for entry, _ in self._mapped_outputs(command, 0)]
         if len(commands) != 1:

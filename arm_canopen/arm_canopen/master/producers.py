@@ -52,12 +52,7 @@ class HeartbeatProducer:
         self._send = send
 
     def advance(self, now: float, state: NmtState) -> None:
-        """Send it when it is due.
-
-        Args:
-            now: Steady time in [s].
-            state: NMT state of the master.
-        """
+        """Send it when it is due."""
         if self._periodic.is_due(now):
             self._send(Frame(self._can_id, bytes((state,))))
 
@@ -66,14 +61,7 @@ class TimeProducer:
     """TIME, the time of day for all devices (CiA 301, 7.2.6)."""
 
     def __init__(self, can_id: int, period: float, wall_clock: WallClock, send: Send) -> None:
-        """Take what is needed.
-
-        Args:
-            can_id: COB-ID of TIME.
-            period: Time between two of them in [s]; 0 for none.
-            wall_clock: Returns the time of day, with its zone.
-            send: Hands a frame to the bus.
-        """
+        """The ``period`` is in [s], 0 for none; ``wall_clock`` returns a time with its zone."""
         self._can_id = can_id
         self._periodic = Periodic(period)
         self._wall_clock = wall_clock

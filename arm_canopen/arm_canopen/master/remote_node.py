@@ -44,39 +44,7 @@ class BootPhase(Enum):
 
 
 class RemoteNode:
-    """One device on the bus.
-
-    Attributes:
-        config: Its configuration, from bus.yml and its EDS.
-        name: Name in bus.yml.
-        objects: Its objects, by PDO and SDO.
-        image: Its process image.
-        sdo: Its SDO client.
-        online: Booted, and not lost since.
-        nmt_state: NMT state as received, None before the first heartbeat or boot-up and after a
-            loss; of a device without heartbeat and guarding the commanded one.
-        phase: How far it has booted.
-        phase_detail: What it is doing in that phase, or why it failed.
-        left_operational: Online, but somebody stopped it or sent it to pre-operational.
-        wanted: NMT state that was commanded last, by whomever on this bus; None when unknown.
-        taken_over: It was in operation already when it came online, and has not been disturbed
-            since.
-        watch_slot: Entry of its 0x1016 by which it watches the master, 0 for none.
-        loss: Why it was lost last, empty while it is online.
-        life: Its heartbeat, or its answers to node guarding.
-        emergencies: Its EMCYs.
-        pdos: Whether its TPDOs come.
-        send_nmt: Sends it an NMT command.
-        on_boot_up: Called when it has restarted.
-        on_lost: Its drivers, which stop; each gets the reason.
-        on_gone: Called when it was lost by itself; what an NMT command does to it is no loss.
-        lead_to_rest: Its drivers, which bring what moves to rest and take its power away, for a
-            reason; each returns when that has ended, well or not.
-        on_failed: Its drivers, which stop because a step of the cycle failed for this device; each
-            gets the error, and the RPDO that cannot be sent for it, if it is one.
-        on_dropped_out: Called when it has to be booted again, though it did not restart, with the
-            time to leave it alone before in [s].
-    """
+    """One device on the bus."""
 
     def __init__(
         self,
@@ -86,45 +54,51 @@ class RemoteNode:
         send: Send,
         report: Report,
     ) -> None:
-        """Build the device from its configuration.
-
-        Args:
-            config: Its configuration, from bus.yml and its EDS.
-            scheduler: Time.
-            sync: The SYNC round of the bus.
-            send: Hands a frame to the bus.
-            report: Takes events.
-        """
-        self.config = config
-        self.name = config.name
-        self.online = False
+        self.config = config  # its configuration, from bus.yml and its EDS
+        self.name = config.name  # name in bus.yml
+        self.online = False  # booted, and not lost since
         self._scheduler = scheduler
         self._report = report
+        # its objects, by PDO and SDO
         self.objects = RemoteObjects(
             config, scheduler, sync, send, report=self.report, is_online=lambda: self.online
         )
-        self.image = self.objects.image
-        self.sdo = self.objects.sdo
+        self.image = self.objects.image  # its process image
+        self.sdo = self.objects.sdo  # its SDO client
+        # NMT state as received, None before the first heartbeat or boot-up and after a loss; of a
+        # device without heartbeat and guarding the commanded one
         self.nmt_state: NmtState | None = None
-        self.phase = BootPhase.WAITING
-        self.phase_detail = ''
+        self.phase = BootPhase.WAITING  # how far it has booted
+        self.phase_detail = ''  # what it is doing in that phase, or why it failed
+        # online, but somebody stopped it or sent it to pre-operational
         self.left_operational = False
+        # NMT state that was commanded last, by whomever on this bus; None when unknown
         self.wanted: NmtState | None = None
+        # it was in operation already when it came online, and has not been disturbed since
         self.taken_over = False
-        self.watch_slot = 0
-        self.loss = ''
-        self.life = LifeSigns(config, send)
-        self.emergencies = EmergencyLog(self.report)
-        self.pdos = PdoWatch(self.image.tpdos, self.report)
+        self.watch_slot = 0  # entry of its 0x1016 by which it watches the master, 0 for none
+        self.loss = ''  # why it was lost last, empty while it is online
+        self.life = LifeSigns(config, send)  # its heartbeat, or its answers to node guarding
+        self.emergencies = EmergencyLog(self.report)  # its EMCYs
+        self.pdos = PdoWatch(self.image.tpdos, self.report)  # whether its TPDOs come
+        # sends it an NMT command
         self.send_nmt: Callable[[NmtCommand], object] = lambda command: None
-        self.on_boot_up: Callable[[], None] = lambda: None
+        self.on_boot_up: Callable[[], None] = lambda: None  # called when it has restarted
+        # its drivers, which stop; each gets the reason
         self.on_lost: list[Callable[[str], None]] = []
+        # called when it was lost by itself; what an NMT command does to it is no loss
         self.on_gone: Callable[[], None] = lambda: None
+        # its drivers, which bring what moves to rest and take its power away, for a reason; each
+        # returns when that has ended, well or not
         self.lead_to_rest: list[Callable[[str], Coroutine[Promise[Any], None, None]]] = []
         self._missing = ''  # the life sign, in words
         self._resting: Promise[list[None]] | None = None
+        # its drivers, which stop because a step of the cycle failed for this device; each gets the
+        # error, and the RPDO that cannot be sent for it, if it is one
         self.on_failed: list[Callable[[Exception, SentRpdo | None], None]] = []
         self._failed = False
+        # called when it has to be booted again, though it did not restart, with the time to leave
+        # it alone before in [s]
         self.on_dropped_out: Callable[[float], None] = lambda pause: None
         self._backoff = DropBackoff()
         self._commanded: NmtCommand | None = None
@@ -190,11 +164,9 @@ class RemoteNode:
             self._nmt_state_changed(self.wanted)
 
     def go_online(self, now: float, *, taken_over: bool = False) -> None:
-        """The device is booted: talk to it, and watch its life signs when it is configured.
+        """The device is booted: talk to it, and await its first life sign from ``now`` on.
 
-        Args:
-            now: Steady time in [s], from which the first life sign is awaited.
-            taken_over: It was in operation already, and was not disturbed.
+        One that is ``taken_over`` was in operation already, and was not disturbed.
         """
         self.taken_over = taken_over
         self.image.clear()  # what it sent before it was configured is no longer true
@@ -207,11 +179,7 @@ class RemoteNode:
             self.pdos.warn_of_losses()
 
     def watch(self, now: float) -> bool:
-        """Look for life signs and PDOs that are overdue; return whether the device was lost now.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Look for life signs and PDOs that are overdue; return whether it was lost now."""
         self.emergencies.look(now)
         missing = self.life.overdue(now)
         if missing:
@@ -252,11 +220,9 @@ class RemoteNode:
         return self._scheduler.spawn(self._scheduler.gather(ends))
 
     def fail(self, error: Exception, output: SentRpdo | None = None) -> None:
-        """Stop its drivers, because a step of the cycle failed; other devices go on.
+        """Stop its drivers, because a step of the cycle failed, or ``output`` cannot be sent.
 
-        Args:
-            error: Why.
-            output: The RPDO that cannot be sent, if that is what failed.
+        Other devices go on.
         """
         for driver_fails in self.on_failed:
             driver_fails(error, output)

@@ -27,15 +27,7 @@ ReportOfDevice = Callable[[EventKind, Severity, str], None]
 
 
 class RemoteObjects:
-    """A device as a set of objects.
-
-    Attributes:
-        config: Its configuration, from bus.yml and its EDS.
-        name: Name in bus.yml.
-        image: Its process image.
-        sdo: Its SDO client.
-        report: Takes what goes wrong with an object.
-    """
+    """A device as a set of objects."""
 
     def __init__(
         self,
@@ -47,18 +39,9 @@ class RemoteObjects:
         report: ReportOfDevice,
         is_online: Callable[[], bool],
     ) -> None:
-        """Build the objects from the configuration of the device.
-
-        Args:
-            config: Its configuration, from bus.yml and its EDS.
-            scheduler: Time.
-            sync: The SYNC round of the bus.
-            send: Hands a frame to the bus.
-            report: Takes what goes wrong with an object.
-            is_online: Returns whether the device was booted, and not lost since.
-        """
-        self.config = config
-        self.name = config.name
+        self.config = config  # its configuration, from bus.yml and its EDS
+        self.name = config.name  # name in bus.yml
+        # its process image
         self.image = ProcessImage(
             config.tpdos,
             config.rpdos,
@@ -67,6 +50,7 @@ class RemoteObjects:
             cyclic=config.is_drive,
             send_last=is_controlword,
         )
+        # its SDO client
         self.sdo = SdoClient(
             config.node_id,
             config.name,
@@ -76,7 +60,7 @@ class RemoteObjects:
             on_odd=partial(report, EventKind.SDO, Severity.WARNING),
         )
         self.sdo.on_download.append(self._object_downloaded)
-        self.report = report
+        self.report = report  # takes what goes wrong with an object
         self._is_online = is_online
         self._scheduler = scheduler
         self._polled: dict[tuple[int, int], BackgroundReader] = {}
@@ -169,10 +153,7 @@ class RemoteObjects:
     ) -> Value:
         """Read an object by SDO and decode it by its type in the EDS.
 
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            timeout: How long each answer may take in [s]; by default that of bus.yml.
+        Each answer may take the ``timeout`` in [s], by default that of bus.yml.
 
         Raises:
             SdoError: The device did not answer or aborted, or the object is not in the EDS.
@@ -187,11 +168,7 @@ class RemoteObjects:
     ) -> Promise[None]:
         """Write an object by SDO, encoded by its type in the EDS; errors reject the promise.
 
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            value: The value.
-            urgent: It does not wait for other SDOs, as of :meth:`SdoClient.write`.
+        An urgent one does not wait for other SDOs, as of :meth:`SdoClient.write`.
         """
         try:
             data = encode(self.entry(index, subindex).data_type, value)
@@ -229,10 +206,7 @@ class RemoteObjects:
         end.when_done(set_back)
 
     async def upload(self, path: str) -> tuple[ObjectEntry, bytes]:
-        """Read an object by what a person calls it.
-
-        Args:
-            path: Its name or number, see :func:`.find_object`.
+        """Read an object by its name or number, see :func:`.find_object`.
 
         Raises:
             ObjectError: The EDS has no such object.
@@ -245,11 +219,9 @@ class RemoteObjects:
     async def download(
         self, path: str, to_bytes: Callable[[ObjectEntry], bytes]
     ) -> tuple[ObjectEntry, bytes]:
-        """Write an object by what a person calls it.
+        """Write an object by its name or number.
 
-        Args:
-            path: Its name or number, see :func:`.find_object`.
-            to_bytes: Gives the value as the object wants it.
+        ``to_bytes`` encodes the value for its entry.
 
         Raises:
             ObjectError: The EDS has no such object.

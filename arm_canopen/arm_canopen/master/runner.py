@@ -35,42 +35,28 @@ class NetworkThread:
     """Owns the cycle, and all reading and writing of the bus.
 
     Other threads hand work to it with ``call`` and ``run`` and get a future; nothing is locked.
-
-    Attributes:
-        network: The network that it runs.
-        period: Length of the cycle in [s].
-        failure: Defect that has ended it; None while it runs, and after a wanted end.
-        on_defect: Called in the thread, for what can still be done; returns what was, in words.
-        on_failure: Called in the thread when there is one.
     """
 
     def __init__(self, bus: Bus, network: Network) -> None:
-        """Prepare; the thread starts with :meth:`start`.
-
-        Args:
-            bus: An open bus; it stays the caller's to close.
-            network: The network whose frames go over it.
-        """
-        self.network = network
-        self.period = network.config.master.cycle_period
+        """The bus is open, and stays the caller's to close."""
+        self.network = network  # the network that it runs
+        self.period = network.config.master.cycle_period  # length of the cycle in [s]
+        # defect that has ended it; None while it runs, and after a wanted end
         self.failure: BusError | None = None
+        # called in the thread, for what can still be done; returns what was, in words
         self.on_defect: Callable[[], str] = lambda: ''
         self.on_failure: Callable[[], None] = lambda: None
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
         self._thread = BusThread(bus, 'canopen', self._serve, OWNER)
-        self._thread.on_failure = self._fail
+        self._thread.on_failure = self._fail  # called in the thread when there is one
 
     def refuse_before_start(self, reason: str) -> None:
         """Refuse what is handed over before the start, with a BusError of this text."""
         self._thread.refuse_before_start(reason)
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
-        """Start the network and its cycle.
-
-        Args:
-            begin: Called first in the thread, which may want a priority.
-        """
+        """Call ``begin`` in the thread, which may want a priority, and start the cycle."""
         self._thread.start(begin)
 
     def stop(self) -> None:
@@ -82,11 +68,7 @@ class NetworkThread:
         return self._thread.call(function)
 
     def run(self, sequence: Callable[[], Promise[T]]) -> Future[T]:
-        """Start something that ends later; the future gets its result.
-
-        Args:
-            sequence: Called in the thread of the cycle; returns the promise.
-        """
+        """Call ``sequence`` in the thread of the cycle; the future gets what its promise gets."""
 
         def begin(future: Future[T]) -> None:
             def finish(promise: Promise[T]) -> None:

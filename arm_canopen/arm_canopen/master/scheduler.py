@@ -97,16 +97,12 @@ def completed() -> Promise[None]:
 
 
 class Task(Promise[T]):
-    """A running coroutine; its result is what the coroutine returns.
-
-    Attributes:
-        cancelled: It was ended from outside.
-    """
+    """A running coroutine; its result is what the coroutine returns."""
 
     def __init__(self, coroutine: Coroutine[Promise[Any], None, T]) -> None:
         """Run up to the first wait."""
         super().__init__()
-        self.cancelled = False
+        self.cancelled = False  # it was ended from outside
         self._coroutine = coroutine
         self._stepping = False
         self._step(None)
@@ -143,15 +139,11 @@ class Task(Promise[T]):
 
 
 class Scheduler:
-    """Timers and conditions for coroutines.
-
-    Attributes:
-        now: Steady time of the last ``advance`` in [s].
-        on_defect: Called with the error of a coroutine that nobody awaits.
-    """
+    """Timers and conditions for coroutines."""
 
     def __init__(self, now: float = 0.0) -> None:
-        self.now = now
+        self.now = now  # steady time of the last ``advance`` in [s]
+        # called with the error of a coroutine that nobody awaits
         self.on_defect: Callable[[BaseException], None] = lambda error: None
         self._timers: list[tuple[float, int, Promise[None]]] = []
         self._order = count()

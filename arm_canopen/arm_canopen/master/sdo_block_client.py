@@ -77,10 +77,8 @@ async def write_blocks(
 async def read_blocks(channel: SdoChannel, timeout: float, size_max: int) -> bytes:
     """Read the object of the transfer that has begun.
 
-    Args:
-        channel: The way to the device.
-        timeout: Longest time for each frame of the device in [s].
-        size_max: A longer value is refused, in [byte].
+    Each frame of the device may take the ``timeout`` in [s]; more than ``size_max`` in [byte] is
+    refused.
 
     Raises:
         SdoAbortError: The device refused, or answered something that makes no sense.

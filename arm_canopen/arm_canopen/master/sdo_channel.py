@@ -60,10 +60,6 @@ class SdoChannel:
     An answer carries its object, and not the request that it belongs to. So answers that are
     outstanding are remembered: before their object is read again, another one is read, and
     since a server answers in order, what comes after that is new.
-
-    Attributes:
-        counters: What became of the transfers.
-        address: The object of the present transfer.
     """
 
     def __init__(
@@ -74,17 +70,9 @@ class SdoChannel:
         send: Send,
         on_odd: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """Take the way to the bus.
-
-        Args:
-            node_id: The device.
-            name: Its name, for messages.
-            scheduler: Time.
-            send: Hands a frame to the bus.
-            on_odd: Takes what is odd about the device, once each.
-        """
-        self.counters = SdoCounters()
-        self.address: Address = (0, 0)
+        """``on_odd`` takes what is odd about the device, once each."""
+        self.counters = SdoCounters()  # what became of the transfers
+        self.address: Address = (0, 0)  # the object of the present transfer
         self._on_odd = on_odd
         self._odd: set[str] = set()
         self._title = f'{name} (node {node_id})'
@@ -104,11 +92,8 @@ class SdoChannel:
     ) -> None:
         """Begin a transfer; makes sure that no answer of an earlier one is taken for its own.
 
-        Args:
-            index: Object index.
-            subindex: Sub-index.
-            timeout: Longest time to wait for the outstanding answers in [s].
-            settle: Do wait for them; otherwise one to the same question counts.
+        To ``settle`` it waits at most ``timeout`` in [s] for outstanding answers; else one to the
+        same question counts.
 
         Raises:
             SdoTimeoutError: The device does not answer at all.
@@ -190,13 +175,10 @@ class SdoChannel:
     async def exchange(
         self, question: bytes | None, match: Match[T], timeout: float, *, repeat: bool = False
     ) -> T:
-        """Send a request, and wait for the answer.
+        """Send a request, and wait at most ``timeout`` in [s] for the answer that ``match`` reads.
 
-        Args:
-            question: The frame; None only waits for the next answer.
-            match: Reads an answer; None when the frame is none to this question.
-            timeout: Longest time to wait in [s].
-            repeat: The request may be sent twice; it is when no answer comes.
+        Without a question it only waits. ``match`` returns None for what answers something else.
+        To ``repeat`` a request is sent twice when no answer comes.
 
         Raises:
             SdoAbortError: The device refused.

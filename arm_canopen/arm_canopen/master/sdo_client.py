@@ -48,13 +48,7 @@ class _Queued(NamedTuple):
 
 
 class SdoClient:
-    """Reads and writes objects of one device.
-
-    Attributes:
-        node_id: The device.
-        on_download: Called when the request of a download leaves, with index, sub-index, data and
-            the promise of its end.
-    """
+    """Reads and writes objects of one device."""
 
     def __init__(
         self,
@@ -66,17 +60,13 @@ class SdoClient:
         dictionary: ObjectDictionary | None = None,
         on_odd: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """Take the way to the bus; further arguments as of :class:`SdoChannel`.
+        """Without a dictionary an answer has as many bytes as came.
 
-        Args:
-            node_id: The device.
-            name: Its name, for messages.
-            scheduler: Time.
-            send: Hands a frame to the bus.
-            dictionary: Types of its objects; without it an answer has as many bytes as came.
-            on_odd: Takes what is odd about the device, once each.
+        Other arguments are as of :class:`SdoChannel`.
         """
-        self.node_id = node_id
+        self.node_id = node_id  # the device
+        # called when the request of a download leaves, with index, sub-index, data and the promise
+        # of its end
         self.on_download: list[DownloadHook] = []
         self._name = name
         self._scheduler = scheduler

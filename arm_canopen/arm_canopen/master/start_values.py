@@ -15,10 +15,6 @@ def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
     An object that nobody commands (a torque limit, a profile velocity, digital outputs) must keep
     what bus.yml wrote or else what its EDS has as default.
 
-    Args:
-        config: The device.
-        mapped: The object in one of its RPDOs.
-
     Returns:
         The value; 0 when neither has one that fits the object.
     """

@@ -19,9 +19,6 @@ class Startup:
     """Holds configured devices back until all mandatory ones are configured.
 
     Without a mandatory device each one is started as soon as it is ready.
-
-    Attributes:
-        complete: All mandatory devices were configured, so nobody is held back any more.
     """
 
     def __init__(
@@ -32,21 +29,13 @@ class Startup:
         send_nmt: SendNmt,
         report: Report,
     ) -> None:
-        """Begin with nobody configured.
-
-        Args:
-            config: The master.
-            nodes: All devices.
-            scheduler: Time.
-            send_nmt: Sends an NMT command to a node id.
-            report: Takes events.
-        """
         self._config = config
         self._nodes = list(nodes)
         self._scheduler = scheduler
         self._send_nmt = send_nmt
         self._report = report
         self._waiting: dict[RemoteNode, Promise[bool]] = {}
+        # all mandatory devices were configured, so nobody is held back any more
         self.complete = not self._missing()
         for node in nodes:
             if node.config.mandatory:

@@ -12,47 +12,28 @@ WINDOW = 2000  # cycles that the percentiles look back
 
 @dataclass(frozen=True, slots=True)
 class CycleFigures:
-    """What the cycle did; jitter over the last window, counts since the start.
+    """What the cycle did; jitter over the last window, counts since the start."""
 
-    Attributes:
-        period: Nominal period in [s].
-        cycles: Number of cycles.
-        overruns: Cycles that were left out because the one before ended too late.
-        jitter_p50: Median lateness of SYNC, when it has been handed to the bus, in [s].
-        jitter_p99: 99th percentile of the lateness in [s].
-        jitter_max: Largest lateness in [s].
-    """
-
-    period: float
-    cycles: int
-    overruns: int
-    jitter_p50: float
-    jitter_p99: float
-    jitter_max: float
+    period: float  # nominal period in [s]
+    cycles: int  # number of cycles
+    overruns: int  # cycles that were left out because the one before ended too late
+    jitter_p50: float  # median lateness of SYNC, when it has been handed to the bus, in [s]
+    jitter_p99: float  # 99th percentile of the lateness in [s]
+    jitter_max: float  # largest lateness in [s]
 
 
 class CycleStatistics:
     """Collects the lateness of each cycle against its deadline."""
 
     def __init__(self, period: float, window: int = WINDOW) -> None:
-        """Start empty.
-
-        Args:
-            period: Nominal period in [s].
-            window: How many cycles the percentiles look back.
-        """
+        """The ``period`` is in [s]; the percentiles look back ``window`` cycles."""
         self._period = period
         self._late: deque[float] = deque(maxlen=window)
         self._cycles = 0
         self._overruns = 0
 
     def record(self, late: float, skipped: int) -> None:
-        """Add a cycle.
-
-        Args:
-            late: Time when SYNC was sent minus deadline in [s].
-            skipped: Deadlines that had passed as a whole and were left out.
-        """
+        """Add a cycle: SYNC minus deadline in [s], and how many deadlines had passed."""
         self._late.append(late)
         self._cycles += 1
         self._overruns += skipped

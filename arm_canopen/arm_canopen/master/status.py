@@ -14,43 +14,24 @@ from .sdo_channel import SdoCounters
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
-    """How a device was at one moment.
+    """How a device was at one moment."""
 
-    Attributes:
-        name: Name in bus.yml.
-        node_id: CANopen node id.
-        online: Booted, and not lost since.
-        nmt_state: NMT state as received, None before the first.
-        phase: How far it has booted.
-        phase_detail: What it is doing in that phase, or why it failed.
-        heartbeat_age: Time since the last heartbeat in [s]; None when there was none or none is
-            supervised.
-        emergency: Last EMCY that the device did not take back.
-        emergencies: The last EMCYs with their age, the newest first, in words.
-        missed_pdos: TPDOs that did not answer a SYNC.
-        sdo: What became of the SDO transfers.
-    """
-
-    name: str
-    node_id: int
-    online: bool
-    nmt_state: NmtState | None
-    phase: BootPhase
-    phase_detail: str
+    name: str  # name in bus.yml
+    node_id: int  # CANopen node id
+    online: bool  # booted, and not lost since
+    nmt_state: NmtState | None  # NMT state as received, None before the first
+    phase: BootPhase  # how far it has booted
+    phase_detail: str  # what it is doing in that phase, or why it failed
+    # time since the last heartbeat in [s]; None when there was none or none is supervised
     heartbeat_age: float | None
-    emergency: Emergency | None
-    emergencies: tuple[str, ...]
-    missed_pdos: int
-    sdo: SdoCounters
+    emergency: Emergency | None  # last EMCY that the device did not take back
+    emergencies: tuple[str, ...]  # the last EMCYs with their age, the newest first, in words
+    missed_pdos: int  # TPDOs that did not answer a SYNC
+    sdo: SdoCounters  # what became of the SDO transfers
 
 
 def node_status(node: RemoteNode, now: float) -> NodeStatus:
-    """Take a snapshot of a device.
-
-    Args:
-        node: The device.
-        now: Steady time in [s].
-    """
+    """Take a snapshot of a device."""
     seen = node.config.heartbeat_timeout > 0 and node.life.last > 0
     return NodeStatus(
         name=node.name,

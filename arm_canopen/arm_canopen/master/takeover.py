@@ -50,10 +50,6 @@ async def read_outputs(node: RemoteNode, timeout: float) -> None:
     may be one that must not be sent mode 0, and for the position targets: they are where the drive
     is, before any TPDO shows it. What cannot be read is taken from bus.yml or the EDS.
 
-    Args:
-        node: The device.
-        timeout: How long each SDO answer may take in [s].
-
     Raises:
         SdoError: The device does not answer.
     """

@@ -47,14 +47,7 @@ class AxisServices:
         place: str,
         thread: NetworkThread,
     ) -> None:
-        """Offer everything.
-
-        Args:
-            node: The node of the device.
-            commands: Commands of the axis.
-            place: What the names begin with.
-            thread: The thread of the network.
-        """
+        """``place`` is what the names begin with."""
         self._node = node
         self._commands = commands
         self._place = place

@@ -39,33 +39,20 @@ NMT_SERVICES: dict[str, NmtCommand] = {
 
 
 class DeviceNode(Node):
-    """Services and topics of one device.
-
-    Attributes:
-        device: The device.
-        output: The thread that publishes and answers.
-        topics: What it publishes.
-        admit: Called before every request; raises CanopenError when none is taken at the moment.
-    """
+    """Services and topics of one device."""
 
     @destroyed_when_refused
     def __init__(self, device: RemoteNode, thread: NetworkThread, output: OutputThread) -> None:
-        """Offer the services.
-
-        Args:
-            device: The device.
-            thread: The thread of its network.
-            output: The thread that publishes and answers.
-        """
         config = device.config
         super().__init__(config.name, **node_options(config))
-        self.device = device
-        self.output = output
+        self.device = device  # the device
+        self.output = output  # the thread that publishes and answers
         self._thread = thread
+        # called before every request; raises CanopenError when none is taken at the moment
         self.admit: Callable[[], None] = lambda: None
         fixed = ParameterDescriptor(description='CANopen node id', read_only=True)
         self.declare_parameter('node_id', config.node_id, fixed, ignore_override=True)
-        self.topics = DeviceTopics(self, device, output)
+        self.topics = DeviceTopics(self, device, output)  # what it publishes
         self.create_subscription(COData, '~/tpdo', self._write_pdo, 10)
         for name, command in NMT_SERVICES.items():
             self._offer_nmt(name, command)
@@ -82,11 +69,8 @@ class DeviceNode(Node):
     ) -> None:
         """Offer a service of this node whose outcome is a future.
 
-        Args:
-            service_type: Its type.
-            name: Its name.
-            handler: Called with each request that is admitted.
-            respond: Fills the response in, and returns it.
+        ``handler`` is called with each request that is admitted; ``respond`` fills the response
+        in, and returns it.
         """
 
         def admitted(request: Any) -> Future[Any]:  # noqa: ANN401

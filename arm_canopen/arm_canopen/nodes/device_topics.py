@@ -44,13 +44,6 @@ class DeviceTopics:
     """``~/nmt_state`` and ``~/rpdo`` of a device."""
 
     def __init__(self, node: Node, device: RemoteNode, output: OutputThread) -> None:
-        """Make the publishers.
-
-        Args:
-            node: The node of the device.
-            device: The device.
-            output: The thread that publishes.
-        """
         self._device = device
         self._output = output
         self._nmt_state = node.create_publisher(String, '~/nmt_state', LATCHED)

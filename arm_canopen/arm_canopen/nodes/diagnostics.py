@@ -4,101 +4,78 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
 
 from ..can.bus import BusCounters
 from ..can.error_frames import ControllerState
 from ..can.load import LoadFigures
 from ..cia402.status import DriveStatus
+from ..master.controller_watch import ControllerWatch
 from ..master.network import Network
 from ..master.statistics import CycleFigures
-from ..master.status import NodeStatus
+from ..master.status import node_status, NodeStatus
 from ..standard.drive import DriveState
+from .output_thread import OutputThread
 
 HIGH_LOAD = 0.7  # share of the bus time above which low-priority frames begin to wait long
 
 
-@dataclass(frozen=True, slots=True)
-class BusStatus:
-    """How the bus was at one moment.
+class DiagnosticsPublisher:
+    """``diagnostics`` of a bus, published by the output thread."""
 
-    Attributes:
-        name: Name of the CAN interface.
-        counters: Frames so far.
-        load: Frames per second and load.
-        cycle: Figures of the SYNC cycle.
-        missed_pdos: TPDOs that did not answer a SYNC, over all devices.
-        late_pdos: TPDOs that came after the synchronous window.
-        unknown_frames: Frames with an identifier that nobody on this bus should use.
-        controller: State of the CAN controller.
-        transmit_errors: Its transmit error counter.
-        receive_errors: Its receive error counter.
-        error_frames: Number of its error frames.
-        last_error: The last of them in words.
-        recording: Last file of the black box; empty before one.
-    """
+    def __init__(self, node: Node, output: OutputThread) -> None:
+        self._node = node
+        self._output = output
+        self._publisher = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
 
-    name: str
-    counters: BusCounters
-    load: LoadFigures
-    cycle: CycleFigures
-    missed_pdos: int
-    late_pdos: int = 0
-    unknown_frames: int = 0
-    controller: ControllerState = ControllerState.ACTIVE
-    transmit_errors: int = 0
-    receive_errors: int = 0
-    error_frames: int = 0
-    last_error: str = ''
-    recording: str = ''
+    def post(self, statuses: list[DiagnosticStatus]) -> None:
+        """Publish them soon; of those that wait only the newest."""
+        self._output.post_stream('diagnostics', partial(self._publish, statuses))
+
+    def _publish(self, statuses: list[DiagnosticStatus]) -> None:
+        message = DiagnosticArray(status=statuses)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
 
 
-def bus_status(
-    name: str,
+def bus_diagnostics(
+    master: str,
+    bus: str,
+    network: Network,
+    drives: Mapping[str, Sequence[DriveStatus]],
+    now: float,
+    *,
     counters: BusCounters,
     load: LoadFigures,
     cycle: CycleFigures,
-    *,
-    network: Network,
-    recording: str,
-) -> BusStatus:
-    """Take a snapshot of a bus.
+    recording: Callable[[str], str],
+) -> list[DiagnosticStatus]:
+    """Describe a bus with its cycle, each device that is no drive, and each axis of the others.
 
-    Args:
-        name: Name of the CAN interface.
-        counters: Frames so far.
-        load: Frames per second and load.
-        cycle: Figures of the SYNC cycle.
-        network: Its devices.
-        recording: Last file of the black box; empty before one.
+    ``recording`` returns the last file of the black box with a fault of a device, of any for an
+    empty name; empty before one.
     """
-    controller = network.controller
-    return BusStatus(
-        name,
-        counters,
-        load,
-        cycle,
-        network.missed_pdos,
-        network.late_pdos,
-        network.unknown_frames,
-        controller.state,
-        controller.transmit_errors,
-        controller.receive_errors,
-        controller.error_frames,
-        controller.last_error,
-        recording,
+    about_bus = bus_diagnostic(
+        master, bus, network, counters=counters, load=load, cycle=cycle, recording=recording('')
     )
+    statuses = [about_bus]
+    for device in network.nodes.values():
+        file = recording(device.name)
+        if device.name in drives:
+            statuses += [drive_diagnostic(bus, axis, file) for axis in drives[device.name]]
+        else:
+            statuses.append(device_diagnostic(bus, node_status(device, now), file))
+    return statuses
 
 
 def device_diagnostic(bus: str, status: NodeStatus, recording: str = '') -> DiagnosticStatus:
     """Describe a device that is no drive.
 
-    Args:
-        bus: Name of the CAN interface.
-        status: The device.
-        recording: Last file of the black box with a fault of it; empty before one.
+    ``recording`` is the last file of the black box with a fault of it; empty before one.
     """
     level, message = _device_level(status)
     return DiagnosticStatus(
@@ -144,19 +121,28 @@ def drive_diagnostic(bus: str, status: DriveStatus, recording: str = '') -> Diag
     )
 
 
-def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
+def bus_diagnostic(
+    master: str,
+    bus: str,
+    network: Network,
+    *,
+    counters: BusCounters,
+    load: LoadFigures,
+    cycle: CycleFigures,
+    recording: str,
+) -> DiagnosticStatus:
     """Describe the bus and its cycle."""
-    counters, cycle = status.counters, status.cycle
-    level, message = _bus_level(status)
+    controller = network.controller
+    level, message = _bus_level(controller, counters, load)
     return DiagnosticStatus(
         level=level,
         name=f'{master}: bus',
         message=message,
-        hardware_id=status.name,
+        hardware_id=bus,
         values=_values(
             {
-                'frames_per_second': f'{status.load.frames_per_second:.1f}',
-                'bus_load': f'{status.load.load * 100:.2f}',
+                'frames_per_second': f'{load.frames_per_second:.1f}',
+                'bus_load': f'{load.load * 100:.2f}',
                 'frames_received': str(counters.received),
                 'frames_sent': str(counters.sent),
                 'frames_lost': str(counters.lost),
@@ -167,32 +153,34 @@ def bus_diagnostic(master: str, status: BusStatus) -> DiagnosticStatus:
                 'jitter_p50': f'{cycle.jitter_p50:.6f}',
                 'jitter_p99': f'{cycle.jitter_p99:.6f}',
                 'jitter_max': f'{cycle.jitter_max:.6f}',
-                'missed_pdos': str(status.missed_pdos),
-                'late_pdos': str(status.late_pdos),
-                'unknown_frames': str(status.unknown_frames),
-                'controller': status.controller.value,
-                'transmit_errors': str(status.transmit_errors),
-                'receive_errors': str(status.receive_errors),
-                'error_frames': str(status.error_frames),
-                'last_error': status.last_error,
-                'black_box': status.recording,
+                'missed_pdos': str(network.missed_pdos),
+                'late_pdos': str(network.late_pdos),
+                'unknown_frames': str(network.unknown_frames),
+                'controller': controller.state.value,
+                'transmit_errors': str(controller.transmit_errors),
+                'receive_errors': str(controller.receive_errors),
+                'error_frames': str(controller.error_frames),
+                'last_error': controller.last_error,
+                'black_box': recording,
             }
         ),
     )
 
 
-def _bus_level(status: BusStatus) -> tuple[bytes, str]:
-    counters = status.counters
-    if status.controller in {ControllerState.BUS_OFF, ControllerState.PASSIVE}:
-        return DiagnosticStatus.ERROR, f'{status.controller.value}: {status.last_error}'
-    if status.controller is ControllerState.WARNING:
-        return DiagnosticStatus.WARN, f'{status.controller.value}: {status.last_error}'
+def _bus_level(
+    controller: ControllerWatch, counters: BusCounters, load: LoadFigures
+) -> tuple[bytes, str]:
+    state = f'{controller.state.value}: {controller.last_error}'
+    if controller.state in {ControllerState.BUS_OFF, ControllerState.PASSIVE}:
+        return DiagnosticStatus.ERROR, state
+    if controller.state is ControllerState.WARNING:
+        return DiagnosticStatus.WARN, state
     if counters.lost or counters.send_errors:
         text = f'{counters.lost} frames lost, {counters.send_errors} not sent since the start'
         return DiagnosticStatus.WARN, text
-    if status.load.load > HIGH_LOAD:
-        return DiagnosticStatus.WARN, f'bus load {status.load.load:.0%}'
-    return DiagnosticStatus.OK, f'{status.load.frames_per_second:.0f} frames/s'
+    if load.load > HIGH_LOAD:
+        return DiagnosticStatus.WARN, f'bus load {load.load:.0%}'
+    return DiagnosticStatus.OK, f'{load.frames_per_second:.0f} frames/s'
 
 
 def _device_level(status: NodeStatus) -> tuple[bytes, str]:

@@ -15,12 +15,7 @@ from .units_service import BusFile, UnitsService
 
 
 class DriveServices:
-    """Services and topics of a drive with one axis or several.
-
-    Attributes:
-        axes: Its axes.
-        joint_states: Their joint states.
-    """
+    """Services and topics of a drive with one axis or several."""
 
     def __init__(
         self,
@@ -29,15 +24,8 @@ class DriveServices:
         thread: NetworkThread,
         file: BusFile,
     ) -> None:
-        """Offer the services.
-
-        Args:
-            node: The node of the device.
-            axes: Commands of its axes.
-            thread: The thread of its network.
-            file: The bus.yml.
-        """
-        self.axes = [commands.drive for commands in axes]
+        self.axes = [commands.drive for commands in axes]  # its axes
+        # their joint states
         self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
         places = ['~' if len(axes) == 1 else axis.name for axis in self.axes]
         self._services = [

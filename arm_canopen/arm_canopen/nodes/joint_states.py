@@ -24,22 +24,11 @@ from .output_thread import OutputThread
 
 
 class DriveJointStates:
-    """``~/joint_states`` of a drive, and of each of its channels where it has several.
-
-    Attributes:
-        axes: The state of each axis.
-        listened: Somebody listens to one of the topics.
-    """
+    """``~/joint_states`` of a drive, and of each of its channels where it has several."""
 
     def __init__(self, node: Node, axes: Sequence[DriveView]) -> None:
-        """Make the publishers.
-
-        Args:
-            node: The node of the device.
-            axes: The state of each axis.
-        """
-        self.axes = list(axes)
-        self.listened = False
+        self.axes = list(axes)  # the state of each axis
+        self.listened = False  # somebody listens to one of the topics
         names = [axis.name for axis in axes]
         topics = {'~': slice(None)}
         if len(names) > 1:  # and each channel as a drive of its own
@@ -69,22 +58,11 @@ class DriveJointStates:
 
 
 class RobotJointStates:
-    """``joint_states`` of a robot, put together from those of its drives.
-
-    Attributes:
-        aggregator: The joints.
-        listened: Somebody listens to the topic.
-    """
+    """``joint_states`` of a robot, put together from those of its drives."""
 
     def __init__(self, node: Node, joints: Sequence[RobotJoint]) -> None:
-        """Make the publisher.
-
-        Args:
-            node: The node that publishes.
-            joints: The joints in the order of the message.
-        """
-        self.aggregator = JointAggregator(joints)
-        self.listened = False
+        self.aggregator = JointAggregator(joints)  # the joints
+        self.listened = False  # somebody listens to the topic
         self._clock = node.get_clock()
         self._publisher = _publisher(node, 'joint_states')
 
@@ -119,13 +97,6 @@ class BusJointStates:
     def __init__(
         self, node: Node, drives: Sequence[DriveJointStates], output: OutputThread
     ) -> None:
-        """Take the drives.
-
-        Args:
-            node: The node of the master.
-            drives: The joint states of each drive.
-            output: The thread that publishes.
-        """
         self._node = node
         self._drives = list(drives)
         self._output = output
@@ -135,10 +106,8 @@ class BusJointStates:
     def publish_robot(self, description: str) -> None:
         """Publish ``joint_states``, too: all axes of the bus, and the joints that mimic them.
 
-        Args:
-            description: URDF as XML text; without it, the topic ``robot_description`` is used.
-                Until it comes, the joints are those of bus.yml in its order; so they stay where it
-                has none of them.
+        By a URDF in XML, or by the topic ``robot_description``. Until it comes, the joints are
+        those of bus.yml in its order; so they stay where it has none of them.
 
         Raises:
             CanopenError: The text is no URDF.
@@ -208,12 +177,9 @@ class BusJointStates:
 
 
 def on_description(node: Node, text: str, begin: Callable[[list[RobotJoint]], None]) -> None:
-    """Call a function once with the movable joints of the robot.
+    """Call ``begin`` once with the movable joints of the robot.
 
-    Args:
-        node: The node that has to know them.
-        text: URDF as XML text; without it, the topic ``robot_description`` is awaited.
-        begin: Gets the joints.
+    Of a URDF in XML, or of the topic ``robot_description``.
 
     Raises:
         CanopenError: The text is no URDF.

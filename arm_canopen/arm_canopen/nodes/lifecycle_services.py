@@ -32,14 +32,6 @@ class LifecycleServices:
     def __init__(
         self, node: Node, managed: Managed, thread: NetworkThread, output: OutputThread
     ) -> None:
-        """Offer the services.
-
-        Args:
-            node: The node.
-            managed: Its state; it changes in the thread of the network.
-            thread: The thread of the network.
-            output: The thread that publishes and answers.
-        """
         self._node = node
         self._managed = managed
         self._thread = thread

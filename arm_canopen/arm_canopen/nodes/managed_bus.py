@@ -26,9 +26,6 @@ class ManagedBus:
     """The lifecycle of a master and its devices.
 
     A device that is not active takes no commands. Deactivating a drive stops and disables it.
-
-    Attributes:
-        manager: The node ``lifecycle_manager``, in the namespace of the master.
     """
 
     def __init__(
@@ -39,15 +36,6 @@ class ManagedBus:
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
-        """Make the nodes managed ones.
-
-        Args:
-            node: The master's node.
-            devices: The nodes of the devices by name.
-            axes: Gives the commands of the axes of a device.
-            thread: The thread of the network.
-            output: The thread that publishes and answers.
-        """
         self._scheduler = thread.network.scheduler
         self._master = Managed(node.get_name(), _nothing)
         LifecycleServices(node, self._master, thread, output)
@@ -58,6 +46,7 @@ class ManagedBus:
             LifecycleServices(device, entry, thread, output)
             managed.append(entry)
         supervisor = Supervisor(self._master, managed, self._scheduler)
+        # the node ``lifecycle_manager``, in the namespace of the master
         self.manager = Node(MANAGER, namespace=node.get_namespace())
         text = ParameterDescriptor(
             description='accepted for ros2_canopen; not needed', read_only=True

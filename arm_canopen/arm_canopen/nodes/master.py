@@ -102,21 +102,10 @@ def main() -> None:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters of the program.
+    """Parameters of the program; :data:`HELP` says what they are."""
 
-    Attributes:
-        bus_configs: Paths of the bus.yml files, one for each bus.
-        can_names: Names of the CAN interfaces, in the same order.
-        diagnostics_period: Time between two /diagnostics messages in [s].
-        thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
-        beside_master: Start although another master is found on the bus.
-        robot_joint_states: Publish the joints of all drives as ``joint_states``.
-        robot_description: URDF as XML text; empty to take it from the topic.
-        black_box: How the last frames are written when a fault happens; None for not at all.
-    """
-
-    bus_configs: list[str]
-    can_names: list[str]
+    bus_configs: list[str]  # one for each bus
+    can_names: list[str]  # in the same order
     diagnostics_period: float
     thread_priority: int
     beside_master: bool
@@ -126,11 +115,9 @@ class Parameters:
 
 
 def serve_buses(stop: threading.Event, extend: Extend | None = None) -> None:
-    """Run the buses that the parameters name, in a program that has begun, until it is to end.
+    """Run the buses that the parameters name, in a program that has begun, until ``stop`` ends it.
 
-    Args:
-        stop: Ends it, with all drives stopped and disabled.
-        extend: As of :func:`run_master`.
+    Then all drives are stopped and disabled; ``extend`` as of :func:`run_master`.
 
     Raises:
         CanopenError: A bus could not be configured or opened, has a master, or its cycle has
@@ -222,9 +209,7 @@ def _stop(processes: Sequence[MasterProcess], others: Sequence[Node]) -> None:
 def _check_names(configs: Sequence[BusConfig], named: str) -> None:
     """Refuse two nodes of one name, which would answer each other's services.
 
-    Args:
-        configs: The buses.
-        named: Namespace that the command line gives to all nodes; empty for none.
+    ``named`` is the namespace that the command line gives to all nodes; empty for none.
     """
     taken: set[tuple[str, str]] = set()
     for config in configs:
@@ -253,45 +238,39 @@ def _declare(node: Node) -> Parameters:
         'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]; one '
         'for each bus.yml, with commas',
     )
-    read.text('master_config', '', 'accepted for ros2_canopen; not needed')
-    read.text('master_bin', '', 'accepted for ros2_canopen; not needed')
-    period = read.number(
-        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+    for name in ('master_config', 'master_bin'):
+        read.text(name, '', 'accepted for ros2_canopen; not needed')
+    parameters = Parameters(
+        bus_configs=configs.split(','),
+        can_names=can_names.split(','),
+        diagnostics_period=read.number(
+            'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+        ),
+        thread_priority=declare_thread_priority(read, THREAD_PRIORITY),
+        beside_master=read.flag(
+            'beside_master',
+            'start although another master is found, which leads other devices',
+            default=False,
+        ),
+        robot_joint_states=read.flag(
+            'robot_joint_states',
+            'publish the joints of all drives as joint_states; for an arm with one master, in the '
+            'place of canopen_joint_state_publisher',
+            default=False,
+        ),
+        robot_description=read.text(
+            'robot_description',
+            '',
+            'URDF as XML text, for the order of joint_states and the joints that mimic others; '
+            'without it, the topic robot_description',
+        ),
+        black_box=declare_black_box(read),
     )
-    priority = declare_thread_priority(read, THREAD_PRIORITY)
-    beside_master = read.flag(
-        'beside_master',
-        'start although another master is found, which leads other devices',
-        default=False,
-    )
-    robot_joint_states = read.flag(
-        'robot_joint_states',
-        'publish the joints of all drives as joint_states; for an arm with one master, in the '
-        'place of canopen_joint_state_publisher',
-        default=False,
-    )
-    description = read.text(
-        'robot_description',
-        '',
-        'URDF as XML text, for the order of joint_states and the joints that mimic others; '
-        'without it, the topic robot_description',
-    )
-    black_box = declare_black_box(read)
     refuse_misspelt(node)
     if not configs:
         raise CanopenError(
             'no bus_config: give the path of a bus.yml with --ros-args -p bus_config:=FILE'
         )
-    parameters = Parameters(
-        configs.split(','),
-        can_names.split(','),
-        period,
-        priority,
-        beside_master,
-        robot_joint_states,
-        description,
-        black_box,
-    )
     if len(parameters.bus_configs) != len(parameters.can_names):
         raise CanopenError(
             f'bus_config names {len(parameters.bus_configs)} buses, can_interface_name '

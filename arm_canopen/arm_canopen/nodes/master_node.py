@@ -38,23 +38,13 @@ SDO_TIMEOUT = 0.5  # [s] a stranger's bus.yml entry, which would say, does not e
 
 
 class MasterServices:
-    """Services of the master node.
-
-    Attributes:
-        admit: Called for every request; raises CanopenError when none is taken at the moment.
-        check_owner: Called with node id and object index before an SDO write; raises CanopenError
-            when the driver of that device writes the object itself.
-    """
+    """Services of the master node."""
 
     def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
-        """Offer them.
-
-        Args:
-            node: The master's node.
-            thread: The thread of the network.
-            output: The thread that answers.
-        """
+        # called for every request; raises CanopenError when none is taken at the moment
         self.admit: Callable[[], None] = lambda: None
+        # called with node id and object index before an SDO write; raises CanopenError when the
+        # driver of that device writes the object itself
         self.check_owner: Callable[[int, int], None] = lambda node_id, index: None
         self._thread = thread
         for kind, name, begin, respond in (

@@ -9,7 +9,7 @@ from functools import partial
 import threading
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from black_box import BlackBoxSettings
@@ -22,10 +22,9 @@ from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..library.bus_master import BusMaster
 from ..master.events import Event
-from ..master.status import node_status
 from .device_node import DeviceNode
 from .device_topics import log_bus_event
-from .diagnostics import bus_diagnostic, bus_status, device_diagnostic, drive_diagnostic
+from .diagnostics import bus_diagnostics, DiagnosticsPublisher
 from .drive_services import DriveServices
 from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
@@ -39,12 +38,7 @@ LAST_DIAGNOSTICS_TIMEOUT = 0.5  # [s] for the last /diagnostics
 
 
 class MasterProcess:
-    """Everything that ``ros2 run arm_canopen master`` runs.
-
-    Attributes:
-        bus: The configuration of the bus.
-        nodes: The ROS nodes, the master's first.
-    """
+    """Everything that ``ros2 run arm_canopen master`` runs."""
 
     def __init__(
         self,
@@ -57,18 +51,11 @@ class MasterProcess:
         beside_master: bool = False,
         black_box: BlackBoxSettings | None = None,
     ) -> None:
-        """Build it; nothing is sent before :meth:`start`.
+        """Nothing is sent before :meth:`start`; the bus is open, and stays the caller's to close.
 
-        Args:
-            node: The master's node.
-            config: The bus.
-            can: The open CAN interface; it stays the caller's to close.
-            diagnostics_period: Time between two /diagnostics messages in [s].
-            thread_priority: SCHED_FIFO priority of the thread of the cycle; 0 for none.
-            beside_master: Start although another master is found, and command no device of its.
-            black_box: How the last frames are written when a fault happens; None for not at all.
+        The ``diagnostics_period`` is in [s].
         """
-        self.bus = config
+        self.bus = config  # the configuration of the bus
         self._node = node
         self._output = OutputThread(node.get_logger())
         self._thread_priority = thread_priority
@@ -94,9 +81,10 @@ class MasterProcess:
         services.check_owner = self._check_owner
         commands = list(self._master.commands.values())
         StopService(node, commands, self._thread, self._output)
-        self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+        self._diagnostics = DiagnosticsPublisher(node, self._output)
         node.create_timer(diagnostics_period, self._request_diagnostics)
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
+        # the ROS nodes, the master's first
         self.nodes: list[Node] = [node, *self._devices.values()]
         if config.master.is_lifecycle:
             managed = ManagedBus(
@@ -123,11 +111,7 @@ class MasterProcess:
         self._master.start(lambda: raise_thread_priority(self._node, priority, what))
 
     def end_on_failure(self, stop: threading.Event) -> None:
-        """Have the program end when a defect has ended the cycle; call it before :meth:`start`.
-
-        Args:
-            stop: Ends the program.
-        """
+        """Set ``stop`` when a defect has ended the cycle; call it before :meth:`start`."""
         self._thread.on_failure = stop.set
 
     @property
@@ -152,9 +136,7 @@ class MasterProcess:
     def publish_robot_joint_states(self, description: str) -> None:
         """Publish ``joint_states`` of all drives of the bus, too; call it before :meth:`start`.
 
-        Args:
-            description: URDF as XML text, which says the order, and which joints mimic others; the
-                topic ``robot_description`` is used where it is empty.
+        Order, and which joints mimic others, by a URDF in XML, or the topic ``robot_description``.
 
         Raises:
             CanopenError: The text is no URDF.
@@ -188,30 +170,23 @@ class MasterProcess:
 
     def _collect(self) -> list[DiagnosticStatus]:
         now = time.monotonic()
-        bus = bus_status(
-            self._master.can.name,
-            self._master.can.counters,
-            self._master.load.figures(now),
-            self._thread.figures(),
-            network=self._network,
-            recording=self._recording(),
+        can = self._master.can
+        return bus_diagnostics(
+            self._node.get_name(),
+            can.name,
+            self._network,
+            {
+                name: [drive_status(axis, now) for axis in services.axes]
+                for name, services in self._drives.items()
+            },
+            now,
+            counters=can.counters,
+            load=self._master.load.figures(now),
+            cycle=self._thread.figures(),
+            recording=self._recording,
         )
-        statuses = [bus_diagnostic(self._node.get_name(), bus)]
-        for device in self._network.nodes.values():
-            services = self._drives.get(device.name)
-            if services is None:
-                status = node_status(device, now)
-                recording = self._recording(device.name)
-                statuses.append(device_diagnostic(self._master.can.name, status, recording))
-                continue
-            drives = [drive_status(axis, now) for axis in services.axes]
-            recording = self._recording(device.name)
-            statuses += [
-                drive_diagnostic(self._master.can.name, drive, recording) for drive in drives
-            ]
-        return statuses
 
-    def _recording(self, device: str = '') -> str:
+    def _recording(self, device: str) -> str:
         """Return the last file of the black box, of a device or of any; empty before one."""
         box = self._master.black_box
         path = None if box is None else box.recording_of(device) if device else box.last
@@ -234,13 +209,7 @@ class MasterProcess:
 
     def _post_diagnostics(self, future: Future[list[DiagnosticStatus]]) -> None:
         if future.exception() is None:  # else the network has ended
-            publish = partial(self._publish_diagnostics, future.result())
-            self._output.post_stream('diagnostics', publish)
-
-    def _publish_diagnostics(self, statuses: list[DiagnosticStatus]) -> None:
-        message = DiagnosticArray(status=statuses)
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+            self._diagnostics.post(future.result())
 
     def _update_listeners(self) -> None:
         self._joint_states.update_listeners()

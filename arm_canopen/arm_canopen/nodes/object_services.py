@@ -4,52 +4,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING
 
 from arm_msgs.srv import ReadObject, WriteObject
 
 from ..config.read.object_text import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError, ObjectError
-from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import object_path
 
+if TYPE_CHECKING:
+    from .device_node import DeviceNode
+
 Transfer = tuple[ObjectEntry, bytes]
-
-
-class ServiceOwner(Protocol):
-    """The node that offers the services.
-
-    Attributes:
-        device: Its device.
-    """
-
-    device: RemoteNode
-
-    def offer(
-        self,
-        service_type: Any,  # noqa: ANN401  # service classes have no type
-        name: str,
-        handler: Callable[[Any], Future[Any]],
-        respond: Callable[[Any, Future[Any]], Any],
-    ) -> None:
-        """Offer a service whose outcome is a future."""
 
 
 class ObjectServices:
     """``~/read_object`` and ``~/write_object`` of one device."""
 
-    def __init__(self, node: ServiceOwner, thread: NetworkThread) -> None:
-        """Offer them.
-
-        Args:
-            node: The node of the device.
-            thread: The thread of its network.
-        """
+    def __init__(self, node: DeviceNode, thread: NetworkThread) -> None:
         self._node = node
         self._objects = node.device.objects
         self._thread = thread

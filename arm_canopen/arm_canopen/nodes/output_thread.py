@@ -27,11 +27,7 @@ class OutputThread:
     """Runs what other threads post, one after another."""
 
     def __init__(self, logger: Logger) -> None:
-        """Prepare; the thread starts with :meth:`start`.
-
-        Args:
-            logger: Takes the defects of what was posted, and what had to be left out.
-        """
+        """``logger`` takes the defects of what was posted, and what had to be left out."""
         self._logger = logger
         self._queue: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._lock = threading.Lock()
@@ -65,10 +61,6 @@ class OutputThread:
         """Have a function run soon that belongs to a stream; returns at once.
 
         While ROS takes less than what comes, only the newest of each stream is kept.
-
-        Args:
-            key: The stream.
-            work: The function.
         """
         with self._lock:
             waits = key in self._newest

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 from black_box import LogPlayer, PlaybackError
@@ -35,9 +35,8 @@ from ..config.model import BusConfig
 from ..exceptions import CanopenError
 from ..library.bus_replay import BusReplay, unknown_scales
 from ..master.events import Event
-from ..master.status import node_status
 from .device_topics import DeviceTopics, log_bus_event, node_options
-from .diagnostics import bus_diagnostic, bus_status, device_diagnostic, drive_diagnostic
+from .diagnostics import bus_diagnostics, DiagnosticsPublisher
 from .joint_states import BusJointStates, DriveJointStates
 from .output_thread import OutputThread
 
@@ -68,19 +67,7 @@ parameters:
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters of the program.
-
-    Attributes:
-        log: The log.
-        interface: The bus, as the log names it; empty for the only one.
-        bus_config: Path of the bus.yml.
-        rate: How many seconds of the log go by in one.
-        start: Where it begins, in [s] after the first frame.
-        loop: Begin again at the end.
-        robot_joint_states: Publish the joints of all drives as ``joint_states``.
-        robot_description: URDF as XML text; empty to take it from the topic.
-        diagnostics_period: Time between two /diagnostics messages in [s].
-    """
+    """Parameters of the program; :data:`HELP` says what they are."""
 
     log: Path
     interface: str
@@ -99,23 +86,11 @@ def main() -> int:
 
 
 class ReplayProcess:
-    """The nodes of a bus that is replayed.
-
-    Attributes:
-        nodes: The nodes, for the executor.
-    """
+    """The nodes of a bus that is replayed."""
 
     def __init__(
         self, node: Node, config: BusConfig, parameters: Parameters, stack: ExitStack
     ) -> None:
-        """Build it.
-
-        Args:
-            node: The node of the replay.
-            config: The bus.
-            parameters: Parameters of the program.
-            stack: Destroys the nodes of the devices.
-        """
         self._refusal: Exception | None = None
         self._node = node
         self._parameters = parameters
@@ -130,7 +105,7 @@ class ReplayProcess:
             start=parameters.start,
         )
         self._player.on_tick = self._tick
-        self.nodes = [node]
+        self.nodes = [node]  # the nodes, for the executor
         self._topics: dict[str, DeviceTopics] = {}
         drives = []
         for device in bus.network.nodes.values():
@@ -144,15 +119,14 @@ class ReplayProcess:
         if parameters.robot_joint_states:
             self._joint_states.publish_robot(parameters.robot_description)
         bus.network.on_feedback = self._feedback
-        self._diagnostics = node.create_publisher(DiagnosticArray, 'diagnostics', 10)
+        self._diagnostics = DiagnosticsPublisher(node, self._output)
         self._diagnostics_due = 0.0
         node.create_timer(LISTENER_PERIOD, self._update_listeners)
 
     def play(self, stop: threading.Event) -> None:
         """Play the log in a thread of its own, and serve the nodes meanwhile.
 
-        Args:
-            stop: Ends it; set at the end of the log.
+        ``stop`` ends it, and is set at the end of the log.
 
         Raises:
             CanopenError: Somebody else publishes the same meanwhile.
@@ -199,28 +173,22 @@ class ReplayProcess:
         now = time.monotonic()
         if now >= self._diagnostics_due:
             self._diagnostics_due = now + self._parameters.diagnostics_period
-            self._output.post_stream('diagnostics', partial(self._publish, self._collect()))
+            self._diagnostics.post(self._collect())
 
     def _collect(self) -> list[DiagnosticStatus]:
         bus, now = self._bus, self._bus.now
         path = str(self._parameters.log)
-        figures = bus.load.figures(now)
-        status = bus_status(
-            self._name, bus.counters, figures, bus.figures(), network=bus.network, recording=path
+        return bus_diagnostics(
+            MASTER,
+            self._name,
+            bus.network,
+            {name: [axis.status(now) for axis in axes] for name, axes in bus.axes.items()},
+            now,
+            counters=bus.counters,
+            load=bus.load.figures(now),
+            cycle=bus.figures(),
+            recording=lambda device: '' if device else path,
         )
-        statuses = [bus_diagnostic(MASTER, status)]
-        for device in bus.network.nodes.values():
-            axes = bus.axes.get(device.name)
-            if axes is None:
-                statuses.append(device_diagnostic(self._name, node_status(device, now)))
-            else:
-                statuses += [drive_diagnostic(self._name, axis.status(now)) for axis in axes]
-        return statuses
-
-    def _publish(self, statuses: list[DiagnosticStatus]) -> None:
-        message = DiagnosticArray(status=statuses)
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
 
     def _update_listeners(self) -> None:
         self._joint_states.update_listeners()
@@ -282,42 +250,35 @@ def _refusal(found: Sequence[str]) -> CanopenError:
 def _declare(node: Node) -> Parameters:
     read = ParameterReader(node)
     log = read.text('log', '', 'log of a bus: black box, candump, ASC, BLF, TRC or csv')
-    interface = read.text(
-        'interface', '', 'of a log of several buses: the one to play, as the log names it'
-    )
-    config = read.text('bus_config', '', 'the bus.yml of that bus')
-    rate = read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one')
-    start = read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first frame [s]')
-    loop = read.flag('loop', 'begin again at the end', default=False)
-    robot_joint_states = read.flag(
-        'robot_joint_states', 'publish the joints of all drives as joint_states', default=False
-    )
-    description = read.text(
-        'robot_description',
-        '',
-        'URDF as XML text, for joint_states; without it, the topic robot_description',
-    )
-    period = read.number(
-        'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+    parameters = Parameters(
+        log=Path(log),
+        interface=read.text(
+            'interface', '', 'of a log of several buses: the one to play, as the log names it'
+        ),
+        bus_config=read.text('bus_config', '', 'the bus.yml of that bus'),
+        rate=read.number('rate', 1.0, RATES, 'how many seconds of the log go by in one'),
+        start=read.number('start', 0.0, (0.0, 1e6), 'where it begins, after the first frame [s]'),
+        loop=read.flag('loop', 'begin again at the end', default=False),
+        robot_joint_states=read.flag(
+            'robot_joint_states', 'publish the joints of all drives as joint_states', default=False
+        ),
+        robot_description=read.text(
+            'robot_description',
+            '',
+            'URDF as XML text, for joint_states; without it, the topic robot_description',
+        ),
+        diagnostics_period=read.number(
+            'diagnostics_period', 1.0, (0.05, 60.0), 'time between two /diagnostics messages [s]'
+        ),
     )
     refuse_misspelt(node)
-    if not log or not config:
+    if not log or not parameters.bus_config:
         raise CanopenError(
             'give a log and its bus.yml: --ros-args -p log:=FILE -p bus_config:=FILE'
         )
-    if not Path(log).is_file():
+    if not parameters.log.is_file():
         raise CanopenError(f'{log}: there is no such file')
-    return Parameters(
-        Path(log),
-        interface,
-        config,
-        rate,
-        start,
-        loop,
-        robot_joint_states,
-        description,
-        period,
-    )
+    return parameters
 
 
 if __name__ == '__main__':

@@ -34,14 +34,6 @@ class StopService:
         thread: NetworkThread,
         output: OutputThread,
     ) -> None:
-        """Offer it.
-
-        Args:
-            node: The master's node.
-            commands: Those of the drives.
-            thread: The thread of the network.
-            output: The thread that answers.
-        """
         self._node, self._commands, self._thread = node, commands, thread
         self._events = node.create_publisher(String, EVENT_TOPIC, 10)
         create_deferred_service(node, Trigger, SERVICE, self._stop, self._answer, post=output.post)

@@ -33,17 +33,11 @@ KEYS = (
 
 @dataclass(frozen=True, slots=True)
 class BusFile:
-    """A bus.yml as the master has read it, so that a client recognizes the very file.
+    """A bus.yml as the master has read it, so that a client recognizes the very file."""
 
-    Attributes:
-        path: Where it is on this computer.
-        inode: Its inode; 0 when it is gone.
-        changed: When it was changed last in [ns]; 0 when it is gone.
-    """
-
-    path: Path
-    inode: int = 0
-    changed: int = 0
+    path: Path  # where it is on this computer
+    inode: int = 0  # its inode; 0 when it is gone
+    changed: int = 0  # when it was changed last in [ns]; 0 when it is gone
 
     @classmethod
     def at(cls, path: Path) -> BusFile:
@@ -61,15 +55,6 @@ class UnitsService:
     def __init__(
         self, node: DeviceNode, drive: Drive, place: str, thread: NetworkThread, file: BusFile
     ) -> None:
-        """Offer it.
-
-        Args:
-            node: The node of the device.
-            drive: The axis.
-            place: What the name begins with.
-            thread: The thread of the network.
-            file: Where its scales stand.
-        """
         self._node, self._drive = node, drive
         self._thread, self._file = thread, file
         node.offer(ReadUnits, f'{place}/read_units', self._read, self._answer)
