@@ -30,10 +30,6 @@ def frozen(values: Sequence[float] | Array) -> Array:
 def checked(values: Sequence[float] | Array, length: int, what: str) -> Array:
     """Return a read-only copy of finite numbers of a known count.
 
-    Args:
-        values: The numbers, from outside.
-        length: How many there must be.
-
     Raises:
         CommandError: The count is wrong, or a number is not finite.
     """

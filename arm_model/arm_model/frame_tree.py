@@ -32,7 +32,6 @@ class FrameTree:
 
         Args:
             parent: Name of the frame in which its pose is given.
-            pose: Its pose.
             time: Steady time of its arrival in [s]; infinity for a static one.
         """
         self._links[child] = _Link(parent, pose, time)

@@ -88,7 +88,6 @@ class JointLimits:
         """Return wanted less actual; of continuous joints half a turn at most.
 
         Args:
-            wanted: Positions in [rad].
             actual: Positions in [rad]; whole turns of continuous joints do not count.
         """
         error: Array = wanted - actual
@@ -96,11 +95,7 @@ class JointLimits:
         return error - turns
 
     def in_nearest_turn(self, positions: Array, seed: Array) -> Array:
-        """Return positions, those of continuous joints in the turn that is nearest to a seed.
-
-        Args:
-            seed: Positions in [rad].
-        """
+        """Return positions, those of continuous joints in the turn that is nearest to a seed."""
         return np.where(self.continuous, seed + self.error(positions, seed), positions)
 
     def scaled(

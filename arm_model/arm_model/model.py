@@ -75,7 +75,6 @@ class RobotModel:
         """Build and check the arm.
 
         Args:
-            limits: The table ``joint_limits`` of a limits file.
             group: The group; by default the only one of the SRDF that is no tool.
             tip: The tip link; by default the end of the group's chain.
             moved_by_others: Joints of other groups that move by themselves, by group: links that
@@ -141,8 +140,6 @@ class RobotModel:
 
         Args:
             limits: Limits of the joints, as MoveIt's joint_limits.yaml has them.
-            group: As in the constructor.
-            tip: As in the constructor.
 
         Raises:
             ModelError: A file cannot be read, or the three do not fit together.
@@ -236,12 +233,7 @@ class RobotModel:
         return float(min(base.actInv(place)[2] for place in places))
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
-        """Return the nearest pairs of shapes with the gradients of their distances.
-
-        Args:
-            within: Greatest distance of interest in [m].
-            count: How many pairs at most.
-        """
+        """Return the nearest pairs of shapes with the gradients of their distances."""
         return self._clearances.nearest(positions, within, count)
 
     def clearance(self, positions: Array, within: float = math.inf) -> float:
@@ -269,13 +261,7 @@ class RobotModel:
         return least
 
     def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
-        """Whether no shapes are as near at any positions between bounds, as far as is known.
-
-        Args:
-            lower: Least joint positions in [rad].
-            upper: Greatest joint positions in [rad].
-            within: The distance of interest in [m].
-        """
+        """Whether no shapes are as near at any positions between bounds, as far as is known."""
         return self._clearances.apart(lower, upper, within)
 
     def clearances(self, scene: PlanningScene | None = None) -> Clearances:

@@ -111,9 +111,6 @@ class ConstraintCheck:
     def __init__(self, model: RobotModel, *constraints: PathConstraints) -> None:
         """Prepare.
 
-        Args:
-            *constraints: What must hold, all of it.
-
         Raises:
             PlanningError: A link is unknown, or no joint moves it.
         """

@@ -45,7 +45,6 @@ class Line:
 
         Args:
             start: Where it begins, in the root link.
-            end: Where it ends.
         """
         self._turning = _Turning(start.rotation, end.rotation)
         self._start, self._way = start.position, end.position - start.position
@@ -75,8 +74,6 @@ class Arc:
 
         Args:
             start: Where it begins, in the root link.
-            end: Where it ends.
-            center: Center of the circle in [m].
             normal: Unit vector about which it turns.
             sweep: Angle of the arc in [rad].
         """
@@ -116,7 +113,6 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
     Args:
         start: Where it begins, in the root link.
         interim: A point on it in [m].
-        end: Where it ends.
 
     Raises:
         PlanningError: The three are on a line, or two of them are one.
@@ -142,8 +138,6 @@ def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
 
     Args:
         start: Where it begins, in the root link.
-        center: Center of the circle in [m].
-        end: Where it ends.
 
     Raises:
         PlanningError: The radii differ, or the three are on a line, as with half a circle.

@@ -62,11 +62,6 @@ class PlanningError(ArmError):
     """
 
     def __init__(self, code: PlanningCode, reason: str) -> None:
-        """Keep the code beside the reason.
-
-        Args:
-            code: What MoveIt reports for it.
-        """
         super().__init__(reason)
         self.code = code
 

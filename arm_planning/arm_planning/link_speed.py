@@ -48,11 +48,7 @@ def speed_limited(path: Path, link: LinkKinematics, most: float) -> tuple[Path, 
 
 
 def slower(path: Path, factor: float) -> Path:
-    """Return the same path with more time everywhere.
-
-    Args:
-        factor: How many times the time.
-    """
+    """Return the same path with more time everywhere."""
     powers = (factor ** -np.arange(6.0))[:, None]
     return Path.of(path.durations * factor, path.coefficients * powers)
 

@@ -65,7 +65,6 @@ class Planner:
 
         Args:
             model: The arm; its scene counts where a call has none.
-            cartesian_limits: Limits of a link's motion for LIN and CIRC; None has the defaults.
             clock: Steady time in [s], for time-outs.
             seed: Of the random numbers: with the same seed and time enough, the same plans.
         """
@@ -422,11 +421,7 @@ def _heeding(constraints: ConstraintCheck | None, goals: list[Array]) -> list[Ar
 
 
 def unknown_planner(planner_id: str, planner_ids: Sequence[str]) -> PlanningError:
-    """Return the refusal of a planner that there is not.
-
-    Args:
-        planner_ids: Names of the planners of free motion.
-    """
+    """Return the refusal of a planner that there is not."""
     known = ', '.join((*planner_ids, *PLANNER_IDS))
     return PlanningError(
         PlanningCode.FAILURE, f'unknown planner_id {planner_id!r}; choose one of {known}'

@@ -71,7 +71,6 @@ def make_srdf(
     Args:
         previous: The SRDF that is there already; empty when there is none.
         limits: The table ``joint_limits`` of a limits file; what it lacks is taken from the URDF.
-        samples: Number of poses that are drawn.
 
     Raises:
         ModelError: The description or the SRDF cannot be used, or there is no good pose.

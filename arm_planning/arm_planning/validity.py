@@ -63,11 +63,7 @@ class ValidityCheck:
         return self._beyond(positions, positions, 0.0) or self._touching(positions, 0.0)
 
     def required(self, *ends: Array) -> Array:
-        """Return the distance that each pair keeps on motions between some states in [m] (k).
-
-        Args:
-            ends: Joint positions in [rad] (n).
-        """
+        """Return the distance that each pair keeps on motions between some states in [m] (k)."""
         least = [self._clearances.least(each, MARGIN).copy() for each in ends]
         required: Array = np.clip(np.min(least, axis=0), 0.0, MARGIN) - LIMIT_TOLERANCE
         return required
@@ -76,8 +72,6 @@ class ValidityCheck:
         """Return a place of a straight motion at which a pair is nearer than it may be, or None.
 
         Args:
-            begin: Joint positions in [rad] (n).
-            end: Joint positions in [rad] (n).
             required: Distance that each pair keeps in [m] (k).
         """
         way = end - begin

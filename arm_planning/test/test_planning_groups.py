@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -83,7 +84,7 @@ def test_a_default_of_the_matrix_counts_for_a_group_that_allows_the_pair() -> No
     whole, model = robot().scene, robot().model('left')
     pair = ('torso_link', 'left_1_link')
     assert scene_for(SceneSnapshot(whole), model.scene).allowed.allows(*pair)
-    matrix = whole.allowed.without(pair[1]).with_default(pair[1], False)
+    matrix = replace(whole.allowed.without(pair[1]), defaults={pair[1]: False})
     scene = scene_for(SceneSnapshot(whole.with_allowed(matrix)), model.scene)
     assert not scene.allowed.allows(*pair)
 

@@ -68,10 +68,6 @@ def time_of_two_arms(turn: float, *, apart: bool) -> tuple[float, float]:
     """Return median and 99th percentile of the time of a cycle of one of two arms in [us].
 
     Both are jogged, back and forth, each tool along and across the line between them.
-
-    Args:
-        turn: How far they are turned towards each other before in [rad].
-        apart: Whether they heed each other.
     """
     models = two_pandas()
     cores, times = [MotionCore(model) for model in models], []

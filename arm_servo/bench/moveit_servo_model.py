@@ -27,11 +27,6 @@ class MoveitServoModel:
     """Positions for twists, as moveit_servo would give them."""
 
     def __init__(self, model: RobotModel, start: Array, period: float) -> None:
-        """Start at rest.
-
-        Args:
-            period: Cycle in [s].
-        """
         self._model = model
         self._period = period
         self.position: Array = np.array(start)
@@ -39,11 +34,7 @@ class MoveitServoModel:
         self._queue: deque[Array] = deque([self.position] * waiting, maxlen=waiting)
 
     def step(self, twist: Array) -> Array:
-        """Advance by a cycle, and return the positions that are commanded now.
-
-        Args:
-            twist: Asked speed of the tool in the base (6).
-        """
+        """Advance by a cycle, and return the positions that are commanded now."""
         late = self._queue[0]
         self._queue.append(self._next(twist))
         return late

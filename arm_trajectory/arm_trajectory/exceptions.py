@@ -37,11 +37,6 @@ class GoalError(CommandError):
     """
 
     def __init__(self, code: GoalCode, reason: str) -> None:
-        """Keep the code beside the reason.
-
-        Args:
-            code: Code of the action's result.
-        """
         super().__init__(reason)
         self.code = code
 

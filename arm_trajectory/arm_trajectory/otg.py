@@ -128,7 +128,6 @@ class OnlineTrajectoryGenerator:
 
         Args:
             target: Where to arrive, its velocity and acceleration within the limits.
-            shortest: Least duration in [s].
         """
         demand = self._to_position
         _start(demand, state)
@@ -207,8 +206,6 @@ def brakeable(distance: Array, acceleration: Array, jerk: Array) -> Array:
 
     Args:
         distance: Ways left in [rad]; negative ones count as zero.
-        acceleration: Greatest decelerations in [rad/s2].
-        jerk: Greatest jerks in [rad/s3].
     """
     way = np.minimum(np.maximum(distance, 0.0), CONTINUOUS_DISTANCE)
     half = 0.5 * acceleration * acceleration / jerk

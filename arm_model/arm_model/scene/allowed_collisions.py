@@ -43,17 +43,9 @@ class AllowedCollisionMatrix:
         found = [self.defaults[name] for name in (first, second) if name in self.defaults]
         return bool(found) and all(found)
 
-    def with_entry(self, first: str, second: str, allowed: bool) -> AllowedCollisionMatrix:
-        """Return the matrix with an entry for a pair."""
-        return self.with_entries([frozenset((first, second))], allowed)
-
     def with_entries(self, pairs: Iterable[Pair], allowed: bool) -> AllowedCollisionMatrix:
         """Return the matrix with the same entry for some pairs."""
         return replace(self, entries={**self.entries, **dict.fromkeys(pairs, allowed)})
-
-    def with_default(self, name: str, allowed: bool) -> AllowedCollisionMatrix:
-        """Return the matrix with a default for all pairs of a name that have no entry."""
-        return replace(self, defaults={**self.defaults, name: allowed})
 
     def without(self, name: str) -> AllowedCollisionMatrix:
         """Return the matrix without the entries and the default of a name."""

@@ -86,9 +86,6 @@ class Clearances:
     def least(self, positions: Array, within: float) -> Array:
         """Return distances: exact ones below a distance of interest, else least ones.
 
-        Args:
-            within: The distance of interest in [m].
-
         Returns:
             Distance of each pair in [m].
         """
@@ -137,7 +134,6 @@ class Clearances:
 
         Args:
             positions: Joint positions in [rad] (m, n).
-            within: The distance of interest in [m].
         """
         turned = np.abs(positions[:, None, :] - self._places)
         rates = self._scene.distance_rate_bounds
@@ -146,23 +142,13 @@ class Clearances:
         return int(doubtful.argmax()) if doubtful.any() else len(positions)
 
     def apart(self, lower: Array, upper: Array, within: float) -> bool:
-        """Whether nothing is as near at any positions between bounds, as far as is known.
-
-        Args:
-            lower: Least joint positions in [rad].
-            upper: Greatest joint positions in [rad].
-            within: The distance of interest in [m].
-        """
+        """Whether nothing is as near at any positions between bounds, as far as is known."""
         turned = np.maximum(upper - self._places, self._places - lower)
         bounds = self._distances - np.einsum('kn,kn->k', turned, self._scene.distance_rate_bounds)
         return not (bounds < within).any()
 
     def nearest(self, positions: Array, within: float, count: int) -> list[Proximity]:
         """Return the nearest pairs with the gradients of their distances.
-
-        Args:
-            within: Greatest distance of interest in [m].
-            count: How many pairs at most.
 
         Returns:
             The pairs, the nearest first.

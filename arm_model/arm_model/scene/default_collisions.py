@@ -5,14 +5,13 @@
 It writes ``disable_collisions`` for links that are adjacent, or in contact nearly always. Here
 that is made up for where an SRDF does not say it. Links that it finds never in contact are checked
 all the same: a sample is no proof, and distances that are great cost nothing. For an SRDF that
-other programs read, :func:`sampled_contacts` looks for contacts much longer.
+other programs read, :func:`arm_model.sample_link_pairs` looks for contacts much longer.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from urdf_reader import KinematicTree, Pair
@@ -31,22 +30,6 @@ SEED = 0  # of the poses: the same robot has the same pairs each time
 HALF_TURN = np.pi
 
 MAX_NAMED = 12  # pairs that one note names
-DESCENTS = 6  # nearest poses of a pair from which nearer ones are searched
-DESCENT_STEPS = 200  # poses that are tried from each of them
-
-FIRST_STEP, LAST_STEP = 0.2, 0.002
-"""Standard deviation of the steps of a search, as a share of the range of each joint."""
-
-
-@dataclass(frozen=True, slots=True)
-class SampledContacts:
-    """What many poses say about the links of a robot."""
-
-    samples: int  # number of poses that were drawn, evenly over the ranges of the joints
-    searched: int  # poses that were tried besides for each pair that was never in contact
-    shares: Mapping[Pair, float]  # share of the drawn poses in which the links touch, by pair
-    # least distance in [m] that was found, by pair; negative where they overlap
-    least: Mapping[Pair, float]
 
 
 def with_default_collisions(
@@ -58,7 +41,6 @@ def with_default_collisions(
     them in it with a purpose. What ``enable_collisions`` names is checked in any case.
 
     Args:
-        upper: Greatest positions.
         notes: Where pairs are named that were not in the SRDF.
     """
     allowed = scene.allowed
@@ -110,11 +92,10 @@ def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> froze
 
     Args:
         lower: Least positions of its joints; minus infinity for one that turns without end.
-        upper: Greatest positions.
     """
     clearances, apart = Clearances(scene), Counter[Pair]()
     candidates = set(map(frozenset, scene.pairs))
-    for positions in _drawn(*_one_turn(lower, upper), SAMPLES):
+    for positions in drawn_poses(*one_turn(lower, upper), SAMPLES):
         touching = clearances.contacts(positions)
         apart.update(candidates.difference(frozenset(each.bodies) for each in touching))
         candidates = {pair for pair in candidates if apart[pair] <= (1 - MIN_SHARE) * SAMPLES}
@@ -123,56 +104,7 @@ def always_in_contact(scene: PlanningScene, lower: Array, upper: Array) -> froze
     return frozenset(candidates)
 
 
-def sampled_contacts(
-    scene: PlanningScene, lower: Array, upper: Array, samples: int
-) -> SampledContacts:
-    """Draw poses, and search on from the nearest ones of each pair that never touched.
-
-    Args:
-        scene: The robot, with all joints that move its links and all pairs to be looked at.
-        lower: Least positions of its joints in [rad] or [m]; of a continuous one, minus infinity.
-        upper: Greatest positions.
-        samples: Number of poses.
-    """
-    clearances = Clearances(scene)
-    lower, upper = _one_turn(lower, upper)
-    poses = np.array(list(_drawn(lower, upper, samples)))
-    found = np.array([clearances.least(pose, np.inf).copy() for pose in poses])
-    columns: dict[Pair, list[int]] = {}
-    for column, pair in enumerate(scene.pairs):
-        columns.setdefault(frozenset(pair), []).append(column)
-    distances = {pair: found[:, each].min(axis=1) for pair, each in columns.items()}
-    shares = {pair: float((each < 0.0).mean()) for pair, each in distances.items()}
-    least = {pair: float(each.min()) for pair, each in distances.items()}
-    for apart in [pair for pair, share in shares.items() if share == 0.0]:
-        starts = poses[np.argsort(distances[apart])[:DESCENTS]]
-        least[apart] = min(least[apart], _least_nearby(scene, lower, upper, apart, starts))
-    return SampledContacts(samples, DESCENTS * DESCENT_STEPS, shares, least)
-
-
-def _least_nearby(
-    scene: PlanningScene, lower: Array, upper: Array, pair: Pair, starts: Array
-) -> float:
-    """Return the least distance of a pair that random steps towards contact find in [m]."""
-    others = [each for each in map(frozenset, scene.pairs) if each != pair]
-    clearances = Clearances(scene.with_allowed(scene.allowed.with_entries(others, True)))
-    draw = np.random.default_rng(SEED)
-    shrinking = np.geomspace(FIRST_STEP, LAST_STEP, DESCENT_STEPS)
-    found = np.inf
-    for start in starts:
-        best, nearest = start, float(clearances.least(start, np.inf).min())
-        for step in shrinking:
-            tried = np.clip(best + draw.normal(0.0, step * (upper - lower)), lower, upper)
-            distance = float(clearances.least(tried, nearest).min())
-            if distance < nearest:
-                best, nearest = tried, distance
-        found = min(found, nearest)
-        if found < 0.0:
-            break
-    return found
-
-
-def _one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
+def one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
     """Return ranges in which joints without an end turn once."""
     return (
         np.where(np.isfinite(lower), lower, -HALF_TURN),
@@ -180,7 +112,7 @@ def _one_turn(lower: Array, upper: Array) -> tuple[Array, Array]:
     )
 
 
-def _drawn(lower: Array, upper: Array, samples: int) -> Iterator[Array]:
+def drawn_poses(lower: Array, upper: Array, samples: int) -> Iterator[Array]:
     """Draw poses, the same each time."""
     draw = np.random.default_rng(SEED)
     return (draw.uniform(lower, upper) for _ in range(samples))

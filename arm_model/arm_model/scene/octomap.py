@@ -50,7 +50,6 @@ def octomap_shapes(
     """Return what is occupied in a map, as cells of one size that lie together, in its frame.
 
     Args:
-        kind: Class of the tree.
         resolution: Edge of its smallest cells in [m].
         binary: Whether it is the binary stream, else the full one.
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+import copy
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from itertools import combinations, product
@@ -88,10 +89,6 @@ class PlanningScene:
     ) -> None:
         """Put a scene together; :attr:`RobotModel.scene` is the first one.
 
-        Args:
-            allowed: Pairs that may touch.
-            objects: Objects of the world.
-
         Raises:
             SceneError: Two things have one name, a link is unknown, or a padding is not usable.
         """
@@ -172,17 +169,10 @@ class PlanningScene:
             },
         )
 
-    def without_objects(self) -> PlanningScene:
-        """Return the robot alone: self-collision."""
-        return self.with_contents(objects={}, attached_bodies={})
-
     def attached(
         self, name: str, link: str, positions: Array, touch_links: Iterable[str] = ()
     ) -> PlanningScene:
         """Return the scene with an object of the world taken up by a link, where both are.
-
-        Args:
-            touch_links: Links that it may touch besides.
 
         Raises:
             SceneError: There is no such object in the world, or no such link.
@@ -249,10 +239,6 @@ class PlanningScene:
         An object that goes leaves nothing in the matrix: the next of its name is checked. Entries
         of the octomap stay.
 
-        Args:
-            objects: Objects of the world by name.
-            allowed: Pairs that may touch.
-
         Raises:
             SceneError: Two things have one name, a link is unknown, or a padding is not usable.
         """
@@ -279,15 +265,9 @@ class PlanningScene:
         """
         if kinematics is self.kinematics:
             return self
-        return PlanningScene(
-            kinematics,
-            self.link_shapes,
-            self.allowed,
-            self.objects.values(),
-            self.attached_bodies.values(),
-            padding=self.padding,
-            scale=self.scale,
-        )
+        moved = copy.copy(self)
+        moved.kinematics = kinematics
+        return moved.with_contents()
 
     def between(self, groups: Sequence[Sequence[str]]) -> PlanningScene:
         """Return what groups that move at the same time may bring together.
@@ -327,7 +307,6 @@ class PlanningScene:
 
         Args:
             first: Name of a link or object; ``*``, ``?`` and ``[...]`` as in file names.
-            second: The same.
             allowed: Whether they may touch; False for pairs that are to be checked.
 
         Raises:

@@ -47,7 +47,6 @@ class FreeMotion:
 
         Args:
             check: Has the last word on states and paths, in the scene of the motion.
-            draw: Source of the random numbers.
         """
         self._limits, self._check, self._draw = limits, check, draw
         self._constraints = constraints

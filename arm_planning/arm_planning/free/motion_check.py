@@ -44,7 +44,6 @@ class MotionCheck:
         """Prepare.
 
         Args:
-            check: Measures in the scene of the search.
             ends: Starts and goals: on the way a pair may be as near as it is there.
             constraints: What holds everywhere; None for nothing.
         """
@@ -85,7 +84,6 @@ class MotionCheck:
 
         Args:
             begin: Joint positions in [rad] (n), known to be free.
-            end: Joint positions in [rad] (n).
         """
         way = end - begin
         motion = float((self._rates @ np.abs(way)).max(initial=0.0))

@@ -81,7 +81,6 @@ def rrt_connect(
 
     Args:
         goals: Joint positions in [rad] (n), free; one of them is reached.
-        sample: Draws joint positions.
         further: Goals that are looked for meanwhile: each is one, or a try that found none.
     """
     for goal in goals:

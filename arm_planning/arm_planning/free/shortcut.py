@@ -27,7 +27,6 @@ def shortened(
 
     Args:
         places: Joint positions in [rad] (m, n) with straight motions between them.
-        draw: Source of the random numbers.
     """
     places = _without_needless(places, check, expired)
     failures = 0

@@ -31,7 +31,6 @@ def timed_path(places: Array, limits: JointLimits, check: ConstrainedCheck) -> P
 
     Args:
         places: Joint positions in [rad] (m, n), with straight motions between them.
-        check: Checks the path as it is after timing.
     """
     stops: set[int] = set()
     corners = set(range(1, len(places) - 1))

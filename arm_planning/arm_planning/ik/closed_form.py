@@ -63,8 +63,6 @@ class ClosedForm:
         Args:
             points: A point of each axis in the root link in [m] (6, 3), all joints at zero.
             axes: Directions of the axes (6, 3).
-            wrist: Where the last three axes meet in [m].
-            tip: Pose of the link.
         """
         base = _basis(axes[0], points[1] - points[0])
         self._base = base.T
@@ -101,11 +99,7 @@ class ClosedForm:
 
     @classmethod
     def of(cls, link: LinkKinematics) -> ClosedForm | None:
-        """Return the closed form of a link; None for an arm of another build.
-
-        Args:
-            link: The link that is to be placed.
-        """
+        """Return the closed form of a link; None for an arm of another build."""
         kinematics = link.kinematics
         native = kinematics.native
         last = kinematics.parent_joint(link.link)

@@ -72,12 +72,7 @@ class LinkKinematics:
 
 
 def pose_error(target: Pose, actual: Pose) -> Array:
-    """Return the way and the rotation vector (6) that lead from a pose to another, in its frame.
-
-    Args:
-        target: The pose that is wanted.
-        actual: The pose that is there.
-    """
+    """Return the way and the rotation vector (6) from a pose to another, in its frame."""
     error = np.empty(6)
     error[:3] = target.position - actual.position
     error[3:] = pin.log3(target.rotation @ actual.rotation.T)

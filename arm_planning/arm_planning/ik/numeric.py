@@ -48,8 +48,6 @@ def descend(link: LinkKinematics, pose: Pose, start: Array, lower: Array, upper:
 
     Args:
         pose: Where it is wanted, in the root link.
-        lower: Least positions in [rad].
-        upper: Greatest positions in [rad].
     """
     positions = np.clip(start, lower, upper)
     best, stalled = np.inf, 0

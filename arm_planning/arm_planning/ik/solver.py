@@ -242,9 +242,6 @@ class IkSolver:
 def check_pose(pose: Pose) -> None:
     """Refuse a pose that is none.
 
-    Args:
-        pose: The pose, from outside.
-
     Raises:
         PlanningError: The rotation is none.
         CommandError: A number is not finite, or there are too few or too many.

@@ -39,8 +39,6 @@ def curve_path(
 
     Args:
         curve: The curve; it begins where the link is.
-        limits: Limits of the link, without them.
-        name: What the motion is called in messages.
 
     Raises:
         PlanningError: The curve cannot be followed; the message says where.

@@ -68,7 +68,6 @@ class IndustrialPlanner:
         """Return the motion of a request.
 
         Args:
-            request: Its planner is PTP, LIN or CIRC.
             check: Finds contact in a scene; None does not look.
 
         Raises:

@@ -22,11 +22,7 @@ NO_WAY = 1e-9  # greatest way of a joint that counts as none in [rad]
 
 
 def ptp_path(start: Array, goal: Array, limits: JointLimits) -> FullSpeedPath:
-    """Return the path at full speed.
-
-    Args:
-        goal: Joint positions at its end in [rad].
-    """
+    """Return the path at full speed."""
     way = goal - start
     size = np.abs(way)
     if size.max() < NO_WAY:

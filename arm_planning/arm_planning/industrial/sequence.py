@@ -57,9 +57,6 @@ class SequenceItem:
 def check_radii(radii: Sequence[float]) -> None:
     """Refuse what are no blend radii of a sequence, by the rules of Pilz' planner.
 
-    Args:
-        radii: That of each item in [m].
-
     Raises:
         PlanningError: There is none, one is negative or not finite, or the last is not 0.
     """
@@ -76,10 +73,6 @@ def check_radii(radii: Sequence[float]) -> None:
 
 def check_overlap(radii: Sequence[float], corners: Sequence[Array], first: int) -> None:
     """Refuse blends that overlap.
-
-    Args:
-        radii: Blend radius of each motion of a group in [m].
-        first: Number of the first motion.
 
     Raises:
         PlanningError: The spheres of two neighbours overlap.
@@ -101,8 +94,6 @@ def joined(
 
     Args:
         parts: The motions, two or more; each begins where the one before ends.
-        link: The link whose way the radii limit.
-        first: Number of the first motion.
 
     Raises:
         PlanningError: A motion is shorter than the radius, or a blend does not stay in its sphere.

@@ -44,11 +44,7 @@ class FullSpeedPath:
 
 
 def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ...]]:
-    """Return a path from rest to rest within the limits, and where it is slower for them.
-
-    Args:
-        full: The path at full speed.
-    """
+    """Return a path from rest to rest within the limits, and where it is slower for them."""
     if not full.path.coefficients[:, 1:].any():  # it stands still
         return full.path, full.notes
     path = _from_rest_to_rest(full)

@@ -93,8 +93,6 @@ def trace(
 
     Args:
         curve: The curve; it begins where the link is.
-        duration: How long the curve takes at the full speed in [s].
-        name: What the motion is called in messages.
 
     Raises:
         PlanningError: A joint would leave its range, the arm would become singular, or the curve

@@ -35,7 +35,6 @@ class PlannerConfigs:
 
         Args:
             planner_id: What a request has: the name, ``group[name]``, the group, or nothing.
-            group: The group of the request.
         """
         name = planner_id.removeprefix(f'{group}[').removesuffix(']')
         return self.defaults.get(group, '') if name in {'', group} else name

@@ -82,8 +82,6 @@ def of_nothing(
 
     Args:
         places: Where they come from, of those that come from a file.
-        groups: Names of the groups of the robot.
-        controllers: Names of the controllers that follow trajectories.
     """
     lines = []
     for above, kind, known in (

@@ -79,11 +79,7 @@ class ExecuteAction:
 
 
 def conclude(handle: Any, code: PlanningCode) -> None:  # noqa: ANN401
-    """Give a goal the status of an outcome, as MoveIt does.
-
-    Args:
-        code: How it ended.
-    """
+    """Give a goal the status of an outcome, as MoveIt does."""
     if code is PlanningCode.SUCCESS:
         handle.succeed()
     elif code is PlanningCode.PREEMPTED and handle.is_cancel_requested:

@@ -102,7 +102,6 @@ class TrajectoryExecution:
         Args:
             received: Returns where joints are in [rad], by joint; raises PlanningError where
                 that is not known.
-            limits: When an execution is refused or ended.
             followers: Joints that follow others, which no controller takes.
         """
         self._followers = frozenset(followers)
@@ -137,26 +136,17 @@ class TrajectoryExecution:
         return [each for each in self._running if each.ending is None]
 
     def on_start(self, begun: Callable[[], None]) -> None:
-        """Have something called when one more trajectory is on its way.
-
-        Args:
-            begun: Called in the executor.
-        """
+        """Have something called when one more trajectory is on its way."""
         self._begun = begun
 
     def on_failure(self, find_out: Callable[[Execution], None]) -> None:
-        """Have somebody find out why a controller gave up, who answers with :meth:`explain`.
-
-        Args:
-            find_out: Called in the executor.
-        """
+        """Have somebody find out why a controller gave up, who answers with :meth:`explain`."""
         self._find_out = find_out
 
     def explain(self, execution: Execution, change: str) -> None:
         """Take why a controller gave up.
 
         Args:
-            execution: What it followed.
             change: How the scene has changed that it had to; empty where its own words alone
                 count.
         """
@@ -266,11 +256,7 @@ class TrajectoryExecution:
         code: PlanningCode = PlanningCode.PREEMPTED,
         reason: str = 'stopped on request',
     ) -> None:
-        """Have it stopped; ``done`` is called when the controllers have.
-
-        Args:
-            reason: The same in words.
-        """
+        """Have it stopped; ``done`` is called when the controllers have."""
         if execution.is_over:
             return
         if execution.ending is not None:

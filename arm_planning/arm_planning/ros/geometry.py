@@ -49,9 +49,6 @@ def pose_of(
 ) -> Pose:
     """Return a geometry_msgs/Pose.
 
-    Args:
-        code: Of the error.
-
     Raises:
         PlanningError: A number is not finite, or the quaternion is none.
     """
@@ -68,7 +65,6 @@ def placement(
 
     Args:
         quaternion: x, y, z, w.
-        code: Of the error.
 
     Raises:
         PlanningError: A number is not finite, or the quaternion is none.
@@ -127,9 +123,6 @@ def plane_message(plane: Plane) -> PlaneMessage:
 
 def check_mesh(message: Any, what: str) -> None:  # noqa: ANN401
     """Make sure that a shape_msgs/Mesh is a body.
-
-    Args:
-        what: What it is a part of.
 
     Raises:
         PlanningError: It has no triangle or no volume, or names a corner that there is not.

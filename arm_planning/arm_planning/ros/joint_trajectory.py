@@ -59,11 +59,7 @@ def part_of(trajectory: Any, joints: Sequence[str]) -> JointTrajectory:  # noqa:
 
 
 def from_start(trajectory: Any, start: Sequence[float]) -> JointTrajectory:  # noqa: ANN401
-    """Return a trajectory with the way to its first point, where that is later than its begin.
-
-    Args:
-        start: Where its joints stand at its begin in [rad] (n).
-    """
+    """Return a trajectory with the way to its first point, where that is later than its begin."""
     first = trajectory.points[0]
     if seconds(first.time_from_start) <= 0.0:
         return trajectory

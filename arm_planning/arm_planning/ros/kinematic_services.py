@@ -47,11 +47,6 @@ class KinematicServices:
         robot: RobotGroups,
         settings: MoveItSettings | None = None,
     ) -> None:
-        """Offer the services.
-
-        Args:
-            settings: What holds where a request does not say so.
-        """
         self._node, self._monitor = node, monitor
         self._kinematics = GroupKinematics(robot, settings)
         background.serve(GetPositionIK, 'compute_ik', self._ik, _refuse)
@@ -87,7 +82,6 @@ class GroupKinematics:
 
         Args:
             robot: The robot, for this thread alone.
-            settings: What holds where a request does not say so.
         """
         self._robot, self._settings = robot, settings or MoveItSettings()
         self._solvers: dict[tuple[str, str], tuple[RobotModel, IkSolver]] = {}

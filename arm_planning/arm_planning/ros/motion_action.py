@@ -130,11 +130,6 @@ class MotionAction:
         background: Background,
         execution: TrajectoryExecution,
     ) -> None:
-        """Offer it.
-
-        Args:
-            planning: What shows plans.
-        """
         self._node, self._kind, self._planning = node, kind, planning
         self._background, self._execution = background, execution
         self._goals: dict[bytes, _Goal] = {}

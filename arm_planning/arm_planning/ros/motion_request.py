@@ -68,11 +68,6 @@ class RequestReader:
         positions: Array,
         settings: MoveItSettings | None = None,
     ) -> None:
-        """Read for a group.
-
-        Args:
-            settings: What holds where a request does not say so.
-        """
         self._settings = settings or MoveItSettings()
         self._model, self._snapshot, self._positions = model, snapshot, positions
         place = dict(zip(snapshot.scene.kinematics.joints, positions.tolist(), strict=True))
@@ -168,9 +163,6 @@ class RequestReader:
 
     def pose(self, message: Any, frame: str, what: str) -> Pose:  # noqa: ANN401
         """Return a geometry_msgs/Pose of a frame in the root link.
-
-        Args:
-            what: What it is the pose of.
 
         Raises:
             PlanningError: The frame is unknown, or a number is none.
@@ -345,9 +337,6 @@ class RequestReader:
 def planning_time(given: float) -> float:
     """Return the time for planning in [s]; 0 and less is one that was not given, as in MoveIt.
 
-    Args:
-        given: The time of the message in [s].
-
     Raises:
         PlanningError: It is not finite.
     """
@@ -360,10 +349,6 @@ def planning_time(given: float) -> float:
 
 def scaling_factor(what: str, value: float, default: float = 1.0) -> float:
     """Return a scaling factor; 0 is one that was not given.
-
-    Args:
-        value: The factor of the message.
-        default: The factor where none was given.
 
     Raises:
         PlanningError: It is negative, or above 1.

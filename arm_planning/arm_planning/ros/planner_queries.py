@@ -22,11 +22,6 @@ class PlannerQueries:
     """Answers about planners; none has anything to set."""
 
     def __init__(self, node: Node, planners: PlannerConfigs) -> None:
-        """Offer query_planner_interface, get_planner_params and set_planner_params.
-
-        Args:
-            planners: Configurations of planners of a package.
-        """
         self._log, self._planners = node.get_logger(), planners
         node.create_service(QueryPlannerInterfaces, 'query_planner_interface', self._interfaces)
         node.create_service(GetPlannerParams, 'get_planner_params', self._get)

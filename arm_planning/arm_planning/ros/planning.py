@@ -60,11 +60,6 @@ class GroupPlanners:
     def __init__(
         self, robot: RobotGroups, cartesian_limits: CartesianLimits | None = None
     ) -> None:
-        """Make none yet.
-
-        Args:
-            cartesian_limits: Limits of LIN and CIRC; None has the defaults.
-        """
         self._robot, self._cartesian_limits = robot, cartesian_limits
         self._planners: dict[str, tuple[RobotModel, Planner]] = {}
 
@@ -98,12 +93,6 @@ class PlanningThreads:
         settings: MoveItSettings | None = None,
         cartesian_limits: CartesianLimits | None = None,
     ) -> None:
-        """Offer plan_kinematic_path, plan_sequence_path and what belongs to them.
-
-        Args:
-            settings: What holds where a request does not say so.
-            cartesian_limits: Limits of LIN and CIRC; None has the defaults.
-        """
         self._monitor, self._background, self._settings = monitor, background, settings
         self._make_robot, self._cartesian_limits = robot, cartesian_limits
         self._planners: dict[str, GroupPlanners] = {}
@@ -312,11 +301,7 @@ def sequence_group(items: Sequence[Any]) -> str:
 
 
 def sequence_response(code: MoveItErrorCodes, planned: PlannedMotion | None) -> Any:  # noqa: ANN401
-    """Return a moveit_msgs/MotionSequenceResponse.
-
-    Args:
-        code: How it ended.
-    """
+    """Return a moveit_msgs/MotionSequenceResponse."""
     response = MotionSequenceResponse(error_code=code)
     if planned is not None:
         response.sequence_start = planned.start

@@ -45,9 +45,6 @@ class RobotGroups:
     ) -> None:
         """Read the robot.
 
-        Args:
-            limits: The table ``joint_limits`` of a limits file.
-
         Raises:
             ModelError: They do not make a robot, or the SRDF has no group.
         """

@@ -93,11 +93,7 @@ class SceneMonitor:
         node.create_timer(REST_PERIOD, self._publish_rest)
 
     def on_change(self, listener: Callable[[], None]) -> None:
-        """Have something called after each change of the scene.
-
-        Args:
-            listener: What is called, in the executor.
-        """
+        """Have something called after each change of the scene."""
         self._listeners.append(listener)
 
     def received(self, joints: Sequence[str]) -> Mapping[str, float]:

@@ -25,9 +25,6 @@ class GroupRun:
 def group_runs(items: Sequence[Any]) -> list[GroupRun]:
     """Return the items of a moveit_msgs/MotionSequenceRequest by group, in their order.
 
-    Args:
-        items: Its items, one or more.
-
     Raises:
         PlanningError: An item has no group, a radius is none or blends two groups, or an item that
             is not the first of its group has a start state.

@@ -92,11 +92,7 @@ class CommandArbiter:
         self.active, self.target = Source.TARGET, target
 
     def stop(self, outcome: Outcome) -> None:
-        """Come to rest: a trajectory on its path, anything else in the shortest time.
-
-        Args:
-            outcome: How the motion ends.
-        """
+        """Come to rest: a trajectory on its path, anything else in the shortest time."""
         if self.active is Source.TRAJECTORY and self.execution is not None:
             self.execution.stop(outcome)
             return

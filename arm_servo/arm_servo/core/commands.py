@@ -20,9 +20,6 @@ ROTATION_TOLERANCE = 1e-3  # how far a rotation may be from one, for rounding of
 def by_joint(model: RobotModel, values: Mapping[str, float], what: str) -> tuple[Array, Mask]:
     """Put numbers in the order of the joints.
 
-    Args:
-        values: Numbers by joint.
-
     Returns:
         The numbers, 0 where none is given, and the mask of those that are.
 

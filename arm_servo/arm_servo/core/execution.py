@@ -100,8 +100,6 @@ class Execution:
         """Accept a trajectory.
 
         Args:
-            generator: Plans how to catch up.
-            speed_scaling: Speed scaling to start with, 0 to 1.
             wait: How long to wait at rest in [s]; the state is one of rest then.
 
         Raises:
@@ -148,7 +146,6 @@ class Execution:
         """Return the first contact on its path; for any thread.
 
         Args:
-            check: Looks for it.
             begin: Time of the path from which on it is looked for in [s].
         """
         found = check.contact(
@@ -175,20 +172,12 @@ class Execution:
             self._waiting -= time
 
     def stop(self, outcome: Outcome) -> None:
-        """Come to rest on the path, and end.
-
-        Args:
-            outcome: How it ends then.
-        """
+        """Come to rest on the path, and end."""
         if self.phase in {Phase.FOLLOWING, Phase.SETTLING}:
             self.phase, self.ending = Phase.STOPPING, outcome
 
     def end(self, outcome: Outcome) -> None:
-        """End at once, unless it has ended: something else moves the arm now, or nothing.
-
-        Args:
-            outcome: How it ended.
-        """
+        """End at once, unless it has ended: something else moves the arm now, or nothing."""
         if self.phase is not Phase.DONE:
             self.ending = self.ending or outcome
             self.phase = Phase.DONE

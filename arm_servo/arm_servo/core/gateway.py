@@ -225,19 +225,11 @@ class CommandGateway:
         return set_point
 
     def refuse_earlier(self, reason: str) -> None:
-        """Refuse what was requested so far and has not begun; for any thread.
-
-        Args:
-            reason: What has happened since, with the remedy.
-        """
+        """Refuse what was requested so far and has not begun; for any thread."""
         self._interrupt(reason)
 
     def fail(self, reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> None:
-        """Bring the arm to rest, a trajectory on its path; the motion ends with the reason.
-
-        Args:
-            reason: What has gone wrong, and where.
-        """
+        """Bring the arm to rest, a trajectory on its path; the motion ends with the reason."""
         self._interrupt(reason)
         self._core.fail(reason, code)
 
@@ -247,7 +239,6 @@ class CommandGateway:
         """Pass a cycle in which the arm does not follow; commands are refused.
 
         Args:
-            blocked: Why, with the remedy.
             ages: How old the measured values of each joint are in [s].
         """
         if self._snapshot.set_point is not None:

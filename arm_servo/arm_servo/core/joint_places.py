@@ -21,12 +21,7 @@ class JointPlaces:
     moving: Collection[str] = frozenset()  # those that move
 
     def next(self, places: Mapping[str, float], commanded: Collection[str]) -> JointPlaces:
-        """Return the next look; a joint that was not there before counts as one that moves.
-
-        Args:
-            places: Where the joints are, by joint.
-            commanded: Joints that are commanded to move.
-        """
+        """Return the next look; a joint that was not there before counts as one that moves."""
         moved = {
             joint
             for joint, place in places.items()

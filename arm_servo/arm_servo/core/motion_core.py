@@ -212,9 +212,6 @@ class MotionCore:
     def use_scene(self, scene: PreparedScene) -> Execution | None:
         """Let another scene count from now on, for jogs, targets and trajectories.
 
-        Args:
-            scene: What :meth:`prepare_scene` returned.
-
         Returns:
             The trajectory under way, whose path is to be checked again beside the cycle; see
             :meth:`conclude_check`. The safety filter keeps it from contact until then. None where
@@ -232,7 +229,6 @@ class MotionCore:
 
         Args:
             scene: The scene; nothing is done when it does not count any more.
-            problem: What is in the way; empty when nothing is.
         """
         if scene is not self._scene or execution is not self._distances.unchecked:
             return

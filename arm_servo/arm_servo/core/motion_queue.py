@@ -107,9 +107,6 @@ class MotionQueue:
         """Begin empty.
 
         Args:
-            orders: What the cycle carries out.
-            order: Which command counts.
-            worker: Prepares motions, one after the other.
             clock: Steady time, the one of the cycle.
             rest: Where the arm stands while others have its drives: from there a motion is tried
                 before the drives are taken from them. None where the arm follows.
@@ -123,11 +120,7 @@ class MotionQueue:
         self._preparing: MotionCommand | None = None
 
     def request(self, request: MotionRequest, get_ready: Callable[[], object]) -> MotionCommand:
-        """Have a motion prepared, and begun when it is found to be clear.
-
-        Args:
-            get_ready: Gets the drives back.
-        """
+        """Have a motion prepared, and begun when it is found to be clear."""
         with self._lock:
             command = MotionCommand(request, self._order.number(), self._clock(), get_ready)
             is_full = len(self._waiting) >= MAX_QUEUED_MOTIONS

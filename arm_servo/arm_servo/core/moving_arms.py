@@ -166,12 +166,7 @@ class MovingArms:
         self._stops[number] = stop
 
     def least(self, number: int, plan: Plan, begin: float, within: float) -> LeastClearance:
-        """Return the least distance of an arm that stops to the others, which stop too.
-
-        Args:
-            plan: Its stop.
-            within: Distance of interest in [m].
-        """
+        """Return the least distance of an arm that stops to the others, which stop too."""
         stops = [*self._stops]
         stops[number] = _Stop.of(plan, begin)
         known = [
@@ -242,11 +237,7 @@ class Neighbours:
         return self._arms.version
 
     def least(self, stop: Plan, begin: float, within: float) -> LeastClearance:
-        """Return the least distance to the others on a stop, while they stop too.
-
-        Args:
-            within: Distance of interest in [m].
-        """
+        """Return the least distance to the others on a stop, while they stop too."""
         return self._arms.least(self._number, stop, begin, within)
 
     def stops(self, plan: Plan, begin: float) -> None:

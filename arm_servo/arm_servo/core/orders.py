@@ -90,9 +90,6 @@ class CommandOrder:
     def admit(self, source: Source, number: int, since: float, cycle: Cycle) -> None:
         """Refuse a motion that is void before it began, or that the arm cannot follow.
 
-        Args:
-            since: When its last step was ordered in [s].
-
         Raises:
             NotReadyError: It is refused.
         """

@@ -28,7 +28,6 @@ class PreparedScene:
         Args:
             near: Where the arm is in [rad]: every pair is measured there, so that the cycle has
                 not to. None where that is not known.
-            checks_paths: Whether paths are looked at.
         """
         clearances = Clearances(scene)
         if near is not None:

@@ -40,12 +40,6 @@ class ClearanceFloor:
     """
 
     def __init__(self, least: LeastOnStop, brake: Callable[[RobotState], Plan | None]) -> None:
-        """Begin with nothing known.
-
-        Args:
-            least: Measures stops.
-            brake: Plans the shortest stop of a state.
-        """
         self._least, self._brake = least, brake
         self._clearance = 0.0  # for which the floor was found
         self._floor: float | None = None
@@ -60,8 +54,6 @@ class ClearanceFloor:
         """Return which links a stop would bring too near, and how near; None for none.
 
         Args:
-            state: The state that is not left yet.
-            now: Steady time of that in [s].
             clearance: Least distance between links in [m]; None is any.
         """
         if clearance is None:

@@ -19,11 +19,6 @@ class SceneExchange:
     """Has scenes prepared by who brings them, taken by the cycle, and paths checked in them."""
 
     def __init__(self, core: MotionCore, orders: OrderQueue, worker: Executor) -> None:
-        """Begin with the scene of the core.
-
-        Args:
-            orders: What the cycle carries out.
-        """
         self._core, self._orders, self._worker = core, orders, worker
         self._versions = count(1)
 

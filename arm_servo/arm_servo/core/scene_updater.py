@@ -81,9 +81,6 @@ class SceneUpdater:
     def update(self, joints: JointPlaces, now: float) -> None:
         """Apply what is new, if it is known where the group is; an equal scene changes nothing.
 
-        Args:
-            joints: Where the joints of the robot are.
-
         Raises:
             ArmError: The scene is refused; the one before counts.
         """

@@ -30,7 +30,6 @@ class SingleTarget:
 
         Args:
             max_speed: Greatest speed of a joint on the way there in [rad/s].
-            generator: Plans at full speed.
         """
         self.target = frozen(target)
         self.outcome: Outcome | None = None

@@ -34,11 +34,7 @@ class StopDistances:
         self.unchecked: Execution | None = None
 
     def update(self, *, moving: bool) -> None:
-        """See what moves the arm in this cycle; a jog counts until the arm rests after it.
-
-        Args:
-            moving: The arm moves.
-        """
+        """See what moves the arm in this cycle; a jog counts until the arm rests after it."""
         jogged = self._arbiter.active in {Source.JOG, Source.NONE}
         self._jogged = jogged or (self._jogged and moving and self._arbiter.brakes)
 
@@ -61,12 +57,7 @@ class StopDistances:
         return ARM_DISTANCE if self._settings.check_self_collision else None
 
     def refusal(self, limiter: Limiter, *, near_arm: bool) -> str:
-        """Say why a motion cannot go on, and what to do.
-
-        Args:
-            limiter: The collision ahead.
-            near_arm: It is with another arm.
-        """
+        """Say why a motion cannot go on, and what to do."""
         if near_arm:
             return (
                 f'{limiter.name} would come nearer than {ARM_DISTANCE * 1e3:g} mm to another arm; '

@@ -39,11 +39,6 @@ class FollowingWatch:
     """
 
     def __init__(self, joints: JointLimits, limits: FollowingLimits, period: float) -> None:
-        """Know no command yet.
-
-        Args:
-            limits: When it does not follow.
-        """
         self._joints = joints
         self._limits = limits
         self._commands = np.zeros((math.ceil(limits.delay / period) + 1, len(joints)))
@@ -75,9 +70,6 @@ class FollowingWatch:
 
         Drives need not stand exactly where they were sent, so what counts is where they stood.
         Encoders are noisy: how much so is learned at rest.
-
-        Args:
-            quiet: Nothing is commanded.
         """
         self._still = self._still + 1 if quiet else 0
         if self._still <= 1:

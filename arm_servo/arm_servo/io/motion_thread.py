@@ -46,7 +46,6 @@ class MotionCycle:
 
         Args:
             output: Takes the set-points while something moves, and the last at rest.
-            watch: Compares the two.
         """
         self._gateway, self._feedback, self._output = gateway, feedback, output
         self._state = RobotState.at_rest(np.zeros(len(gateway.model)))

@@ -36,8 +36,6 @@ def declare_output(node: Node, prefix: str, topic: str, kind: str) -> OutputPara
 
     Args:
         prefix: Before each name, with its dot.
-        topic: Default of the topic.
-        kind: Default of its type.
 
     Raises:
         ModelError: The type is unknown, or does not carry what is to be in it.
@@ -69,11 +67,6 @@ class TopicOutput:
     def __init__(
         self, node: Node, parameters: OutputParameters, joints: list[str], period: float
     ) -> None:
-        """Advertise.
-
-        Args:
-            period: Time from the message to its point in [s].
-        """
         kind = Float64MultiArray if parameters.kind == ARRAY else JointTrajectory
         self._publisher = node.create_publisher(kind, parameters.topic, 10)
         self._parameters, self._joints = parameters, joints

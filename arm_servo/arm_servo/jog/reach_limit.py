@@ -83,7 +83,6 @@ class ReachLimit:
 
         Args:
             jacobian_at: Scaled Jacobian of joint positions.
-            found: The directions there.
             command: Scaled twist that is asked (6).
         """
         self._remember(position, good=bool(command.any()) and not found.damped)
@@ -122,7 +121,6 @@ class ReachLimit:
 
         Args:
             jacobian_at: Scaled Jacobian of joint positions.
-            found: The directions there.
             command: Scaled twist that is asked (6).
         """
         if not (found.lost.any() and command.any()):

@@ -54,7 +54,6 @@ class Directions:
 
         Args:
             command: Scaled twist that is asked (6).
-            fastest: Greatest speed along the last joint direction in [rad/s].
         """
         asked, least = abs(float(command @ self.tool[:, -1])), self.least
         needed = asked * least / max(fastest, MIN_SPEED) - least * least
@@ -112,7 +111,6 @@ def distance_to_singularity(
 
     Args:
         jacobian_at: Scaled Jacobian of joint positions.
-        found: The directions there.
 
     Returns:
         The way in [rad], below zero against the direction; infinity where there is none.
@@ -136,7 +134,6 @@ def way_out(
 
     Args:
         jacobian_at: Scaled Jacobian of joint positions.
-        found: The directions there.
         command: Scaled twist (6).
 
     Returns:

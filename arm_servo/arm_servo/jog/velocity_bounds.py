@@ -116,7 +116,6 @@ class VelocityBounds:
 
         Args:
             forces: How hard the bounds (n) and the rows (m) press, with the sense of the bound.
-            factor: What is left of the asked speed.
         """
         count, share = len(self._limits), min(max(factor, 0.0), 1.0)
         found = []

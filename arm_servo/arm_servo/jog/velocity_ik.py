@@ -81,11 +81,6 @@ class VelocityIk:
     """
 
     def __init__(self, model: RobotModel, settings: IkSettings | None = None) -> None:
-        """Prepare.
-
-        Args:
-            settings: Weights and margins.
-        """
         self._model = model
         self._settings = settings or IkSettings()
         self._limits = model.limits
@@ -129,12 +124,7 @@ class VelocityIk:
     def joints(
         self, state: RobotState, velocity: Array, commanded: Mask, period: float
     ) -> IkAnswer:
-        """Find joint speeds near asked ones; joints that are not commanded are held.
-
-        Args:
-            velocity: Asked speeds in [rad/s].
-            commanded: Mask of the joints that the command moves.
-        """
+        """Find joint speeds near asked ones; joints that are not commanded are held."""
         self._reach_limit.forget()
         weight = np.where(commanded, 1.0, self._settings.hold_weight)
         jacobian, command = np.diag(weight), weight * velocity

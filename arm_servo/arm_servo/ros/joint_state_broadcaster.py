@@ -112,7 +112,6 @@ class JointStateBroadcaster:
         Args:
             others: Drives that are no joints of the arm; they publish ``<drive>/joint_states``.
             mimics: Joints that follow one that has a drive.
-            active: Whether it publishes from the start.
         """
         self.active = active
         self._node, self._gateway = node, gateway

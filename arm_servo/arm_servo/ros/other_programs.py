@@ -13,11 +13,7 @@ OWN_SERVICE = 'pause'  # service that the trajectory controller of this package 
 
 
 def watch_other_programs(nodes: Sequence[Node], outputs: Sequence[str] = ()) -> None:
-    """Log an error for each program that moves the arm, too, when it appears.
-
-    Args:
-        outputs: Topics on which set-points leave.
-    """
+    """Log an error for each program that moves the arm, too, when it appears."""
     known: set[str] = set()
 
     def look() -> None:

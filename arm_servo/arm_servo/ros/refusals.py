@@ -23,11 +23,7 @@ class LoggedReasons:
         self._logged = ('', -math.inf)
 
     def is_new(self, reason: str, now: float) -> bool:
-        """Return whether a reason is to be logged; one that differs in numbers only is not.
-
-        Args:
-            reason: Why something was refused.
-        """
+        """Return whether a reason is to be logged; one that differs in numbers only is not."""
         kind, (logged, seen) = NUMBER_PATTERN.sub('', reason), self._logged
         self._logged = (kind, now)
         return kind != logged or now - seen >= REPEAT_PERIOD

@@ -41,11 +41,6 @@ class CatchUpInterpolator:
     """
 
     def __init__(self, limits: JointLimits, generator: OnlineTrajectoryGenerator) -> None:
-        """Prepare.
-
-        Args:
-            generator: Plans the way to the interception.
-        """
         self._limits = limits
         self._generator = generator
         self._plan: Plan | None = None

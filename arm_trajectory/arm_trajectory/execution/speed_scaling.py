@@ -84,11 +84,7 @@ class TrajectoryTimer:
         self._wanted = self.speed_scaling = speed_scaling
 
     def ahead(self, time: float) -> tuple[float, float, float]:
-        """Foresee time, speed scaling and change, which goes on evenly until it is as wanted.
-
-        Args:
-            time: How far ahead in [s].
-        """
+        """Foresee time, speed scaling and change, which goes on evenly until it is as wanted."""
         gap = self._wanted - self.speed_scaling
         if self.change * gap <= 0.0:
             return self.time + self.speed_scaling * time, self.speed_scaling, self.change
@@ -105,11 +101,7 @@ class TrajectoryTimer:
         return self.speed_scaling == 0.0 and self.change == 0.0
 
     def step(self, path: Path, wanted: float, period: float) -> None:
-        """Advance.
-
-        Args:
-            wanted: Speed scaling to reach.
-        """
+        """Advance."""
         self._wanted = wanted
         if self.speed_scaling == wanted and self.change == 0.0:
             self.time += self.speed_scaling * period

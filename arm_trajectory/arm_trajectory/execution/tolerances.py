@@ -28,7 +28,6 @@ class Tolerances:
 
         Args:
             position: Errors of position in [rad].
-            velocity: Errors of velocity in [rad/s].
         """
         for error, tolerance, what, unit in (
             (position, self.position, 'position', 'rad'),

@@ -25,12 +25,7 @@ class Excess:
 
 
 def farthest_beyond(path: Path, lower: Array, upper: Array) -> Excess | None:
-    """Return the place where a path is farthest beyond a range; None where it keeps within.
-
-    Args:
-        lower: Least positions in [rad].
-        upper: Greatest positions in [rad].
-    """
+    """Return the place where a path is farthest beyond a range; None where it keeps within."""
     scaled = path.coefficients * (path.durations[:, None] ** np.arange(6.0))[:, :, None]
     control = path.control_values
     too_low = (control < lower - ROUNDING_TOLERANCE).any(axis=1)

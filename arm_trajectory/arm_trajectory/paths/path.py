@@ -61,12 +61,7 @@ def shifted(coefficients: Array, by: Array) -> Array:
 
 
 def linear(start: float, duration: float, begin: Array, end: Array) -> Segment:
-    """Return the straight segment between two positions.
-
-    Args:
-        begin: Positions at its begin in [rad].
-        end: Positions at its end in [rad].
-    """
+    """Return the straight segment between two positions."""
     coefficients = np.zeros((6, len(begin)))
     coefficients[0], coefficients[1] = begin, (end - begin) / duration
     return Segment(start, duration, coefficients)
@@ -96,7 +91,6 @@ def quintics(durations: Array, positions: Array, velocities: Array, acceleration
     """Return the coefficients (k, 6, n) of the quintics from each place to the next.
 
     Args:
-        durations: How long they last in [s] (k).
         positions: Positions in [rad] (k + 1, n).
         velocities: Velocities in [rad/s] (k + 1, n).
         accelerations: Accelerations in [rad/s2] (k + 1, n).

@@ -54,7 +54,6 @@ class PathCheck:
 
         Args:
             positions_at: Joint positions in [rad] (k, n) at times in [s] (k).
-            duration: How long the way lasts in [s].
         """
         if not self._clearances.pairs:
             return None

@@ -47,11 +47,7 @@ class Points:
         )
 
     def slowed(self, factor: float) -> Points:
-        """Return the same points with more time.
-
-        Args:
-            factor: How many times the time.
-        """
+        """Return the same points with more time."""
         return Points(
             self.times * factor,
             self.positions,
@@ -61,11 +57,7 @@ class Points:
         )
 
     def delayed(self, by: float) -> Points:
-        """Return the same points later.
-
-        Args:
-            by: How much later in [s].
-        """
+        """Return the same points later."""
         return replace(self, times=self.times + by)
 
     def since(self, place: int) -> Points:
@@ -100,11 +92,7 @@ def upcoming_points(
 
 
 def refuse(reason: str, code: GoalCode = GoalCode.INVALID_GOAL) -> GoalError:
-    """Return the refusal of a goal.
-
-    Args:
-        code: Code of the action's result.
-    """
+    """Return the refusal of a goal."""
     return GoalError(code, reason)
 
 

@@ -67,11 +67,7 @@ def rounded(path: Path, limits: JointLimits, *, from_rest: bool = True) -> Path:
 
 
 def run_out(start: float, end: RobotState, limits: JointLimits) -> list[Segment]:
-    """Return how a path that ends with a velocity comes to rest behind its end.
-
-    Args:
-        start: When the path ends in [s].
-    """
+    """Return how a path that ends with a velocity comes to rest behind its end."""
     still = np.zeros_like(end.velocity)
     duration = 2.0 * float(_needed(end.velocity[None], still[None], limits)[0])
     if duration == 0.0:

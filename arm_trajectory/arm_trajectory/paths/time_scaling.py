@@ -66,11 +66,6 @@ class Timing:
     """What a path asks of the joints, and the scaling that brings it within their limits."""
 
     def __init__(self, path: Path, limits: JointLimits) -> None:
-        """Look at a path.
-
-        Args:
-            path: A path without corners.
-        """
         self._path = path
         self._limits = limits
         places, offsets = _places(path)

@@ -34,11 +34,7 @@ class Outcome(NamedTuple):
 
 
 def raise_priority(priority: int, what: str) -> Outcome:
-    """Give the calling thread a real-time priority; threads that it starts do not inherit it.
-
-    Args:
-        what: What the thread does, for the words.
-    """
+    """Give the calling thread a real-time priority; threads that it starts do not inherit it."""
     if not priority:
         return Outcome(granted=False, text='')
     try:

@@ -87,9 +87,6 @@ class SemanticDescription:
 def parse_srdf(text: str) -> SemanticDescription:
     """Read an SRDF.
 
-    Args:
-        text: The SRDF as XML text.
-
     Raises:
         DescriptionError: The text is no SRDF.
     """

@@ -186,7 +186,6 @@ class KinematicTree:
         """Return the joints from one link out to another.
 
         Args:
-            base: Link where the chain begins.
             tip: Link where it ends.
 
         Raises:
@@ -281,9 +280,6 @@ class KinematicTree:
 
 def read_urdf(text: str) -> KinematicTree:
     """Read a URDF.
-
-    Args:
-        text: The URDF as XML text.
 
     Returns:
         Its contents.

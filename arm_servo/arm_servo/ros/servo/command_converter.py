@@ -47,7 +47,6 @@ class CommandConverter:
 
         Args:
             model: The arm; only its names are used.
-            scales: How numbers become speeds.
         """
         self.scales = scales
         self.capped = ''

@@ -27,11 +27,7 @@ class StatusCode(IntEnum):
 
 
 def code_of(report: MotionReport) -> StatusCode:
-    """Return the code for what limits most; speed and acceleration have none.
-
-    Args:
-        report: What limits the motion.
-    """
+    """Return the code for what limits most; speed and acceleration have none."""
     for limiter in report.limiters:
         halted = limiter.factor < HALTED_SPEED_FACTOR
         if limiter.cause is Cause.COLLISION:
@@ -54,7 +50,6 @@ def status_of(
 
     Args:
         refusal: Why the last command was refused, with the remedy; empty when it was not.
-        capped: What was cut off the last command.
     """
     if refusal:
         return int(StatusCode.INVALID), refusal

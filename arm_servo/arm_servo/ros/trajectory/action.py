@@ -71,9 +71,7 @@ class TrajectoryAction:
         """Offer ``~/follow_joint_trajectory``.
 
         Args:
-            rate: Rate of the feedback in [Hz].
             convert: Makes a trajectory of a goal; raises GoalError.
-            follow: Has a trajectory followed.
         """
         self._node = node
         self._gateway = gateway

@@ -24,7 +24,6 @@ def goal_of_trajectory(
     """Return the goal that a JointTrajectory is.
 
     Args:
-        message: The trajectory_msgs/JointTrajectory.
         now: ROS time in [s].
 
     Raises:
@@ -71,11 +70,7 @@ def goal_of_action(
 
 
 def point_of(state: RobotState, time: float = 0.0) -> JointTrajectoryPoint:
-    """Return a state as a point.
-
-    Args:
-        time: Its time_from_start in [s].
-    """
+    """Return a state as a point."""
     point = JointTrajectoryPoint(
         positions=state.position.tolist(),
         velocities=state.velocity.tolist(),

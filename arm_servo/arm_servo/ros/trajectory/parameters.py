@@ -106,11 +106,7 @@ def _goal_tolerances(joints: Sequence[str], limits: JointLimits | None) -> Seque
 
 
 def declare_check(read: ParameterReader, *, default: bool = True) -> bool:
-    """Declare whether motions on whose way links meet are refused.
-
-    Args:
-        read: Declares for the node.
-    """
+    """Declare whether motions on whose way links meet are refused."""
     return read.flag(
         'check_self_collision',
         'refuse trajectories and displacements on whose way links of the arm collide',
