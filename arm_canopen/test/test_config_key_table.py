@@ -14,16 +14,17 @@ import pytest
 import yaml
 
 from arm_canopen.config import BusConfig
-from arm_canopen.config.read.device_keys import (
+from arm_canopen.config.keys import Key, Kind, Use
+from arm_canopen.config.sections import (
     DEVICE_KEYS,
     DRIVE_KEYS,
+    MASTER_KEYS,
+    OPTION_KEYS,
     RPDO_KEYS,
     SDO_KEYS,
+    SECTIONS,
     TPDO_KEYS,
 )
-from arm_canopen.config.read.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.read.schema import Key, Kind, Use
-from arm_canopen.config.read.section import SECTIONS
 from arm_canopen.exceptions import ConfigError
 
 PAGE = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
@@ -161,8 +162,8 @@ def other_value(section: str, key: Key) -> Any:
         return defaults.get(key.name) == 'false'
     if key.choices is not None:
         return min(key.choices)
-    low = 0 if key.low is None else key.low
-    return min(int(low) + 7, 7 if key.high is None else int(key.high))
+    low, high = key.span or (0, 7)
+    return min(int(low) + 7, int(high))
 
 
 def bus_of(folder: Path, key: Key, section: str, **keys: Any) -> BusConfig | None:

@@ -22,14 +22,11 @@ from config_samples import (
 )
 import pytest
 
-from arm_canopen.config import DriveConfig, Identity, NodeConfig, PdoConfig
+from arm_canopen.config import Identity, NodeConfig, PdoConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.config.read.device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, TPDO_KEYS
 from arm_canopen.config.read.eds import load_eds
-from arm_canopen.config.read.master_keys import MASTER_KEYS, OPTION_KEYS
-from arm_canopen.config.read.schema import Key, Kind, Use
-from arm_canopen.config.resolve.settings import DeviceSettings, MasterSettings, Options
+from arm_canopen.config.sections import DeviceSettings, MasterSettings
 from arm_canopen.exceptions import ConfigError
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.drive import DriveState
@@ -325,41 +322,6 @@ def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert len(reads) == 1
 
 
-PDO_FIELDS = {'number', 'cob_id', 'mapping', 'configured', 'fixed_mapping', 'assumed'}
-TABLES: list[tuple[tuple[Key, ...], type, set[str]]] = [
-    (OPTION_KEYS, Options, set()),
-    (MASTER_KEYS, MasterSettings, set()),
-    (DEVICE_KEYS, DeviceSettings, set()),
-    (DRIVE_KEYS, DriveConfig, {'name', 'channel'}),
-    (TPDO_KEYS, PdoConfig, PDO_FIELDS),
-    (RPDO_KEYS, PdoConfig, set()),
-]
-
-
-@pytest.mark.parametrize(('keys', 'record', 'elsewhere'), TABLES)
-def test_tables_and_records_fit(keys: tuple[Key, ...], record: type, elsewhere: set[str]) -> None:
-    """Each key that is read fills a field, and each field has a key or is filled elsewhere."""
-    names = {field.name for field in fields(record)}
-    filled = {key.field for key in keys if key.field}
-    assert filled <= names
-    assert elsewhere or record is PdoConfig or filled == names
-    assert len({key.name for key in keys}) == len(keys)
-    if elsewhere:
-        assert names == elsewhere | filled
-
-
-@pytest.mark.parametrize('key', MASTER_KEYS + DEVICE_KEYS + DRIVE_KEYS, ids=lambda key: key.name)
-def test_every_key_that_is_not_read_says_why(key: Key) -> None:
-    """A key is read, has no effect, or says why it is not used; defaults lie within ranges."""
-    if key.use in (Use.UNUSED, Use.REFUSED):
-        assert key.why
-        assert not (key.use is Use.REFUSED and key.field)
-    elif key.kind is not Kind.BLOCK and key.use is Use.READ:
-        assert key.field
-    if key.default is not None and key.low is not None and not key.zero:
-        assert key.low <= key.default <= (key.high or key.default)
-
-
 def test_the_line_of_a_device_is_that_of_its_name(tmp_path: Path) -> None:
     """Nodes log where they are configured."""
     path = write_bus(tmp_path)
@@ -404,5 +366,3 @@ def test_a_default_has_one_value(settings: Any, model: Any) -> None:
     }
     assert len(same) > 5
     assert {name: read[name] for name in same} == {name: built[name] for name in same}
-    keys = MASTER_KEYS + DEVICE_KEYS
-    assert [key.name for key in keys if key.field and key.default is not None] == []

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
 from arm_canopen.config.model.master import MasterConfig
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.read.shared_keys import U16_MAX
+from arm_canopen.config.sections import U16_MAX
 from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 from arm_canopen.exceptions import CodecError
 from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER, TIME_PRODUCER

@@ -4,65 +4,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 import difflib
 from typing import Any
 
 from ..findings import Findings, RefusedError
-from .device_keys import DEVICE_KEYS, DRIVE_KEYS, RPDO_KEYS, SDO_KEYS, TPDO_KEYS
+from ..keys import Key, Kind, Use
+from ..sections import SECTIONS, TOP_LEVEL
+from . import scalars
 from .document import Item, Scalar, ScalarKind, YamlList, YamlMap
-from .master_keys import MASTER_KEYS, OPTION_KEYS
 from .scalars import describe
-from .schema import Key, Kind, Use
 
-TOP_LEVEL = ('options', 'master', 'defaults', 'nodes')
-
-SECTIONS: dict[str, tuple[Key, ...]] = {
-    'options': OPTION_KEYS,
-    'master': MASTER_KEYS,
-    'a device or defaults': DEVICE_KEYS + DRIVE_KEYS,
-    'a number below tpdo': TPDO_KEYS,
-    'a number below rpdo': RPDO_KEYS,
-    'an entry of sdo': SDO_KEYS,
+CONVERTERS: dict[Kind | None, Callable[[Item], Any]] = {
+    Kind.INTEGER: scalars.integer,
+    Kind.NUMBER: scalars.number,
+    Kind.BOOLEAN: scalars.boolean,
+    Kind.TEXT: scalars.text,
 }
-"""Where each key belongs, for remedies."""
 
 
 def read_section(mapping: YamlMap, keys: Sequence[Key], findings: Findings) -> dict[str, Any]:
-    """Check the keys of a section and read those that fill the model.
+    """Check the keys of a section, and return the given values in units of the model by field.
 
     Blocks (lists and mappings) are left to their own readers.
-
-    Returns:
-        Values in units of the model by field; defaults of the table are filled in.
     """
     check_keys(mapping, keys, findings)
     values: dict[str, Any] = {}
     for key in keys:
-        if key.field and key.default is not None:
-            values[key.field] = key.to_model(key.default)
         item = mapping.entries.get(key.name)
-        if item is None:
-            continue
-        _read_key(key, item, values, findings)
+        if item is not None:
+            _read_key(key, item, values, findings)
     return values
 
 
 def _read_key(key: Key, item: Item, values: dict[str, Any], findings: Findings) -> None:
     try:
-        value = None if key.kind is Kind.BLOCK else key.convert(item)
+        value: Any = None if key.kind is Kind.BLOCK else convert(key, item)
     except RefusedError as reason:
         findings.refuse(item.place, reason)
         return
-    is_neutral = value is not None and value == key.neutral
-    if key.field:
-        values[key.field] = key.to_model(value)
-    if key.use is Use.REFUSED and not is_neutral:
+    if key.is_kept:
+        values[key.field] = value if key.unit is None else value / key.unit
+    if value is not None and value == key.default:
+        return
+    if key.use is Use.REFUSED:
         findings.error(
             item.place, f'{describe(item)} is not supported: {key.why}', 'remove the key'
         )
-    elif key.use is Use.UNUSED and not is_neutral:
+    elif key.use is Use.UNUSED:
         findings.warning(item.place, f'known, not used yet: {key.why}', 'it may stay')
+
+
+def convert(key: Key, item: Item) -> Any:  # noqa: ANN401  # the kind decides
+    """Return a value in units of the file.
+
+    Raises:
+        RefusedError: It is of another kind or out of range.
+    """
+    value, why = CONVERTERS[key.kind](item), f'; {key.why}' if key.why else ''
+    if key.choices is not None and value not in key.choices:
+        known = ', '.join(f'{number} {title}' for number, title in key.choices.items())
+        raise RefusedError(f'{value} is not allowed here', f'take one of: {known}{why}')
+    if not _in_range(key, value):
+        wanted = 'a value other than 0'
+        if key.span is not None:
+            low, high = key.span
+            wanted = f'{"0 or " if key.zero else ""}{low:g} to {high:g}'
+        raise RefusedError(f'{describe(item)} is out of range', f'take {wanted}{why}')
+    return value
+
+
+def _in_range(key: Key, value: float | str) -> bool:
+    if isinstance(value, str):
+        return True
+    if value == 0 and key.zero is not None:
+        return key.zero
+    return key.span is None or key.span[0] <= value <= key.span[1]
 
 
 def check_keys(mapping: YamlMap, keys: Iterable[Key], findings: Findings) -> None:

@@ -12,9 +12,9 @@ from ...standard.drive import DriveState
 from ..findings import Findings, Place, RefusedError
 from ..model.drive import DriveConfig, RecoveryPolicy
 from ..read import scalars
-from ..read.device_keys import CHANNEL_KEYS, SCALE_KEYS
 from ..read.document import Item, YamlMap
 from ..read.section import listing, read_section
+from ..sections import CHANNEL_KEYS, SCALE_KEYS
 
 ROS_NAME = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 SCALE_TOLERANCE = 0.01  # by which the product of the scales of both directions may miss 1

@@ -17,11 +17,12 @@ from ..model.pdo_direction import RPDO, TPDO
 from ..read.document import YamlMap
 from ..read.eds import Eds
 from ..read.section import texts
+from ..sections import DeviceSettings, Options
 from .eds_files import EdsFiles
 from .parameter_values import parameter_writes
 from .pdos import PdoDraft, PdoReader
 from .sdo_list import read_writes
-from .settings import DeviceSettings, Options, read_device_settings
+from .settings import read_device_settings
 
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)

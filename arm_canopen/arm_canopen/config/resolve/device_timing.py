@@ -16,11 +16,11 @@ from ..model.bus import NodeConfig, PdoConfig
 from ..model.master import MasterConfig
 from ..model.pdo_direction import Direction, RPDO, TPDO
 from ..model.tpdo_freshness import with_event_timer
+from ..sections import MasterSettings, Options
 from ..units import MILLISECONDS
 from .device import DeviceDraft
 from .drive_types import check_drive_types
 from .pdos import PdoDraft
-from .settings import MasterSettings, Options
 
 CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
 """What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""

@@ -15,7 +15,8 @@ import difflib
 from ..findings import Findings
 from ..read.document import Item, YamlList, YamlMap
 from ..read.scalars import describe
-from ..read.section import block, TOP_LEVEL
+from ..read.section import block
+from ..sections import TOP_LEVEL
 from .merge import merge_device
 
 NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"

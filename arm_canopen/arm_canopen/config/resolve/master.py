@@ -13,10 +13,9 @@ from ..model.master import MasterConfig
 from ..read.document import YamlMap
 from ..read.scalars import integer
 from ..read.section import texts
-from ..read.shared_keys import U8_MAX, U16_MAX
+from ..sections import MASTER, MasterSettings, Options, U8_MAX, U16_MAX
 from ..units import MILLISECONDS
 from .sdo_list import error_behaviours
-from .settings import MASTER, MasterSettings, Options
 
 TIME_PERIOD = 1.0  # [s] when only that bit requests it
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits

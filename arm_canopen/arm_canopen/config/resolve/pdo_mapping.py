@@ -11,9 +11,9 @@ from ...standard.objects import is_signed, PDO_BITS_MAX
 from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
 from ..findings import Findings, Place, RefusedError
 from ..model.pdo_direction import Direction, RPDO
-from ..read.device_keys import MAPPING_KEYS
 from ..read.document import Item, YamlList
 from ..read.eds import DUMMY_TYPES, Eds
+from ..sections import MAPPING_KEYS
 from .sdo_list import find_entry, read_object
 
 SIGNED_BY_BITS = {bits: data_type for data_type, bits in SIGNED_BITS.items()}

@@ -15,11 +15,11 @@ from ...standard.pdo import SYNCHRONOUS_MAX
 from ..findings import Findings, Place, RefusedError
 from ..model.bus import PdoConfig
 from ..model.pdo_direction import Direction, RPDO, TPDO
-from ..read.device_keys import RPDO_KEYS, TPDO_KEYS
 from ..read.document import Item, Scalar, YamlList, YamlMap
 from ..read.eds import Eds
 from ..read.scalars import describe, integer, key_number
 from ..read.section import block, listing, read_section
+from ..sections import RPDO_KEYS, TPDO_KEYS
 from .pdo_mapping import eds_mapping, is_fixed, read_mapping
 
 PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}
@@ -133,14 +133,14 @@ class PdoReader:
             subindex = SUBINDICES.get(key.field, 0)
             entry = self._eds.dictionary.get(communication, subindex) if subindex else None
             if entry is not None and entry.configured and isinstance(entry.default, int):
-                found[key.field] = key.to_model(entry.default)
+                found[key.field] = entry.default / (key.unit or 1)
         return found
 
     def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
         """Lay the values of bus.yml over a PDO of the EDS."""
         values = read_section(section, PDO_KEYS[draft.direction.name], self._findings)
         self._check_parameters(draft, section, values)
-        config = replace(draft.config, configured=True, **values)
+        config = replace(draft.config, configured=True, **{'enabled': True} | values)
         draft = replace(draft, config=config, place=section.place)
         entries = listing(section, 'mapping', self._findings)
         if entries is not None:

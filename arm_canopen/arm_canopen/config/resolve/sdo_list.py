@@ -21,13 +21,12 @@ from ...standard.datatypes import (
 from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ...standard.objects import Index, PDO_COUNT_MAX
 from ..findings import Findings, Place, RefusedError
+from ..keys import Key
 from ..model.bus import SdoWrite, SourceLocation
 from ..read import scalars
-from ..read.device_keys import SDO_KEYS
 from ..read.document import Item, Scalar, ScalarKind, YamlMap
-from ..read.schema import Key
 from ..read.section import block, listing, read_section
-from ..read.shared_keys import U8_MAX
+from ..sections import SDO_KEYS, U8_MAX
 
 PDO_OBJECTS = (
     (Index.RPDO_COMMUNICATION, 'rpdo'),
@@ -104,7 +103,7 @@ def read_object(item: Item, keys: tuple[Key, ...], findings: Findings) -> dict[s
             item.place, f'expected an object, got {scalars.describe(item)}', f'write {example}'
         )
         return None
-    values = read_section(item, keys, findings)
+    values = {'subindex': 0} | read_section(item, keys, findings)
     if 'index' not in item.entries:
         findings.error(item.place, "no 'index'", f'write {example}')
     return values if 'index' in values else None
