@@ -13,9 +13,9 @@ FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 EXECUTABLES = [
     'bringup = arm_bringup.bringup:main',
     'check = arm_bringup.check:main',
-    'demo = arm_bringup.demos.wave.main:main',
-    'motion_demo = arm_bringup.demos.motion:main',
-    'plan_demo = arm_bringup.demos.plan:main',
+    'demo = arm_bringup.examples.wave:main',
+    'motion_demo = arm_bringup.examples:motion_demo',
+    'plan_demo = arm_bringup.examples:plan_demo',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -57,7 +57,6 @@ setup(
         'PyYAML>=6',
         'rich>=13',
         sibling('arm_canopen'),
-        sibling('libraries/demo_runner'),
         sibling('libraries/process_supervisor'),
         sibling('libraries/urdf_reader'),
     ],
@@ -65,7 +64,6 @@ setup(
         'test': ['pytest'],
         'motion': [
             'numpy>=1.26',
-            'pin>=3.3',
             sibling('arm_model'),
             sibling('arm_planning'),
             sibling('arm_servo'),

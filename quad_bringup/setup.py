@@ -12,7 +12,7 @@ FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
     'bringup = quad_bringup.bringup:main',
-    'demo = quad_bringup.demo.main:main',
+    'demo = quad_bringup.examples.walk:main',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -46,7 +46,6 @@ setup(
     ],
     install_requires=[
         'rich>=13',
-        sibling('libraries/demo_runner'),
         sibling('libraries/node_runner'),
         sibling('libraries/process_supervisor'),
         sibling('quad_controller'),

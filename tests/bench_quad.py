@@ -26,9 +26,8 @@ import psutil
 from rclpy.qos import qos_profile_sensor_data
 from simulated_quad import AHEAD, SimulatedQuad
 
-from quad_bringup.demo.report import velocity_text
-from quad_bringup.demo.segments import Velocity
-from quad_bringup.demo.track import mean_velocity, Pose, Track
+from quad_bringup.examples.walk import Track, Velocity, velocity_text
+from quad_description.rotations import tilt_of
 
 if TYPE_CHECKING:
     from processes import RunningProcess
@@ -65,28 +64,21 @@ def usage(process: RunningProcess) -> Usage:
     return Usage(times.user + times.system, system.memory_info().rss / 1e6)
 
 
-def poses(messages: Sequence[Odometry]) -> Track:
-    """Follow the body through messages."""
-    track = Track()
-    for message in messages:
-        stamp = message.header.stamp
-        position, turn = message.pose.pose.position, message.pose.pose.orientation
-        rotation = (turn.x, turn.y, turn.z, turn.w)
-        seconds = stamp.sec + 1e-9 * stamp.nanosec
-        track.take(Pose(seconds, position.x, position.y, position.z, rotation))
-    return track
-
-
 def mean(messages: Sequence[Odometry]) -> Velocity | None:
     """Return the mean velocity of the body, in its own frame, over messages."""
-    begin, end = poses(messages[:1]).milestone, poses(messages).milestone
-    return None if begin is None or end is None else mean_velocity(begin, end)
+    track = Track()
+    for message in messages[:1]:
+        track.take(message)
+    begin = track.stamp, track.way
+    for message in messages[1:]:
+        track.take(message)
+    return track.mean_since(*begin)
 
 
 def largest_tilt(messages: Sequence[Odometry]) -> float:
     """Return how far the body leaned in [rad]."""
     turns = [message.pose.pose.orientation for message in messages]
-    return max(Pose(0, 0, 0, 0, (turn.x, turn.y, turn.z, turn.w)).tilt for turn in turns)
+    return max(tilt_of((turn.x, turn.y, turn.z, turn.w)) for turn in turns)
 
 
 def percentile(values: Sequence[float], share: float) -> float:

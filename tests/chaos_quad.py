@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from disturbance import Disturbance, Event, full_cpu
 from simulated_quad import SimulatedQuad
 
-from quad_bringup.demo.segments import Velocity
+from quad_bringup.examples.walk import Velocity
 from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import tilt_of
 from quad_hardware.joints import JointMap, servo_of

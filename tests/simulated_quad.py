@@ -20,8 +20,7 @@ from std_msgs.msg import String
 
 from node_runner import LATCHED
 from process_supervisor import find_executable, write_parameters
-from quad_bringup.demo.main import GROUND_TRUTH
-from quad_bringup.demo.segments import Velocity
+from quad_bringup.examples.walk import GROUND_TRUTH, Velocity
 from quad_bringup.stack import quad_processes, Stack
 from quad_description import movable_joints, robot_urdf
 from quad_msgs.srv import SetMode

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from node_runner import LATCHED
-from quad_bringup.demo.main import GROUND_TRUTH
+from quad_bringup.examples.walk import GROUND_TRUTH
 from quad_description import Pose, pose_positions
 from quad_msgs.srv import SetMode
 

@@ -48,7 +48,6 @@ IMPORTED = [
     'arm_trajectory',
     'canopen_sim',
     'canopen_tools',
-    'demo_runner',
     'first_motion',
     'message_definitions',
     'operator_input',

@@ -16,7 +16,7 @@ from small_bringup import read_until, SmallWorkspace
 from small_processes import service_manager, TIMEOUT
 
 from arm_bringup import bringup
-from arm_bringup.demos.wave.main import DEMO
+from arm_bringup.examples.wave import main as demo
 
 pytestmark = pytest.mark.slow
 
@@ -226,4 +226,4 @@ def test_an_option_that_is_cut_short_moves_nothing(words: list[str]) -> None:
         bringup.parse(['panda', *words])
     assert end.value.code == 2
     with pytest.raises(SystemExit):
-        DEMO.parse(['panda', '--dur', '5'])
+        demo(['panda', '--dur', '5'])

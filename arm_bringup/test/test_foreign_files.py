@@ -14,8 +14,8 @@ from two_arms import ARMS, DRIVES, GRIPPER, write_two_arms
 from urdf_reader import parse_srdf, read_urdf
 
 from arm_bringup.bringup import parse
-from arm_bringup.demos.wave.main import waving_joints
 from arm_bringup.description import expand_xacro, read_description, read_semantic
+from arm_bringup.examples.wave import waving_joints
 from arm_bringup.exceptions import DescriptionError, RobotError
 from arm_bringup.groups import choose_groups, moved_groups, MovedGroups
 from arm_bringup.robots import find_robot, Robot
@@ -143,7 +143,7 @@ def test_groups_that_are_asked_for_wave(
 ) -> None:
     """The demo enables the others as little as it waves with them."""
     place = f'{write_two_arms(tmp_path / "two_arms")}{os.sep}'
-    assert {*waving_joints(locate(parse([place, *argv])[0]), DRIVES)} == {*waving}
+    assert {*waving_joints(locate(parse([place, *argv])[0]), DRIVES, DRIVES)} == {*waving}
 
 
 def test_a_package_that_is_not_installed_is_given_a_folder(folder: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/process_supervisor']),
         ('share/process_supervisor', ['package.xml']),
     ],
-    install_requires=['PyYAML>=6', sibling('libraries/dds_network')],
+    install_requires=['PyYAML>=6', 'rich>=13', sibling('libraries/dds_network')],
     extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
     zip_safe=True,
     maintainer='The arm and quad developers',

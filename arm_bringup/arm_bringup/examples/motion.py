@@ -1,0 +1,637 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_bringup motion_demo``: a simulated arm is jogged and follows trajectories.
+
+Joint vectors are in model order in [rad], the tool is the tip link of the first group in its base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+import json
+import math
+from pathlib import Path
+import sys
+import time
+
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointTrajectoryControllerState, SpeedScalingFactor
+from geometry_msgs.msg import TwistStamped
+from moveit_msgs.msg import ServoStatus
+import numpy as np
+from rclpy.action.client import ActionClient
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from urdf_reader import JointRange
+
+from arm_canopen import load_bus
+from arm_model import ArmError, Array, load_limits, ModelError, RobotModel, start_pose
+from arm_trajectory import PathCheck
+from node_runner import LATCHED
+from process_supervisor import CallError, namespaced_parameters, RosOptions
+
+from ..description import read_semantic
+from ..groups import MovedGroups
+from ..motion import controller_names, motion_files
+from ..robots import Robot
+from ..service_client import ServiceClient
+from ..session import Session
+from ..stack import MOTION_NODE
+from .arm import ActionRun, ArmDemo, EndRequested, number, parse, run
+
+RATE = 100.0
+"""Rate of the controller's states in [Hz]."""
+JOG_PERIOD = 0.02
+"""Time between two jog commands in [s]."""
+LATE_COMMANDS = 0.05
+"""Time between two jog commands in [s] from which on the tool may stop in between: each counts
+for 0.1 s, of which its way to the servo takes some."""
+SETTLE, FRESH = 0.35, 0.1
+"""Least pause after a motion, and age up to which a state says where the arm is now, in [s]."""
+MOTION_TIMEOUT = 60.0
+"""Longest time of a trajectory in [s]."""
+
+SIDE, SPEED = 0.08, 0.1
+"""Side of a square in [m], and greatest speed of the tool on it in [m/s]."""
+SIDES = ((1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0))
+"""Directions of the sides of a square."""
+MAX_RUN_UP = 0.3
+"""Greatest part of a side on which the joints may accelerate."""
+STEPS, SPEED_SHARE, MARGIN = 8, 0.6, 0.03
+"""Steps in which a side is gone through on the model, the share of a joint's speed that it may
+need there, and the share of a joint's range that it keeps from the ends."""
+OFF_LINE = 0.01
+"""Share of the speed that may lead off a line on the model."""
+CLEARANCE, NEARER = 0.015, 0.001
+"""Least distance of links on a square in [m], and how much nearer links may come that are near
+each other where it begins."""
+
+OUTWARDS, DOWN, FAST = 0.866, 0.5, 0.2
+"""Way to the singular pose: shares of outwards and down, and its speed in [m/s]."""
+STUCK, LONGEST = 0.05, 6.0
+"""Speed in [m/s] below which the tool has come to its end there, and the longest time in [s]; the
+way back may take twice as long."""
+
+WAYS = (0.5, 0.25, 0.1)
+"""How far joints go in a trajectory in [rad] or [m], the first that is free."""
+LIMIT_SHARE, VELOCITY_SHARE, SHORTEST = 0.6, 0.35, 1.5
+"""Share of the limits of acceleration and jerk, and of speed, that a trajectory uses (a drive that
+waits for a busy computer must not lose its path), and its shortest time in [s]."""
+SLOW = 0.3
+"""Speed override."""
+
+WORST_LINE, WORST_SPEED = 3e-3, 0.01
+"""Greatest distance of the tool from the line that it is jogged along in [m], and difference of
+its speed from the asked one as a share."""
+LEAST_RETURN = 0.9
+"""Share of the way that the tool must come back from the singular pose."""
+WORST_PATH, WORST_TRACKING = 5e-3, 0.2
+"""Greatest distance of a set-point from the path of a trajectory, and of a joint from its
+set-point, in [rad]; the latter is judged only where every drive answered in every cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One state of the trajectory controller; set-points unless they are called measured.
+
+    Attributes:
+        time: Time of its cycle in [s].
+        speed: Speed override, 0 to 1.
+        tool: Position of the tool in [m].
+    """
+
+    time: float
+    position: Array
+    velocity: Array
+    acceleration: Array
+    measured: Array
+    speed: float
+    tool: Array
+    measured_tool: Array
+
+
+class Motion(ArmDemo):
+    """Squares, a singular pose, a trajectory with override, one that is canceled."""
+
+    label = 'motion'
+
+    def __init__(
+        self,
+        arm: Session,
+        limits: Mapping[str, JointRange],
+        duration: float | None,
+        groups: MovedGroups,
+    ) -> None:
+        self.controller = controller_names(arm.robot, groups)[groups.names[0]]
+        commands = [
+            f'ros2 run arm_servo servo_keyboard_input{arm.ros.hint}',
+            f'ros2 topic echo {arm.ros.resolve("servo_node/status")}',
+            f'ros2 topic echo {arm.ros.resolve(self.controller)}/controller_state',
+        ]
+        super().__init__(arm, limits, duration, commands)
+        semantic, bounds = read_semantic(arm.robot), load_limits(arm.robot.limits)
+        tip = arm.robot.tip_link or None
+        self.model = RobotModel(arm.urdf, semantic, bounds, groups.arms[0], tip)
+        self.period = load_bus(arm.robot.bus_config).master.sync_period
+        self.pose = start_pose(self.model)
+        self.moved = {*self.model.joints}
+        self.samples: list[Sample] = []
+        self.status = ''  # what the servo said last
+        self.limited: list[str] = []  # what it said while something limited the motion
+        self.jerk = 0.0  # greatest one, as a share of the limit
+        self._run: ActionRun | None = None
+
+    def join(self, given_up: Callable[[], bool]) -> ServiceClient:
+        """Join the ROS graph: twists and an override out, states of controller and servo in."""
+        client = super().join(given_up)
+        node, state = client.node, JointTrajectoryControllerState
+        self._twist = node.create_publisher(TwistStamped, 'servo_node/delta_twist_cmds', 10)
+        self._speed = node.create_publisher(
+            SpeedScalingFactor, f'{self.controller}/speed_scaling_input', LATCHED
+        )
+        self._action_name = f'{self.controller}/follow_joint_trajectory'
+        self._action = ActionClient(node, FollowJointTrajectory, self._action_name)
+        node.create_subscription(state, f'{self.controller}/controller_state', self._take, 50)
+        node.create_subscription(ServoStatus, 'servo_node/status', self._take_status, 10)
+        return client
+
+    def line(self) -> str:
+        """Return what moves the arm."""
+        speed = tool_speed(self.samples[-2:], self.period)
+        override = 100 * self.samples[-1].speed if self.samples else 100
+        return (
+            f'tool {speed:.3f} m/s   override {override:.0f} %   '
+            f'peak jerk {100 * self.jerk:.0f} % of the limit   {self.status}'
+        )
+
+    def move(self) -> None:
+        """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
+        try:
+            self.repeat(lambda: None, self._parts)
+        except EndRequested:
+            self.enter('leaving')
+            if self._run is not None and not self._run.done:
+                self._run.cancel()
+        self._sum_up()
+        self.conclude()
+
+    def _parts(self) -> None:
+        self.go_to_start()
+        if all(square_fits(self.model, self.pose, each) for each in self._frames):
+            for name, frame in zip(('base frame', 'tool frame'), self._frames, strict=True):
+                self.square(name, frame)
+        else:
+            self.add('squares', 'left out: they are not possible from the start pose')
+        self.singularity()
+        self.go_to_start()
+        self.trajectory()
+        self.cancel()
+
+    @property
+    def _frames(self) -> tuple[str, str]:
+        return self.model.base, self.model.tip
+
+    @property
+    def last(self) -> Sample:
+        """The latest state.
+
+        Raises:
+            CallError: There is none.
+        """
+        if not self.samples:
+            raise CallError('the trajectory controller publishes no state: is the arm enabled?')
+        return self.samples[-1]
+
+    def go_to_start(self) -> None:
+        """Follow a trajectory to the start pose."""
+        self.enter('to the start pose')
+        self.pause(SETTLE)
+        begin = self.last.position if self.samples else np.zeros(len(self.model))
+        for pose in free_way(self.model, begin, self.pose):
+            self._finish(self._send(pose, duration_of(self.model, begin, pose)))
+            begin = pose
+
+    def square(self, name: str, frame: str) -> None:
+        """Jog the tool along the sides of a square in a frame."""
+        self.enter(f'a square in the {name}')
+        speed = square_speed(self.model, self.pose)
+        speeds, commanded, measured, gap, missed = [], 0.0, 0.0, 0.0, self.missed
+        self.limited.clear()
+        for way in SIDES:
+            begin, first = self.last, len(self.samples)
+            direction = self.model.pose(begin.position, frame).rotation @ np.array(way, float)
+            gap = max(gap, self._jog(speed * np.array(way), frame, SIDE / speed))
+            moving = self.samples[first:]
+            speeds.append(tool_speed(moving[len(moving) // 2 : -(len(moving) // 4)], self.period))
+            self._rest()
+            side = self.samples[first:]
+            tools, seen = [each.tool for each in side], [each.measured_tool for each in side]
+            commanded = max(commanded, off_line(tools, begin.tool, direction))
+            measured = max(measured, off_line(seen, begin.measured_tool, direction))
+        reached = max(speeds, key=lambda each: abs(each - speed))
+        # PDOs of drives that came late: joints of different times are not where the tool is
+        worst = commanded if self.missed > missed else measured
+        limited = (self.limited or [''])[-1]
+        figures = (
+            f'TCP speed asked {speed:.3f} m/s, reached {reached:.4f} m/s; off the line '
+            f'{1e3 * commanded:.2f} mm commanded, {1e3 * measured:.2f} mm measured'
+        )
+        problem = ''
+        if worst > WORST_LINE:
+            problem = f'the tool was {1e3 * worst:.1f} mm off its line'
+        elif abs(reached - speed) > WORST_SPEED * speed:
+            if gap > LATE_COMMANDS:
+                figures += (
+                    f'; speed not judged: jog commands were up to {gap:.2f} s apart, this '
+                    'computer is too busy'
+                )
+            elif limited and reached < speed:
+                figures += f'; the limits of this arm allow no more: {limited}'
+            else:
+                problem = f'the tool moved at {reached:.4f} m/s instead of {speed:.3f} m/s'
+        self.add(f'square, {name}', figures, problem)
+
+    def singularity(self) -> None:
+        """Jog the tool outwards until the arm is straight, or something else ends it, and back."""
+        self.enter('into the straight arm, and back')
+        begin, first = self.last.tool, len(self.samples)
+        ahead = np.array([begin[0], begin[1], 0.0])
+        ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
+        outwards = OUTWARDS * ahead - np.array([0.0, 0.0, DOWN])
+        if not can_go(self.model, self.last.position, outwards):
+            why = 'left out: this arm cannot lead its tool along a line outwards'
+            self.add('singularity', why)
+            return
+        self.limited.clear()
+
+        def out() -> float:
+            return float((self.last.tool - begin) @ outwards)
+
+        self._jog(FAST * outwards, self.model.base, LONGEST, self._stuck)
+        self._rest()
+        singular = [text for text in self.limited if 'singular' in text]
+        text = (singular or self.limited or [''])[-1]
+        reached = max(float((each.tool - begin) @ outwards) for each in self.samples[first:])
+        self._jog(-FAST * outwards, self.model.base, 2.0 * LONGEST, lambda: out() <= 0.0)
+        self._rest()
+        back, problem = reached - out(), ''
+        if reached <= 0.0 or back < LEAST_RETURN * reached:
+            why = text or 'no reason given'
+            problem = f'the tool came back {back:.3f} m of {reached:.3f} m; {why}'
+        figures = f'{reached:.3f} m out, {back:.3f} m back; there: {text or "nothing limits"}'
+        self.add('singularity', figures, problem)
+
+    def trajectory(self) -> None:
+        """Follow a trajectory, at 30 % in its middle."""
+        self.enter('a trajectory, at 30 % in its middle')
+        begin, end, nominal, first = self._plan()
+        goal = self._send(end, nominal)
+        self._reach(goal, begin, end, 0.2)
+        self._speed.publish(SpeedScalingFactor(factor=SLOW))
+        self._reach(goal, begin, end, 0.6)
+        self._speed.publish(SpeedScalingFactor(factor=1.0))
+        self._finish(goal)
+        slow = min(each.speed for each in self.samples[first:])
+        times = [each.time for each in self.samples[first:] if each.velocity.any()]
+        took = times[-1] - times[0] if times else 0.0
+        error = self._path_error(first, begin, end)
+        figures = (
+            f'path error {1e3 * error:.3f} mrad, {nominal:.1f} s planned, {took:.1f} s with '
+            f'{100 * slow:.0f} % in its middle'
+        )
+        problem = ''
+        if error > WORST_PATH:
+            problem = f'{1e3 * error:.1f} mrad off the path'
+        elif slow != SLOW or took < nominal:
+            problem = f'the override did not slow it down: {took:.1f} s'
+        self.add('trajectory', figures, problem)
+
+    def cancel(self) -> None:
+        """Cancel a trajectory in its middle: it comes to rest on its path."""
+        self.enter('a trajectory, canceled')
+        begin, end, nominal, first = self._plan()
+        goal = self._send(end, nominal)
+        self._reach(goal, begin, end, 0.4)
+        goal.cancel()
+        self._rest()
+        error = self._path_error(first, begin, end)
+        done = float(np.linalg.norm(self.last.position - begin) / np.linalg.norm(end - begin))
+        problem = ''
+        if error > WORST_PATH:
+            problem = f'{1e3 * error:.1f} mrad off the path'
+        elif np.abs(self.last.velocity).max() > 0.0:
+            problem = 'the arm does not rest'
+        elif goal.status != GoalStatus.STATUS_CANCELED:
+            problem = f'it was not canceled: {_why(goal)}'
+        figures = (
+            f'at rest after {100 * done:.0f} % of the way, {1e3 * error:.3f} mrad off the path'
+        )
+        self.add('cancel', figures, problem)
+
+    def _sum_up(self) -> None:
+        """Add what was measured all the time."""
+        if self.samples:
+            self.add('peak jerk', f'{100 * self.jerk:.1f} % of the limit of the joint')
+            tracking = tracking_error(self.samples, self.period)
+            slow = f'a joint was {tracking:.3f} rad from its set-point'
+            problem = slow if tracking > WORST_TRACKING and not self.missed else ''
+            self.add('joint tracking error', f'{1e3 * tracking:.2f} mrad', problem)
+            self.add('bus and loop', self.bus_line())
+        late = number(self.bus, 'jitter_p99')
+        if late > self.period / 2:
+            text = f'the cycle was late by {1e3 * late:.0f} ms now and then (p99): this computer '
+            self.warnings = [f'{text}is too busy, drives wait and may lose their path']
+
+    def _jog(
+        self, linear: Array, frame: str, longest: float, done: Callable[[], bool] | None = None
+    ) -> float:
+        """Jog for a time, or until it is done; return the longest time between commands in [s]."""
+        begun = last = time.monotonic()
+        gap = 0.0
+        while (elapsed := time.monotonic() - begun) < longest:
+            self._publish_twist(linear, frame)
+            now = time.monotonic()
+            gap, last = max(gap, now - last), now
+            self.client.listen(JOG_PERIOD)
+            self.look()
+            if done is not None and elapsed > 2.0 * SETTLE and done():
+                break
+        self._publish_twist(0.0 * linear, frame)
+        return max(gap, time.monotonic() - last)
+
+    def _publish_twist(self, linear: Array, frame: str) -> None:
+        message = TwistStamped()
+        message.header.stamp = self.client.node.get_clock().now().to_msg()
+        message.header.frame_id = frame
+        vector = message.twist.linear
+        vector.x, vector.y, vector.z = (float(value) for value in linear)
+        self._twist.publish(message)
+
+    def _stuck(self) -> bool:
+        """Return whether the tool has hardly moved lately."""
+        recent = self.samples[-round(SETTLE / self.period) :]
+        return float(np.linalg.norm(recent[-1].tool - recent[0].tool)) < STUCK * SETTLE
+
+    def _plan(self) -> tuple[Array, Array, float, int]:
+        """Return begin, end, time and number of the first sample of a trajectory from here."""
+        begin = self.last.position
+        end = free_end(self.model, begin)
+        return begin, end, duration_of(self.model, begin, end), len(self.samples)
+
+    def _send(self, end: Array, nominal: float) -> ActionRun:
+        """Send a trajectory to a pose, at rest there, and wait until it is accepted."""
+        rest = [0.0] * len(end)
+        point = JointTrajectoryPoint(positions=end.tolist(), velocities=rest, accelerations=rest)
+        point.time_from_start.sec = int(nominal)
+        point.time_from_start.nanosec = round(nominal % 1.0 * 1e9)
+        goal = FollowJointTrajectory.Goal(
+            trajectory=JointTrajectory(joint_names=list(self.model.joints), points=[point])
+        )
+        self._run = ActionRun(self.client, self._action, goal, self._action_name)
+        return self._run
+
+    def _finish(self, goal: ActionRun) -> None:
+        self.wait_moving(lambda: goal.done, MOTION_TIMEOUT, 'the end of a trajectory')
+        if goal.status != GoalStatus.STATUS_SUCCEEDED:
+            raise CallError(f'a trajectory failed: {_why(goal)}')
+        self._rest()
+
+    def _reach(self, goal: ActionRun, begin: Array, end: Array, share: float) -> None:
+        """Wait until a share of the way is done: times say little on a computer that is busy."""
+        way = end - begin
+
+        def there() -> bool:
+            return goal.done or float((self.last.position - begin) @ way / (way @ way)) >= share
+
+        self.wait_moving(there, MOTION_TIMEOUT, f'{100 * share:.0f} % of a trajectory')
+
+    def _rest(self) -> None:
+        """Wait until the arm rests, and what is known of it is new."""
+        self.pause(SETTLE)
+        clock = self.client.node.get_clock()
+
+        def at_rest() -> bool:
+            age = 1e-9 * clock.now().nanoseconds - self.last.time
+            return age < FRESH and not self.last.velocity.any()
+
+        self.wait_moving(at_rest, MOTION_TIMEOUT, 'the arm to rest')
+
+    def _path_error(self, first: int, begin: Array, end: Array) -> float:
+        return off_line([each.position for each in self.samples[first:]], begin, end - begin)
+
+    def _take(self, message: JointTrajectoryControllerState) -> None:
+        reference, stamp = message.reference, message.header.stamp
+        position, velocity, acceleration, measured = map(
+            np.array,
+            (
+                reference.positions,
+                reference.velocities,
+                reference.accelerations,
+                message.feedback.positions,
+            ),
+        )
+        tools = (self.model.pose(each).position for each in (position, measured))
+        sample = Sample(
+            stamp.sec + 1e-9 * stamp.nanosec,
+            *(position, velocity, acceleration, measured),
+            message.speed_scaling_factor,
+            *tools,
+        )
+        if self.samples:
+            jerk = jerk_between(self.samples[-1], sample, self.period, self.model.limits.jerk)
+            self.jerk = max(self.jerk, jerk)
+        self.samples.append(sample)
+
+    def _take_status(self, message: ServoStatus) -> None:
+        self.status = message.message
+        if message.code > 0:
+            self.limited.append(message.message)
+
+
+def _why(goal: ActionRun) -> str:
+    return f'{goal.result.error_code}: {goal.result.error_string}'
+
+
+def cycles_between(before: Sample, after: Sample, period: float) -> int:
+    """Return how many cycles lie between two samples, by their stamps."""
+    return round((after.time - before.time) / period)
+
+
+def tool_speed(samples: Sequence[Sample], period: float) -> float:
+    """Return the median speed of the commanded tool in [m/s]; 0 without two samples."""
+    speeds = [
+        float(np.linalg.norm(after.tool - before.tool)) / (cycles * period)
+        for before, after in pairwise(samples)
+        if (cycles := cycles_between(before, after, period)) >= 1
+    ]
+    return float(np.median(speeds)) if speeds else 0.0
+
+
+def jerk_between(before: Sample, after: Sample, period: float, limits: Array) -> float:
+    """Return the change of the acceleration over time, as a share of the limits in [rad/s3].
+
+    Stamps of a computer that was held up for more than three cycles say too little: 0.
+    """
+    cycles = cycles_between(before, after, period)
+    if not 1 <= cycles <= 3:
+        return 0.0
+    change = np.abs(after.acceleration - before.acceleration)
+    return float((change / (cycles * period * limits)).max())
+
+
+def tracking_error(samples: Sequence[Sample], period: float) -> float:
+    """Return the greatest distance of a measured joint from where it was sent in [rad].
+
+    A drive answers in the cycle after the one in which it was sent somewhere, so a measurement is
+    compared with the set-point of the cycle before.
+    """
+    errors = (
+        float(np.abs(after.measured - before.position).max())
+        for before, after in pairwise(samples)
+        if cycles_between(before, after, period) == 1
+    )
+    return max(errors, default=0.0)
+
+
+def off_line(points: Sequence[Array], begin: Array, direction: Array) -> float:
+    """Return the greatest distance of points of any dimension from a straight line."""
+    unit = direction / np.linalg.norm(direction)
+    offsets = [point - begin for point in points]
+    return max(
+        (float(np.linalg.norm(each - (each @ unit) * unit)) for each in offsets), default=0.0
+    )
+
+
+def duration_of(model: RobotModel, begin: Array, end: Array) -> float:
+    """Return the time of a quintic from rest to rest that keeps all limits in [s].
+
+    Its peaks over unit way and unit time are 15/8, 10/sqrt(3) and 60.
+    """
+    way, limits = np.abs(end - begin), model.limits
+    needed = (
+        15 / 8 * way / (VELOCITY_SHARE * limits.velocity),
+        np.sqrt(10 / math.sqrt(3) * way / (LIMIT_SHARE * limits.acceleration)),
+        np.cbrt(60 * way / (LIMIT_SHARE * limits.jerk)),
+    )
+    return float(max(SHORTEST, *(each.max() for each in needed)))
+
+
+def square_fits(model: RobotModel, start: Array, frame: str) -> bool:
+    """Return whether the tool can go along a square in a frame: within all limits, and free."""
+    limits, positions = model.limits, start.copy()
+    least = min(CLEARANCE, model.clearance(start, CLEARANCE) - NEARER)
+    margin = np.where(limits.continuous, 0.0, MARGIN * (limits.upper - limits.lower))
+    for side in SIDES:
+        velocity = SPEED * model.pose(positions, frame).rotation @ np.array(side, float)
+        for _ in range(STEPS):
+            shares, off = joint_shares(model, positions, velocity)
+            positions = positions + limits.velocity * shares * (SIDE / SPEED) / STEPS
+            inside = (positions >= limits.lower + margin) & (positions <= limits.upper - margin)
+            slow = np.abs(shares) <= SPEED_SHARE
+            if off > OFF_LINE * SPEED or not (inside & slow).all():
+                return False
+            if model.clearance(positions, CLEARANCE) < least:
+                return False
+    return True
+
+
+def can_go(model: RobotModel, start: Array, direction: Array) -> bool:
+    """Return whether the tool can be led along a direction in the base frame.
+
+    An arm of few joints cannot: its tool would leave the line, so that jogging does not move it.
+    """
+    _, off = joint_shares(model, start, direction)
+    return off <= OFF_LINE * float(np.linalg.norm(direction))
+
+
+def joint_shares(model: RobotModel, positions: Array, velocity: Array) -> tuple[Array, float]:
+    """Return speeds of the joints for a velocity of the tool, and what they miss of it in [m/s].
+
+    The speeds are shares of the limits, the velocity of the tool is in [m/s] in the base.
+    """
+    jacobian, twist = model.jacobian(positions), np.concatenate([velocity, np.zeros(3)])
+    shares = np.linalg.lstsq(jacobian * model.limits.velocity, twist, rcond=1e-3)[0]
+    off = (jacobian @ (model.limits.velocity * shares) - twist)[:3]
+    return shares, float(np.linalg.norm(off))
+
+
+def square_speed(model: RobotModel, start: Array) -> float:
+    """Return a speed for the squares that is reached early on each side in [m/s].
+
+    A joint that moves r for each metre reaches its speed in r v/a + a/j.
+    """
+    limits = model.limits
+    scaled = np.linalg.pinv(model.jacobian(start) * limits.velocity, rcond=1e-3)[:, :3]
+    frames = (model.base, model.tip)
+    axes = np.hstack([model.pose(start, each).rotation[:, :2] for each in frames])
+    rates = limits.velocity * np.abs(scaled @ axes).max(axis=1)
+    build_up, length = limits.acceleration / limits.jerk, MAX_RUN_UP * SIDE
+    root = np.sqrt(build_up**2 + 4.0 * length * rates / limits.acceleration)
+    return min(SPEED, float(np.min(2.0 * length / (build_up + root))))
+
+
+def is_free(model: RobotModel, begin: Array, end: Array) -> bool:
+    """Return whether no links meet on the straight way, as the controller judges it."""
+    way = end - begin
+    contact = PathCheck(model.scene).contact(lambda times: begin + np.outer(times, way), 1.0)
+    return contact is None
+
+
+def free_way(model: RobotModel, begin: Array, end: Array) -> list[Array]:
+    """Return the end, or a pose of the SRDF before it that leads around links."""
+    if not is_free(model, begin, end):
+        for via in model.poses.values():
+            if is_free(model, begin, via) and is_free(model, via, end):
+                return [via, end]
+    return [end]  # else the controller says which links are in the way
+
+
+def free_end(model: RobotModel, begin: Array) -> Array:
+    """Return where a trajectory leads, each joint in the direction in which it has more room.
+
+    Raises:
+        ModelError: Links are in the way of all of them.
+    """
+    for end in _ends(model, begin):
+        if (end != begin).any() and is_free(model, begin, end):
+            return end
+    raise ModelError(f'group {model.group}: links are in the way of all trajectories')
+
+
+def _ends(model: RobotModel, begin: Array) -> Iterator[Array]:
+    limits = model.limits
+    up, down = limits.upper - begin, begin - limits.lower
+    for way in WAYS:
+        room = np.minimum(way, 0.5 * np.maximum(up, down))
+        step = np.where(up >= down, room, -room)
+        yield begin + step
+        yield np.clip(begin - step, limits.lower, limits.upper)
+
+
+def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups) -> Sequence[Path]:
+    """Write the parameter files of the demo: the robot's own, and what the demo relies on."""
+    controller = controller_names(robot, groups)[groups.names[0]]
+    servo = {'command_in_type': 'speed_units', 'scale': {'linear': 1.0}}  # cap [m/s]
+    values = {
+        controller: {'ros__parameters': {'state_publish_rate': RATE}},
+        'servo_node': {'ros__parameters': {'moveit_servo': servo}},
+    }
+    path = folder / 'demo.yaml'
+    path.write_text(json.dumps(values), encoding='utf-8')
+    # the later of two equal names wins; a pattern of an earlier file loses to any name
+    return [*motion_files(robot, folder, ros, groups), namespaced_parameters(path, ros, folder)]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo; as :func:`.wave.main`."""
+    parsed = parse(
+        sys.argv[1:] if argv is None else argv,
+        'motion_demo',
+        'Bring a simulated arm up and move it: a square with the tool in the base frame and in '
+        'its own, into the straight arm and back, a trajectory with a speed override in its '
+        'middle, and one that is canceled. Ends with what was measured.',
+        'repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
+    )
+    return run(parsed, Motion, master=MOTION_NODE, files=demo_files, errors=(ArmError,))

@@ -1,0 +1,838 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""``ros2 run arm_bringup plan_demo``: a simulated arm picks and places among obstacles.
+
+A client of MoveIt's move_group as any other, by its public topics, services and actions. Poses are
+in the root link of the description in [m] and [rad].
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+import contextlib
+from dataclasses import dataclass
+from itertools import permutations, product
+import json
+import math
+import os
+from pathlib import Path
+import sys
+import time
+from typing import Any
+
+from control_msgs.action import GripperCommand
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion
+from moveit_msgs.action import MoveGroup
+from moveit_msgs.msg import (
+    AttachedCollisionObject,
+    CollisionObject,
+    Constraints,
+    DisplayTrajectory,
+    JointConstraint,
+    MoveItErrorCodes,
+    OrientationConstraint,
+    PlanningScene,
+    PositionConstraint,
+    RobotState,
+)
+from moveit_msgs.srv import ApplyPlanningScene, GetPositionIK, GetStateValidity
+import numpy as np
+from rclpy.action.client import ActionClient
+from sensor_msgs.msg import JointState
+from shape_msgs.msg import SolidPrimitive
+from urdf_reader import JointRange, read_urdf
+
+import arm_model
+from arm_model import ArmError, Array, Clearances, load_limits, RobotModel, start_pose
+from arm_planning import JointGoal, MotionRequest, Planner, PlanningCode, PlanningError
+from node_runner import LATCHED
+from process_supervisor import CallError, namespaced_parameters, RosOptions
+
+from ..description import read_semantic
+from ..exceptions import RobotError
+from ..groups import MovedGroups
+from ..motion import controller_names, planning_files
+from ..robots import Robot
+from ..service_client import ServiceClient
+from ..session import locate, Session
+from ..stack import MOTION_NODE
+from .arm import ActionRun, ANSWER_TIMEOUT, ArmDemo, EndRequested, parse, run
+
+SLOW, CAREFUL, USUAL, FREE = 0.1, 0.2, 0.4, 0.5
+"""Shares of the limits at which the arm meets a box, follows lines, goes around, moves freely."""
+PLANNING_TIME, IK_TIMEOUT = 5.0, 0.5
+"""Longest time for planning, as MoveGroupInterface asks for, and for inverse kinematics in [s]."""
+JOINT_TOLERANCE, POSITION_TOLERANCE, TURN_TOLERANCE = 1e-4, 1e-4, 1e-3
+"""Tolerances of goals as MoveGroupInterface has them in [rad], [m] and [rad]."""
+START_TIMEOUT, MOTION_TIMEOUT, SETTLE_TIMEOUT = 60.0, 120.0, 5.0
+"""Longest time in [s] until move_group has received joint states, since DDS takes long on a busy
+computer, of a motion, and until what happened is seen."""
+DURATION_MARGIN = 20.0
+"""How much longer than planned a motion may take on a busy computer in [s]."""
+WORST_JOINT, WORST_PLACE, STILL = 5e-3, 2e-3, 1e-2
+"""Farthest that a joint may stand from its goal in [rad] or [m], that a tool or the part may be
+from theirs in [m], and that joints move of an arm that was refused a motion in [rad] or [m]."""
+EARLY = 0.15
+"""Share of the way after which a box appears."""
+AT_REST, REST_STATES, SHORT_REST_STATES = 5e-4, 16, 4
+"""An arm rests whose joints move less than so far in [rad] or [m], in so many joint states; what
+is planned anew while a motion goes on may follow the rest within a tenth of a second."""
+EDGES, SHARES, ROOM = (0.08, 0.06, 0.04, 0.03, 0.02), (0.6, 0.5, 0.7, 0.45), 0.06
+"""Edges of a box in the way as shares of the arm's reach, the largest that is possible is taken;
+where on a path it appears; and its least distance from both ends, as a share of the reach."""
+LEAST_REACH, LEAST_SWING, FAR = 0.05, 0.25, 1.0
+"""Reach of an arm that is shorter in [m]; least way of the tip around a box as a share of it; and
+the distance beyond which all count as this in [m]."""
+GAP, APPROACH = 0.003, 0.1
+"""Room below the part in [m]; straight approach and retreat as a share of the reach."""
+PART, PILLAR, VISITOR = 'part', 'pillar', 'visitor'
+WITH_GRIPPER = '_hand'
+"""What follows the name of a robot in that of its folder with a gripper."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Where an arm picks and places: a table around its first axis, a pillar in the middle.
+
+    Attributes:
+        group: The group that moves.
+        reach: Reach of the arm in [m]; table, pillar and wall are shares of it.
+        centre: Direction of the pillar, its distance, and the height of the table.
+        part: Edges of the part in [m].
+        below: How far the middle of the part is below the tip while it is held in [m].
+        turn: Turn of the tip against the part in [rad].
+        touch_links: Links that the part may touch while it is held.
+        above: Joint positions near which the straight approach to each of the two places begins.
+        aside: Joint, and its position, of a pose on whose way a box can appear.
+        gripper: Group and joint of the gripper, and where it is open and closed; None without.
+    """
+
+    group: str
+    reach: float
+    centre: tuple[float, float, float]
+    part: tuple[float, float, float]
+    below: float
+    turn: float
+    touch_links: tuple[str, ...]
+    above: tuple[tuple[float, ...], tuple[float, ...]]
+    aside: tuple[str, float]
+    gripper: tuple[str, str, float, float] | None = None
+
+    def at(self, spread: float, height: float, further: float = 0.0) -> tuple[float, ...]:
+        """Return x, y, z and yaw at an angle from the pillar, on a height above the table."""
+        direction, radius, top = self.centre
+        angle, radius = direction + spread, radius + further
+        return radius * math.cos(angle), radius * math.sin(angle), top + height, angle
+
+    def part_at(self, place: int) -> tuple[float, ...]:
+        """Return where the part is at one of the two places: x, y, z and yaw."""
+        return self.at((0.6, -0.6)[place], GAP + self.part[2] / 2)
+
+    def tip_at(self, place: int, lifted: float = 0.0) -> Pose:
+        """Return where the tip takes the part up, or the same lifted."""
+        x, y, z, yaw = self.part_at(place)
+        return downwards(x, y, z + self.below + lifted, yaw + self.turn)
+
+    def obstacles(self) -> list[CollisionObject]:
+        """Return table, pillar and wall."""
+        thin, wide, deep, tall, thick = (
+            share * self.reach for share in (0.03, 1.3, 0.5, 0.3, 0.06)
+        )
+        return [
+            box('table', (deep, wide, thin), self.at(0.0, -thin / 2, 0.05 * self.reach)),
+            box(PILLAR, (thick, thick, tall), self.at(0.0, tall / 2)),
+            box('wall', (thin, wide, 2 * tall), self.at(0.0, tall, 0.33 * self.reach)),
+        ]
+
+
+CELLS = {
+    'panda_hand': Cell(
+        group='panda_arm',
+        reach=0.986,
+        centre=(0.0, 0.5424, 0.1479),
+        part=(0.04, 0.052, 0.08),
+        below=0.1386,
+        turn=-0.75 * math.pi,
+        touch_links=('panda_link7', 'panda_hand', 'panda_leftfinger', 'panda_rightfinger'),
+        above=(
+            (-0.189, -0.016, 0.785, -2.091, 0.013, 2.079, 2.347),
+            (-0.607, -0.012, 0.007, -2.091, 0.0, 2.079, 2.356),
+        ),
+        aside=('panda_joint4', -0.856),
+        gripper=('hand', 'panda_finger_joint1', 0.035, 0.02585),
+    ),
+    'prbt': Cell(
+        group='manipulator',
+        reach=0.741,
+        centre=(math.pi, 0.4076, 0.1111),
+        part=(0.052, 0.067, 0.0741),
+        below=0.0466,
+        turn=0.0,
+        touch_links=('prbt_flange',),
+        above=((0.6, -0.537, 1.765, 0.0, 0.839, 0.0), (-0.6, -0.537, 1.765, 0.0, 0.839, 0.0)),
+        aside=('prbt_joint_1', -1.5),
+    ),
+    'gp110': Cell(
+        group='gp110_arm',
+        reach=2.645,
+        centre=(0.0, 1.4548, 0.3968),
+        part=(0.185, 0.241, 0.2645),
+        below=0.1443,
+        turn=0.0,
+        touch_links=('link_6_t',),
+        above=((0.6, 0.14, -0.339, 0.0, -1.093, 0.0), (-0.6, 0.14, -0.339, 0.0, -1.093, 0.0)),
+        aside=('joint_1_s', 1.5),
+    ),
+}
+"""Cells of the robots here, by their folder."""
+
+
+@dataclass(frozen=True)
+class Swing:
+    """A motion around a box, for an arm without a cell: from one pose of the SRDF to another.
+
+    Attributes:
+        begin: Joint positions at its begin in [rad] or [m].
+        end: Joint positions at its end.
+        inside: Joint positions at which the arm touches the box.
+        box: The box.
+    """
+
+    begin: Array
+    end: Array
+    inside: Array
+    box: CollisionObject
+
+
+class Plan(ArmDemo):
+    """Pick, place, a box in the way, a blocked goal; without a cell a motion around a box."""
+
+    beside = ', and move_group'
+    label = 'plan'
+
+    def __init__(
+        self,
+        arm: Session,
+        limits: Mapping[str, JointRange],
+        duration: float | None,
+        groups: MovedGroups,
+    ) -> None:
+        scene, ros = 'moveit_msgs/srv/GetPlanningScene', arm.ros
+        commands = [
+            f'ros2 topic echo {ros.resolve("display_planned_path")}',
+            f'ros2 service call {ros.resolve("get_planning_scene")} {scene}',
+        ]
+        super().__init__(arm, limits, duration, commands)
+        robot = arm.robot
+        self.root = read_urdf(arm.urdf).root
+        self.group = groups.arms[0]
+        self.model = RobotModel(
+            arm.urdf,
+            read_semantic(robot),
+            load_limits(robot.limits),
+            self.group,
+            robot.tip_link or None,
+            folder=robot.description.parent,
+        )
+        cell = CELLS.get(robot.name)
+        self.cell = cell if cell is not None and cell.group == self.group else None
+        self.home = start_pose(self.model)
+        self.swing: Swing | None = None
+        if self.cell is None:
+            self.swing = find_swing(self.model, self.home)
+        elif self.cell.gripper:
+            group, joint, opened, _ = self.cell.gripper
+            self.model = self.model.with_others({joint: opened})
+            self.gripper_action = f'{controller_names(robot, groups)[group]}/gripper_cmd'
+        self.positions: dict[str, float] = {}
+        self.states = 0  # how many joint states have come
+        self.paths: list[DisplayTrajectory] = []
+        self.scene = PlanningScene()  # as viewers are shown it
+        self.planning_times: list[float] = []
+        self.text = ''
+        self._place = 0  # where the part is
+        self._run: ActionRun | None = None
+
+    def join(self, given_up: Callable[[], bool]) -> ServiceClient:
+        """Join the ROS graph as a client of move_group does, and as a viewer."""
+        client = super().join(given_up)
+        node = client.node
+        self._move = ActionClient(node, MoveGroup, 'move_action')
+        self._apply = node.create_client(ApplyPlanningScene, 'apply_planning_scene')
+        self._ik = node.create_client(GetPositionIK, 'compute_ik')
+        self._validity = node.create_client(GetStateValidity, 'check_state_validity')
+        if self.cell is not None and self.cell.gripper:
+            self._gripper = ActionClient(node, GripperCommand, self.gripper_action)
+        node.create_subscription(JointState, 'joint_states', self._take_joints, 50)
+        path, scene = 'display_planned_path', 'monitored_planning_scene'
+        node.create_subscription(DisplayTrajectory, path, self.paths.append, LATCHED)
+        node.create_subscription(PlanningScene, scene, self._take_scene, LATCHED)
+        return client
+
+    def line(self) -> str:
+        """Return what was planned last."""
+        planned = f'planned in {_ms(self.planning_times[-1])}   ' if self.planning_times else ''
+        return planned + self.text
+
+    def move(self) -> None:
+        """Run the parts until the time is over; at Ctrl-C cancel what is on its way."""
+        try:
+            self.repeat(self._begin, self._parts)
+        except EndRequested:
+            self.enter('leaving')
+            if self._run is not None and not self._run.done:
+                self._run.cancel()
+        planned = 'nothing was planned'
+        if times := self.planning_times:
+            planned = (
+                f'{len(times)} plans, p50 {_ms(np.median(times))}, greatest {_ms(max(times))}'
+            )
+        self.add('planning', planned)
+        self.add('bus and loop', self.bus_line())
+        self.conclude()
+
+    def _begin(self) -> None:
+        self.enter('putting the scene up')
+        self.wait_moving(lambda: self.states > 0, SETTLE_TIMEOUT, 'joint states')
+        if self.cell is not None:
+            part = box(PART, self.cell.part, self.cell.part_at(0))
+            self._add(*self.cell.obstacles(), part)
+            home = self._joints(self.home)
+        elif self.swing is not None:
+            home = self._joints(self.swing.begin)
+        else:
+            return
+        self.enter('home, by free motion')
+        deadline = time.monotonic() + START_TIMEOUT
+        goal = self._attempt(home)
+        while code_of(goal) == 'ROBOT_STATE_STALE' and time.monotonic() < deadline:
+            goal = self._attempt(home)  # move_group has received no joint states yet
+        self._judge('home', goal, home)
+
+    def _parts(self) -> None:
+        first, motions = len(self.paths), len(self.planning_times)
+        if self.cell is None:
+            self.add('pick and place', 'left out: no place for it is known for this arm')
+            self._go_around()
+        else:
+            self._pick_and_place(self.cell)
+        self._judge_viewer(len(self.paths) - first, len(self.planning_times) - motions)
+
+    def _pick_and_place(self, cell: Cell) -> None:
+        source, target = self._place, 1 - self._place
+        home = self._joints(self.home)
+        self._pick(cell, source)
+        self._put(cell, target)
+        self._place = target
+        self.enter('home, by free motion')
+        self._go('home', home, FREE)
+        joint, place = cell.aside
+        self._meet({**home, joint: place})
+        pillar, grasp = cell.at(0.0, 0.15 * cell.reach), cell.tip_at(source)
+        inside = Pose(position=Point(x=pillar[0], y=pillar[1], z=pillar[2]))
+        inside.orientation = grasp.orientation
+        self._refused('blocked goal', self._solve(inside, cell.above[source], free=False), PILLAR)
+        self.enter('home, by free motion')
+        self._go('home', home, FREE)
+
+    def _pick(self, cell: Cell, place: int) -> None:
+        name, held = 'pick', ''
+        self.enter('to the part, by free motion')
+        if cell.gripper:
+            self._grip(cell.gripper[2])
+        free = self._go_above(name, cell, place)
+        self.enter('picking: a straight approach, attach, a straight retreat')
+        down = self._go(name, cell.tip_at(place), CAREFUL)
+        self._rest()
+        body = AttachedCollisionObject(link_name=self.model.tip, touch_links=cell.touch_links)
+        body.object.id, body.object.operation = PART, CollisionObject.ADD
+        self._change(attached=body)
+        if cell.gripper:
+            _, joint, _, closed = cell.gripper
+            self._grip(closed)
+            self._arrives(name, lambda: abs(self.positions[joint] - closed), WORST_JOINT, 'm')
+            held = f'; gripped with {joint} at {1e3 * closed:.1f} mm'
+        up = self._go(name, cell.tip_at(place, APPROACH * cell.reach), CAREFUL)
+        self._expect_part(name, is_held=True)
+        self.add(name, f'free motion {_ms(free)}; LIN {_ms(down)} down, {_ms(up)} up{held}')
+
+    def _put(self, cell: Cell, place: int) -> None:
+        name = 'place'
+        self.enter('with the part around the pillar, by free motion')
+        free = self._go_above(name, cell, place)
+        self.enter('placing: a straight approach, detach, a straight retreat')
+        down = self._go(name, cell.tip_at(place), CAREFUL)
+        if cell.gripper:
+            self._grip(cell.gripper[2])
+        self._rest()
+        body = AttachedCollisionObject(link_name=self.model.tip)
+        body.object.id, body.object.operation = PART, CollisionObject.REMOVE
+        self._change(attached=body)
+        self._expect_part(name, is_held=False)
+        seen = next((each for each in self.scene.world.collision_objects if each.id == PART), None)
+        off = math.inf
+        if seen is not None:
+            at = seen.pose.position
+            off = math.dist((at.x, at.y, at.z), cell.part_at(place)[:3])
+        self._arrives(f'{name}: the part', lambda: off, WORST_PLACE, 'm')
+        up = self._go(name, cell.tip_at(place, APPROACH * cell.reach), CAREFUL)
+        self.add(
+            name,
+            f'free motion {_ms(free)}; LIN {_ms(down)} down, {_ms(up)} up; the part is '
+            f'{1e3 * off:.1f} mm from where it was to go',
+        )
+
+    def _go_above(self, name: str, cell: Cell, place: int) -> float:
+        """Move freely to where a straight approach begins: what compute_ik finds for it."""
+        above = cell.tip_at(place, APPROACH * cell.reach)
+        return self._go(name, self._solve(above, cell.above[place], free=True), FREE)
+
+    def _meet(self, target: Mapping[str, float]) -> None:
+        """Put a box in the way of a motion: the arm stops, and the goal is reached around it."""
+        name = 'box in the way'
+        self.enter('slowly on, until a box appears in the way')
+        shown = len(self.paths)
+        goal = self._send(target, SLOW, replan=True)
+        end = np.array([target[joint] for joint in self.model.joints])
+        begin = self._here()
+
+        def on_the_way() -> bool:
+            executes = any(each.state == 'MONITOR' for each in goal.feedback)
+            done = np.abs(self._here() - begin).max() / max(np.abs(end - begin).max(), 1e-9)
+            return goal.done or (executes and len(self.paths) > shown and done > EARLY)
+
+        self.wait_moving(on_the_way, MOTION_TIMEOUT, 'motion')
+        rows = [] if goal.done else self._ahead(self.paths[-1])
+        visitor = box_ahead(self.model, rows) if rows else None
+        if visitor is None:
+            self._finish(name, goal, target)
+            self.problem(name, 'no place was found for a box in its way')
+            return
+        self.enter('a box is in the way: stop before it, plan anew, go around')
+        appeared = time.monotonic()
+        self._change(visitor)
+        at_rest, stop = self._rest(goal), 'not seen to rest'
+        if not goal.done:
+            room = 1e3 * distance_of(self.model, visitor, self._here())
+            stop = f'at rest {at_rest - appeared:.1f} s after it came, {room:.0f} mm before it'
+        planning_time = self._finish(name, goal, target)
+        plans = sum(each.state == 'PLANNING' for each in goal.feedback)
+        if plans < 2:  # once, and once more
+            self.problem(name, f'planned {plans} times: nothing was in the way')
+        self.add(name, f'{stop}, planned anew in {_ms(planning_time)} ({plans} plans)')
+        self._change(CollisionObject(id=VISITOR, operation=CollisionObject.REMOVE))
+
+    def _go_around(self) -> None:
+        """Move around a box, be refused inside of it, and come back around another one."""
+        name = f'{self.group} around a box'
+        self.enter(f'{self.group}: around a box, by free motion')
+        swing = self.swing
+        if swing is None:
+            self.add(name, 'left out: no motion was found for it')
+            return
+        begin = self._joints(swing.begin)
+        self._go(name, begin, FREE)
+        self._add(swing.box)
+        there = self._go(name, self._joints(swing.end), USUAL)
+        self._refused(f'{self.group}: blocked goal', self._joints(swing.inside), swing.box.id)
+        self._meet(begin)
+        self.add(name, f'planned in {_ms(there)}')
+        self._change(CollisionObject(id=swing.box.id, operation=CollisionObject.REMOVE))
+
+    def _refused(self, name: str, target: Mapping[str, float], obstacle: str) -> None:
+        """Judge a goal that is in contact: it is refused, the obstacle is named, nothing moves."""
+        self.enter('a goal that is blocked')
+        before = self._here()
+        goal = self._attempt(target)
+        code, message = code_of(goal), goal.result.error_code.message
+        self.text = f'{code}: {message}'
+        self.pause(0.5)
+        moved = float(np.abs(self._here() - before).max())
+        if code != 'GOAL_IN_COLLISION':
+            self.problem(name, f'{code} instead of GOAL_IN_COLLISION: {message}')
+        elif obstacle not in message:
+            self.problem(name, f'the message does not name {obstacle}: {message}')
+        if moved > STILL:
+            self.problem(name, f'a joint moved by {moved:.3f}')
+        self.add(name, f'{code}: {message}')
+
+    def _judge_viewer(self, paths: int, motions: int) -> None:
+        """Judge what a viewer was shown: a path of each motion, and the robot where it rests."""
+        name = 'viewer'
+
+        def off() -> float:
+            state = self.scene.robot_state.joint_state
+            shown: dict[str, float] = dict(zip(state.name, state.position, strict=True))
+            return max(
+                abs(shown.get(joint, math.inf) - self.positions[joint]) for joint in self.limits
+            )
+
+        self._arrives(f'{name}: the robot in monitored_planning_scene', off, WORST_JOINT, 'rad')
+        if paths < motions:
+            self.problem(name, f'{paths} paths on display_planned_path of {motions} motions')
+        things = ', '.join(each.id for each in self.scene.world.collision_objects) or 'nothing'
+        self.add(name, f'{paths} paths on display_planned_path; in the scene at the end: {things}')
+
+    def _expect_part(self, name: str, *, is_held: bool) -> None:
+        """Judge whether the scene that viewers get has the part where it is."""
+
+        def right() -> bool:
+            state, world = self.scene.robot_state, self.scene.world
+            held = any(each.object.id == PART for each in state.attached_collision_objects)
+            lies = any(each.id == PART for each in world.collision_objects)
+            return (held, lies) == (is_held, not is_held)
+
+        if not self._comes(right):
+            where = 'attached' if is_held else 'in the world'
+            self.problem(name, f'monitored_planning_scene does not have the part {where}')
+
+    def _go(self, name: str, target: Mapping[str, float] | Pose, speed: float) -> float:
+        """Move to joint positions freely, to a pose along a line; return the planning time in [s].
+
+        Raises:
+            CallError: It failed.
+        """
+        return self._finish(name, self._send(target, speed), target)
+
+    def _finish(self, name: str, goal: ActionRun, target: Mapping[str, float] | Pose) -> float:
+        self.wait_moving(lambda: goal.done, MOTION_TIMEOUT, f'the end of a motion ({name})')
+        return self._judge(name, goal, target)
+
+    def _attempt(self, target: Mapping[str, float]) -> ActionRun:
+        """Move freely, and wait for the end of that, whatever it is."""
+        goal = self._send(target, FREE)
+        self.wait_moving(lambda: goal.done, MOTION_TIMEOUT, 'the end of a motion')
+        return goal
+
+    def _judge(self, name: str, goal: ActionRun, target: Mapping[str, float] | Pose) -> float:
+        """Judge the end of a motion: where the joints are seen, and whether something touches."""
+        if (code := code_of(goal)) != 'SUCCESS':
+            raise CallError(f'{name}: {code}: {goal.result.error_code.message}')
+        planning_time = float(goal.result.planning_time)
+        self.planning_times.append(planning_time)
+
+        def off() -> float:
+            if not isinstance(target, Pose):
+                return max(abs(self.positions[joint] - at) for joint, at in target.items())
+            tip = self.model.kinematics.link_pose(self.model.tip, self._here()).position
+            return math.dist(tip, (target.position.x, target.position.y, target.position.z))
+
+        worst, unit = (WORST_PLACE, 'm') if isinstance(target, Pose) else (WORST_JOINT, 'rad')
+        self._arrives(name, off, worst, unit)
+        request = GetStateValidity.Request(group_name=self.group)
+        request.robot_state.is_diff = True
+        answer = self._call(self._validity, request, 'check_state_validity')
+        if not answer.valid:
+            pairs = (
+                f'{each.contact_body_1} and {each.contact_body_2}' for each in answer.contacts
+            )
+            self.problem(name, f'not valid at its end; in contact: {", ".join(pairs)}')
+        return planning_time
+
+    def _arrives(self, name: str, off: Callable[[], float], worst: float, unit: str) -> None:
+        """Judge where something comes to rest within some seconds."""
+        if not self._comes(lambda: off() <= worst):
+            self.problem(name, f'{1e3 * off():.1f} m{unit} from its goal')
+
+    def _comes(self, condition: Callable[[], bool]) -> bool:
+        """Return whether something comes true within some seconds."""
+        with contextlib.suppress(CallError):
+            self.wait_moving(condition, SETTLE_TIMEOUT, 'it')
+        return condition()
+
+    def _rest(self, goal: ActionRun | None = None) -> float:
+        """Wait until no joint moves, or a motion has ended; return when one moved last in [s]."""
+        enough = SHORT_REST_STATES if goal else REST_STATES
+        last, moved, states = self._here(), time.monotonic(), self.states
+
+        def rests() -> bool:
+            nonlocal last, moved, states
+            here = self._here()
+            if float(np.abs(here - last).max()) > AT_REST:
+                last, moved, states = here, time.monotonic(), self.states
+            return self.states - states >= enough or (goal is not None and goal.done)
+
+        self.wait_moving(rests, MOTION_TIMEOUT, 'rest')
+        return moved
+
+    def _here(self) -> Array:
+        """Return where the joints of the arm were seen last."""
+        return np.array([self.positions[joint] for joint in self.model.joints])
+
+    def _joints(self, positions: Array) -> dict[str, float]:
+        return dict(zip(self.model.joints, positions.tolist(), strict=True))
+
+    def _ahead(self, path: DisplayTrajectory) -> list[Array]:
+        """Return positions of the arm on what is left of a path, from where they are."""
+        here, rows = self._here(), []
+        for each in path.trajectory:
+            names = list(each.joint_trajectory.joint_names)
+            order = [names.index(joint) for joint in self.model.joints]
+            rows += [np.array(point.positions)[order] for point in each.joint_trajectory.points]
+        passed = min(range(len(rows)), key=lambda row: float(np.abs(rows[row] - here).max()))
+        return [here, *rows[passed + 1 :]]
+
+    def _send(
+        self, target: Mapping[str, float] | Pose, speed: float, *, replan: bool = False
+    ) -> ActionRun:
+        """Send a goal to move_action, as MoveGroupInterface::move does; LIN to a pose."""
+        goal = MoveGroup.Goal()
+        request, options = goal.request, goal.planning_options
+        request.group_name = self.group
+        request.num_planning_attempts, request.allowed_planning_time = 1, PLANNING_TIME
+        request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = speed
+        request.start_state.is_diff = True
+        options.planning_scene_diff.is_diff = True
+        options.planning_scene_diff.robot_state.is_diff = True
+        options.replan = replan
+        if isinstance(target, Pose):
+            request.planner_id = 'LIN'
+            request.goal_constraints = [pose_goal(self.root, self.model.tip, target)]
+        else:
+            request.goal_constraints = [joint_goal(target)]
+        self.text = request.planner_id or 'free motion'
+        self._run = ActionRun(self.client, self._move, goal, 'move_action')
+        return self._run
+
+    def _solve(self, pose: Pose, seed: Sequence[float], *, free: bool) -> dict[str, float]:
+        """Return joint positions for a pose of the tip, near others; whether nothing may touch.
+
+        Raises:
+            CallError: There are none, or move_group does not answer.
+        """
+        request = GetPositionIK.Request()
+        wanted = request.ik_request
+        wanted.group_name, wanted.ik_link_name = self.group, self.model.tip
+        wanted.avoid_collisions = free
+        wanted.pose_stamped = PoseStamped(pose=pose)
+        wanted.pose_stamped.header.frame_id = self.root
+        wanted.robot_state = RobotState(is_diff=True)
+        wanted.robot_state.joint_state.name = list(self.model.joints)
+        wanted.robot_state.joint_state.position = [float(each) for each in seed]
+        wanted.timeout.nanosec = round(1e9 * IK_TIMEOUT)
+        answer = self._call(self._ik, request, 'compute_ik')
+        code = answer.error_code
+        if code.val != MoveItErrorCodes.SUCCESS:
+            raise CallError(f'compute_ik: {PlanningCode(code.val).name}: {code.message}')
+        state = answer.solution.joint_state
+        places = dict(zip(state.name, state.position, strict=True))
+        return {joint: places[joint] for joint in self.model.joints}
+
+    def _grip(self, position: float) -> None:
+        """Move the gripper, and wait until it is there.
+
+        Raises:
+            CallError: It did not get there, or its controller does not answer.
+        """
+        goal, name = GripperCommand.Goal(), self.gripper_action
+        goal.command.position = position
+        grip = ActionRun(self.client, self._gripper, goal, name)
+        self.client.wait_until(lambda: grip.done, ANSWER_TIMEOUT, f'the end of {name}')
+        if not grip.result.reached_goal:
+            where = grip.result.position
+            raise CallError(f'{name}: {position:.4f} was not reached: {where:.4f}')
+
+    def _add(self, *things: CollisionObject) -> None:
+        """Put things into the scene, and wait until viewers are shown them."""
+        self._change(*things)
+        names = {each.id for each in things}
+        self.wait_moving(
+            lambda: names <= {each.id for each in self.scene.world.collision_objects},
+            SETTLE_TIMEOUT,
+            f'{", ".join(sorted(names))} in monitored_planning_scene',
+        )
+
+    def _change(
+        self, *things: CollisionObject, attached: AttachedCollisionObject | None = None
+    ) -> None:
+        """Change the scene, as PlanningSceneInterface does.
+
+        Raises:
+            CallError: It was refused, or move_group does not answer.
+        """
+        diff = PlanningScene(is_diff=True)
+        diff.robot_state.is_diff = True
+        for each in things:
+            each.header.frame_id = self.root
+        diff.world.collision_objects = list(things)
+        if attached is not None:
+            diff.robot_state.attached_collision_objects = [attached]
+        request = ApplyPlanningScene.Request(scene=diff)
+        if not self._call(self._apply, request, 'apply_planning_scene').success:
+            raise CallError('apply_planning_scene: refused; the log of move_group says why')
+
+    def _call(self, client: Any, request: Any, name: str) -> Any:  # noqa: ANN401
+        self.client.wait_until(client.service_is_ready, ANSWER_TIMEOUT, f'the service {name}')
+        self.client.wait_until_known([name], ANSWER_TIMEOUT)
+        future = client.call_async(request)
+        self.client.wait_until(future.done, ANSWER_TIMEOUT, f'the answer of {name}')
+        return future.result()
+
+    def _take_joints(self, message: JointState) -> None:
+        self.positions.update(zip(message.name, message.position, strict=False))
+        self.states += 1
+
+    def _take_scene(self, message: PlanningScene) -> None:
+        self.scene = message
+
+
+def _ms(duration: float) -> str:
+    return f'{1e3 * duration:.0f} ms'
+
+
+def code_of(goal: ActionRun) -> str:
+    """Return MoveIt's code of the end of a motion by its name."""
+    value = goal.result.error_code.val
+    try:
+        return PlanningCode(value).name
+    except ValueError:
+        return str(value)
+
+
+def joint_goal(joints: Mapping[str, float]) -> Constraints:
+    """Return the goal that joints are at positions."""
+    return Constraints(
+        joint_constraints=[
+            JointConstraint(
+                joint_name=name,
+                position=position,
+                tolerance_above=JOINT_TOLERANCE,
+                tolerance_below=JOINT_TOLERANCE,
+                weight=1.0,
+            )
+            for name, position in joints.items()
+        ]
+    )
+
+
+def pose_goal(frame: str, link: str, pose: Pose) -> Constraints:
+    """Return the goal that a link is at a pose."""
+    place = PositionConstraint(link_name=link, weight=1.0)
+    turn = OrientationConstraint(link_name=link, weight=1.0, orientation=pose.orientation)
+    place.header.frame_id = turn.header.frame_id = frame
+    sphere = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[POSITION_TOLERANCE])
+    place.constraint_region.primitives = [sphere]
+    place.constraint_region.primitive_poses = [pose]
+    turn.absolute_x_axis_tolerance = TURN_TOLERANCE
+    turn.absolute_y_axis_tolerance = TURN_TOLERANCE
+    turn.absolute_z_axis_tolerance = TURN_TOLERANCE
+    return Constraints(position_constraints=[place], orientation_constraints=[turn])
+
+
+def downwards(x: float, y: float, z: float, yaw: float) -> Pose:
+    """Return a pose whose z axis points down, turned by half a turn about its x axis."""
+    turn = Quaternion(x=math.cos(yaw / 2), y=math.sin(yaw / 2), z=0.0, w=0.0)
+    return Pose(position=Point(x=x, y=y, z=z), orientation=turn)
+
+
+def box(name: str, edges: Sequence[float], place: Sequence[float]) -> CollisionObject:
+    """Return a box with its middle at a place: x, y, z and yaw."""
+    x, y, z, yaw = place
+    message = CollisionObject(id=name, operation=CollisionObject.ADD)
+    turn = Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+    message.pose = Pose(position=Point(x=x, y=y, z=z), orientation=turn)
+    message.primitives = [SolidPrimitive(type=SolidPrimitive.BOX, dimensions=list(edges))]
+    message.primitive_poses = [Pose()]
+    return message
+
+
+def cube_at(model: RobotModel, name: str, edge: float, positions: Array) -> CollisionObject:
+    """Return a cube around the tip of an arm at joint positions."""
+    place = model.kinematics.link_pose(model.tip, positions).position
+    return box(name, (edge, edge, edge), (*place.tolist(), 0.0))
+
+
+def with_box(model: RobotModel, thing: CollisionObject) -> arm_model.PlanningScene:
+    """Return the scene of an arm with an upright box in it."""
+    at = thing.pose.position
+    pose = arm_model.Pose(arm_model.ORIGIN.rotation, arm_model.frozen([at.x, at.y, at.z]))
+    shape = arm_model.Box(*thing.primitives[0].dimensions)
+    return model.scene.with_object(arm_model.CollisionObject(thing.id, shape, pose=pose))
+
+
+def distance_of(model: RobotModel, thing: CollisionObject, positions: Array) -> float:
+    """Return the distance of a box from an arm in [m]; negative where they touch."""
+    scene = with_box(model, thing)
+    distances = Clearances(scene).least(positions, FAR).tolist()
+    pairs = zip(scene.pairs, distances, strict=True)
+    return min((distance for pair, distance in pairs if thing.id in pair), default=FAR)
+
+
+def box_ahead(model: RobotModel, rows: Sequence[Array]) -> CollisionObject | None:
+    """Return a box into which an arm would run on its way, clear of both ends of that."""
+    reach = max(model.reach, LEAST_REACH)
+    for edge, share in product(EDGES, SHARES):
+        at = rows[int(share * (len(rows) - 1))]
+        thing = cube_at(model, VISITOR, edge * reach, at)
+        room = min(distance_of(model, thing, each) for each in (rows[0], rows[-1]))
+        if distance_of(model, thing, at) < 0.0 and room > ROOM * reach:
+            return thing
+    return None
+
+
+def find_swing(model: RobotModel, home: Array) -> Swing | None:
+    """Return a motion between poses that a box makes worth planning; None where none is found."""
+    planner, reach = Planner(model), max(model.reach, LEAST_REACH)
+    poses = [home, *model.poses.values()]
+    for begin, end in permutations(poses, 2):
+        tips = (model.pose(each).position for each in (begin, end))
+        if math.dist(*tips) < LEAST_SWING * reach:
+            continue
+        for edge in EDGES:
+            inside = 0.5 * (begin + end)
+            thing = cube_at(model, f'{model.group}_box', edge * reach, inside)
+            room = min(distance_of(model, thing, each) for each in (begin, end))
+            if distance_of(model, thing, inside) >= 0.0 or room <= ROOM * reach:
+                continue
+            request = MotionRequest(begin, [JointGoal(end)], timeout=2.0)
+            with contextlib.suppress(PlanningError):
+                planner.plan(request, with_box(model, thing))
+                return Swing(begin, end, inside, thing)
+    return None
+
+
+def with_gripper(arguments: argparse.Namespace) -> Robot:
+    """Find the robot; of one that is asked for by name, its folder with a gripper if there is one.
+
+    Raises:
+        RobotError: There is no such robot.
+    """
+    robot = locate(arguments)
+    if os.sep not in arguments.robot:
+        both = argparse.Namespace(**{**vars(arguments), 'robot': robot.name + WITH_GRIPPER})
+        with contextlib.suppress(RobotError):
+            robot = locate(both)
+            arguments.robot = both.robot
+    return robot
+
+
+def demo_files(robot: Robot, folder: Path, ros: RosOptions, groups: MovedGroups) -> Sequence[Path]:
+    """Write the parameter files of the demo: those of a bring-up, and time for a busy computer."""
+    execution = {'allowed_goal_duration_margin': DURATION_MARGIN}
+    values = {'move_group': {'ros__parameters': {'trajectory_execution': execution}}}
+    path = folder / 'demo.yaml'
+    path.write_text(json.dumps(values), encoding='utf-8')
+    files = planning_files(robot, folder, ros, groups)
+    return [*files, namespaced_parameters(path, ros, folder)]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the demo; as :func:`.wave.main`."""
+    parsed = parse(
+        sys.argv[1:] if argv is None else argv,
+        'plan_demo',
+        'Bring a simulated arm up with move_group, and have it pick and place among obstacles, '
+        'go around a box that appears in its way, and refuse a blocked goal. Ends with what was '
+        'measured at the joint states.',
+        'repeat it until so many seconds are over, once at least (default: until Ctrl-C)',
+    )
+    return run(
+        parsed,
+        Plan,
+        master=MOTION_NODE,
+        find_robot=with_gripper,
+        files=demo_files,
+        plan=True,
+        errors=(ArmError,),
+    )

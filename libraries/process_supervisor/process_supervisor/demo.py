@@ -1,0 +1,351 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""A demo beside the processes of its robot: a live table, a summary and an exit code.
+
+This module is not imported by the package: a mere bring-up shows no table.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+import math
+import os
+import sys
+import threading
+import time
+from typing import Any, Generic, TYPE_CHECKING, TypeVar
+
+from rich import box
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from .beside import join_in_time
+from .console import explain
+from .exceptions import CallError, GivenUpError
+from .runner import Runner
+from .spec import ProcessSpec
+from .supervision import Notice, Outcome, Phase, Severity
+from .terminal import LineWriter, Painter, severity_of, wants_colour
+
+if TYPE_CHECKING:
+    from .graph_client import GraphClient
+
+ClientT = TypeVar('ClientT', bound='GraphClient')
+
+REFRESH_PERIOD = 0.2
+"""Time between two pictures in [s]."""
+LINE_PERIOD = 3.0
+"""Time between two lines of progress in [s]."""
+NARROWEST = 80
+"""Columns of a terminal below which there is no table."""
+SHOWN_MESSAGES = 2
+"""Lines that messages get below the table."""
+MESSAGE_LIFE = {Severity.INFO: 4.0, Severity.WARNING: 20.0, Severity.ERROR: 60.0}
+"""How long a message is shown in [s]."""
+
+
+class Demo(ABC, Generic[ClientT]):
+    """What a demo does and shows; :func:`run_demo` runs it.
+
+    All methods run in one thread beside the supervisor, except :meth:`leave`.
+
+    Attributes:
+        title: What runs, and where.
+        commands: Commands to try in a second terminal.
+        lines: Lines that title and table need; a terminal with fewer shows lines of progress.
+        widest: Columns after which the title line ends.
+        client: The node of the demo, from when it has :attr:`joined` the ROS graph.
+        moving: The robot moves: Ctrl-C is left to :meth:`perform`, which looks at :attr:`left`.
+        summary: Lines of the summary, empty before there is something to report.
+        problems: What went wrong; the exit code is 1 then.
+        warnings: What is worth a look.
+    """
+
+    opening = 'starting'
+    lines: int
+    widest = NARROWEST
+    client: ClientT
+
+    def __init__(self, title: str, commands: Sequence[str]) -> None:
+        self.title, self.commands = title, commands
+        self.joined = self.moving = False
+        self.summary: Sequence[str] = ()
+        self.problems: Sequence[str] = ()
+        self.warnings: Sequence[str] = ()
+        self._screen: _Screen | None = None
+        self._ending = threading.Event()
+        self._next_picture = 0.0
+        self._phase = ''
+
+    @abstractmethod
+    def join(self, given_up: Callable[[], bool]) -> ClientT:
+        """Join the ROS graph; waiting ends when ``given_up`` returns True."""
+
+    def prepare(self) -> None:  # a demo may need nothing
+        """Do what can be done while the processes start."""
+
+    @abstractmethod
+    def perform(self) -> None:
+        """Do it all, from when the processes are ready to the standstill of the robot."""
+
+    def stopping(self) -> None:
+        """End what would go on while the processes stop."""
+
+    @abstractmethod
+    def table(self, width: int) -> Sequence[RenderableType]:
+        """Draw the table into so many columns, at least 80."""
+
+    @abstractmethod
+    def progress(self) -> str:
+        """Return one line of progress."""
+
+    @property
+    def left(self) -> bool:
+        """The user requested the end."""
+        return self._ending.is_set()
+
+    def leave(self) -> bool:
+        """Request the end, from any thread; return whether the robot has to come to rest first."""
+        self._ending.set()
+        return self.moving
+
+    def enter(self, phase: str) -> None:
+        """Show what is going on from now on."""
+        if self._screen is not None and phase != self._phase:
+            self._phase = phase
+            self._screen.enter(phase)
+
+    def warn(self, text: str) -> None:
+        """Show a warning while the demo goes on."""
+        if self._screen is not None:
+            self._screen.notice(Notice(Severity.WARNING, text))
+
+    def show(self) -> None:
+        """Draw a new picture, when the last one is old enough."""
+        now = time.monotonic()
+        if self._screen is not None and now >= self._next_picture:
+            self._next_picture = now + REFRESH_PERIOD
+            self._screen.show()
+
+    def wait(self, condition: Callable[[], bool], timeout: float, what: str) -> None:
+        """Wait for something while pictures are drawn.
+
+        Raises:
+            CallError: It did not come within the timeout in [s].
+            GivenUpError: The processes have ended.
+        """
+
+        def reached() -> bool:
+            self.show()
+            return condition()
+
+        self.client.wait_until(reached, timeout, what)
+
+    def play(self, runner: Runner, screen: _Screen) -> None:
+        """Perform beside a supervisor, stop it, and show how everything ends."""
+        self._screen = screen
+        self.enter(self.opening)
+        try:
+            self.client = self.join(lambda: runner.phase in {Phase.STOPPING, Phase.STOPPED})
+            self.joined = True
+            self.prepare()
+            self.wait(lambda: runner.phase is Phase.RUNNING, math.inf, 'the processes')
+            self.perform()
+            runner.stop(Outcome(0, 'the demo has ended'))
+        except GivenUpError:
+            pass  # the supervisor knows why
+        except CallError as error:
+            runner.stop(Outcome(1, str(error)))
+        except BaseException as error:
+            runner.stop(Outcome(1, f'{type(error).__name__}: {error}'))
+            raise
+        finally:
+            if self.joined:
+                self._accompany(lambda: runner.phase is Phase.STOPPED)
+
+    def _accompany(self, stopped: Callable[[], bool]) -> None:
+        """Keep the picture alive until everything has ended: drives become disabled in it."""
+        try:
+            self.stopping()
+            self.enter('stopping')
+            while not stopped():
+                self.client.listen(REFRESH_PERIOD / 4)
+                self.show()
+            self._next_picture = 0.0
+            self.show()
+        finally:
+            self.client.close()
+
+
+class _Screen:
+    """Where a demo is seen: a live table in a terminal that has room for it, else lines."""
+
+    def __init__(
+        self, demo: Demo[Any], console: Console, write: LineWriter, painter: Painter
+    ) -> None:
+        self._demo, self._console, self._write, self._painter = demo, console, write, painter
+        self._begun, self._next_line = time.monotonic(), 0.0
+        self._phase = 'starting'
+        self._messages: deque[tuple[float, str]] = deque(maxlen=2 * SHOWN_MESSAGES)
+        self._notes: dict[str, str] = {}
+        self._commands = second_terminal(demo.commands)
+        self._lock = threading.Lock()
+        size = console.size
+        self.live: Live | None = None
+        if not console.is_terminal or console.is_dumb_terminal or console.encoding[:3] != 'utf':
+            write(demo.title)
+        elif size.width < NARROWEST or size.height < demo.lines:
+            room = f'{size.width} x {size.height} characters, too few for the table'
+            write(f'this terminal has {room}')
+            write(demo.title)
+        else:
+            self.live = Live(console=console, auto_refresh=False, redirect_stdout=False)
+            self.live.start()
+            self._refresh()
+
+    def enter(self, phase: str) -> None:
+        """Show what is going on: in the title, or as a line with the time since the start."""
+        self._phase = phase
+        if self.live is None:
+            self._next_line = time.monotonic() + LINE_PERIOD
+            self._write(f'{time.monotonic() - self._begun:6.1f} s  {phase}')
+        self._refresh()
+
+    def show(self) -> None:
+        """Draw the latest figures; as a line only every few seconds."""
+        if self.live is None and time.monotonic() >= self._next_line:
+            self.enter(self._demo.progress())
+        self._refresh()
+
+    def line(self, name: str, text: str) -> None:
+        """Show what a process wrote when it is a warning or an error, from any thread."""
+        severity = severity_of(text)
+        if severity is Severity.INFO:
+            return
+        if self.live is None:
+            self._write(self._painter.line(name, text))
+        self._keep(severity, f'{name}: {text}')
+
+    def notice(self, notice: Notice) -> None:
+        """Show a notice of the supervisor, from any thread."""
+        if self.live is None:
+            self._write(self._painter.notice(notice))
+        if notice.lasting:
+            self._notes[notice.process] = notice.text
+        else:
+            self._notes.pop(notice.process, None)
+            self._keep(notice.severity, notice.text)
+        self._refresh()
+
+    def close(self) -> None:
+        """Leave the last table where it is, without what can no longer be tried."""
+        if self.live is not None:
+            self._commands, self._notes = [], {}
+            self.enter('ended')
+            with self._lock:
+                self.live.stop()
+
+    def _keep(self, severity: Severity, text: str) -> None:
+        self._messages.append((time.monotonic() + MESSAGE_LIFE[severity], text))
+
+    def _refresh(self) -> None:
+        with self._lock:
+            if self.live is not None and self.live.is_started:
+                size = self._console.size
+                self.live.update(self._picture(size.width, size.height), refresh=True)
+
+    def _picture(self, width: int, height: int) -> RenderableType:
+        """Draw title, table, notes, messages, and commands to try, as far as there is room."""
+        demo, now = self._demo, time.monotonic()
+        title = Table.grid(expand=False)
+        title.width = min(width, demo.widest)
+        title.add_column(no_wrap=True, overflow='ellipsis', ratio=1)
+        title.add_column(justify='right', no_wrap=True)
+        right = Text(f'{self._phase}  {now - self._begun:.1f} s', style='cyan')
+        title.add_row(Text(demo.title, style='bold'), right)
+        parts: list[RenderableType] = [title, *demo.table(width)]
+        kept = [text for end, text in list(self._messages) if now < end][-SHOWN_MESSAGES:]
+        room = height - demo.lines
+        for lines in (
+            [Text(text, style='bold green', overflow='fold') for text in self._notes.values()],
+            [Text(text, style='yellow', no_wrap=True, overflow='ellipsis') for text in kept],
+            _folded(self._commands, width),
+        ):
+            if lines and room > 1:
+                shown = lines[: room - 1]
+                parts += [Text(''), *shown]
+                room -= 1 + len(shown)
+        return Group(*parts)
+
+
+def second_terminal(commands: Sequence[str]) -> list[str]:
+    """Return commands to try in a second terminal, after those that make it find this one."""
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    first = f'source env.sh; export ROS_DOMAIN_ID={domain}' if domain else 'source env.sh'
+    return [first, *commands]
+
+
+def _folded(commands: Sequence[str], width: int) -> list[Text]:
+    """Fold long commands by character, as a terminal does, so that they can be copied."""
+    indented = (f'  {command}' for command in commands)
+    folded = (line[i : i + width] for line in indented for i in range(0, len(line), width))
+    lines = [Text(line, style='cyan', no_wrap=True) for line in folded]
+    return [Text('try in a second terminal', style='bold'), *lines] if lines else []
+
+
+def make_table(*columns: tuple[str, int, bool]) -> Table:
+    """Return an empty table: name and least width of each column, and whether it holds numbers."""
+    table = Table(box=box.HORIZONTALS, show_edge=False, padding=0, header_style='bold')
+    for name, width, is_number in columns:
+        justify = 'right' if is_number else 'left'
+        table.add_column(name, no_wrap=True, min_width=width, justify=justify)  # type: ignore[arg-type]
+    return table
+
+
+def signed(value: float) -> str:
+    """Write a number with sign and three digits; what is unknown as a dash."""
+    # adding 0.0 turns a rounded -0.0 into 0.0
+    return f'{round(value, 3) + 0.0:+.3f}' if math.isfinite(value) else '-'
+
+
+def run_demo(demo: Demo[ClientT], processes: Sequence[ProcessSpec], *, endless: bool) -> int:
+    """Run a demo in a thread beside the supervisor of its processes.
+
+    Args:
+        demo: The demo.
+        processes: What runs.
+        endless: It ends at Ctrl-C; whoever has seen its table needs no summary then.
+
+    Returns:
+        0, or 1 when something went wrong.
+    """
+    write = LineWriter(sys.stdout)
+    painter = Painter('demo', [s.name for s in processes], wants_colour(sys.stdout, os.environ))
+    screen = _Screen(demo, Console(), write, painter)
+    try:
+        with Runner(processes, screen.line, screen.notice, on_interrupt=demo.leave) as runner:
+            thread = threading.Thread(
+                target=demo.play, args=[runner, screen], name='demo', daemon=True
+            )
+            thread.start()
+            outcome = runner.run()
+            late = join_in_time(thread)
+    finally:
+        screen.close()
+    if not (endless and screen.live is not None):
+        for line in demo.summary:
+            write(line)
+    for line in demo.warnings:
+        write(f'warning: {line}')
+    failures = [] if demo.left else [*demo.problems]
+    if outcome.exit_code:
+        failures = [explain(outcome), *failures]
+    if late:
+        failures.append(late)
+    for line in dict.fromkeys(failures):
+        write(f'error: {line}')
+    return 1 if failures else 0

@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo of the quadruped measures, and what it calls wrong."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import math
+import re
+
+from hypothesis import given
+from hypothesis import strategies as st
+from nav_msgs.msg import Odometry
+import pytest
+from rich.console import Console
+
+from process_supervisor import RosOptions
+from quad_bringup.examples.walk import (
+    PARTS,
+    Segment,
+    STANDSTILL,
+    Track,
+    Velocity,
+    Walk,
+    wrong_speed,
+)
+from quad_bringup.session import Session
+from quad_description import LEGS
+
+PERIOD = 0.02
+"""Time between two poses in [s]."""
+
+speed = st.floats(-0.5, 0.5)
+rate = st.floats(-3.0, 3.0)
+angle = st.floats(-math.pi, math.pi)
+AHEAD = Velocity(forward=0.2)
+JOINTS = [f'{leg}_{part}_joint' for leg in LEGS for part in PARTS]
+
+
+def pose(stamp: float, x: float, y: float, yaw: float) -> Odometry:
+    """Make a pose of a level body."""
+    message = Odometry()
+    message.header.stamp.sec = int(stamp)
+    message.header.stamp.nanosec = round(1e9 * (stamp % 1.0))
+    message.pose.pose.position.x, message.pose.pose.position.y = x, y
+    turn = message.pose.pose.orientation
+    turn.z, turn.w = math.sin(yaw / 2), math.cos(yaw / 2)
+    return message
+
+
+def drive(
+    track: Track, velocity: Velocity, start: tuple[float, float, float], time: float
+) -> None:
+    """Let a body move at a constant velocity of its own frame: along a circle."""
+    x, y, yaw = start
+    for index in range(round(time / PERIOD) + 1):
+        elapsed = index * PERIOD
+        turned = velocity.turn * elapsed
+        # the mean direction of a circle's chord is that at half the angle
+        chord = math.sin(turned / 2) / (turned / 2) * elapsed if abs(turned) > 1e-9 else elapsed
+        heading = yaw + turned / 2
+        cosine, sine = math.cos(heading), math.sin(heading)
+        dx = chord * (cosine * velocity.forward - sine * velocity.left)
+        dy = chord * (sine * velocity.forward + cosine * velocity.left)
+        track.take(pose(100.0 + elapsed, x + dx, y + dy, yaw + turned))
+
+
+@given(st.builds(Velocity, speed, speed, rate), st.tuples(speed, speed, angle))
+def test_a_constant_velocity_of_the_body_is_found_wherever_it_goes(
+    velocity: Velocity, start: tuple[float, float, float]
+) -> None:
+    """Over many turns, too: the angle is not wrapped."""
+    track = Track()
+    drive(track, velocity, start, 4.0)
+    for found in (track.mean_since(100.0, STANDSTILL), track.velocity):
+        assert found is not None
+        assert found.forward == pytest.approx(velocity.forward, abs=2e-4)
+        assert found.left == pytest.approx(velocity.left, abs=2e-4)
+        assert found.turn == pytest.approx(velocity.turn, abs=1e-6)
+
+
+def test_the_velocity_of_the_moment_forgets_what_was_before() -> None:
+    """It is that of the last second."""
+    track = Track()
+    drive(track, Velocity(forward=0.3), (0.0, 0.0, 0.0), 2.0)
+    for index in range(100):
+        track.take(pose(102.0 + (index + 1) * PERIOD, 0.6, 0.0, 0.0))
+    assert track.velocity is not None
+    assert track.velocity.forward == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_pose_that_is_not_newer_is_passed_over() -> None:
+    """Messages that come twice, or out of order, cover no way; one pose is no motion."""
+    track = Track()
+    assert track.velocity is None
+    for stamp, x in ((1.0, 0.0), (2.0, 0.2), (2.0, 0.9), (1.5, 5.0), (3.0, 0.4)):
+        track.take(pose(stamp, x, 0.0, 0.0))
+    assert (track.stamp, *track.way) == pytest.approx((3.0, 0.4, 0.0, 0.0))
+    assert track.mean_since(track.stamp, track.way) is None
+
+
+def segment(
+    measured: Velocity | None, odometry: Velocity | None = None, commanded: Velocity = AHEAD
+) -> Segment:
+    """Make a segment of 8 s."""
+    return Segment('walk', 8.0, commanded, measured, odometry)
+
+
+@pytest.mark.parametrize(
+    ('moved', 'words'),
+    [
+        (Velocity(0.196, 0.002, -0.01), '^$'),
+        (Velocity(0.12, 0.0, 0.0), 'walk: commanded .0.200.*moved .0.120'),
+        (Velocity(0.2, 0.06, 0.0), 'walk: .*moved'),
+        (Velocity(0.2, 0.0, 0.3), 'walk: .*moved'),
+        (Velocity(math.nan, 0.0, 0.0), 'walk: .*moved'),
+        (None, 'walk: no motion was measured'),
+    ],
+    ids=['good', 'slow', 'sideways', 'turning', 'nan', 'unknown'],
+)
+def test_a_robot_that_moves_otherwise_is_reported(moved: Velocity | None, words: str) -> None:
+    """By the segment, with both velocities."""
+    assert re.search(words, wrong_speed(segment(moved)))
+
+
+def test_a_slow_robot_that_stands_has_not_walked_and_odometry_is_second() -> None:
+    """What may be missing of a crawl is less than the whole of it."""
+    crawl = Velocity(forward=0.04)
+    assert 'walk: commanded +0.040' in wrong_speed(segment(STANDSTILL, commanded=crawl))
+    assert not wrong_speed(segment(Velocity(forward=0.03), commanded=crawl))
+    bad = Velocity(forward=0.1)
+    assert not wrong_speed(segment(None, AHEAD))
+    assert wrong_speed(segment(None, bad))
+    assert not wrong_speed(segment(AHEAD, bad))
+
+
+@pytest.mark.parametrize('is_known', [False, True])
+def test_the_table_fits_a_usual_terminal(is_known: bool) -> None:
+    """80 columns, in as many lines as it says, also before the robot is seen."""
+    quad = Session('XGO lite, simulated', '/tmp/xgo', JOINTS, [])
+    walk = Walk(quad, RosOptions(), argparse.Namespace(policy=None, gait='crawl', duration=None))
+    if is_known:
+        walk.targets = dict.fromkeys(JOINTS, -1.234)
+        walk.positions = dict.fromkeys(JOINTS, -1.235)
+        walk.fault, walk.tilt, walk.battery = 'fallen ' * 20, 1.0, 99.0
+        drive(walk.truth, Velocity(-0.2, -0.1, -1.5), (0.0, 0.0, 0.0), 1.0)
+    console = Console(file=io.StringIO(), width=80, height=24)
+    lines = [line for part in walk.table(80) for line in console.render_lines(part, pad=False)]
+    assert len(lines) == Walk.lines - 2  # a title, and one that is left free
+    texts = [''.join(each.text for each in line) for line in lines]
+    assert max(map(len, texts)) <= 80
+    assert sum(text.count('-1.234 -1.235') for text in texts) == 12 * is_known
+    assert ('waiting for the controller' in walk.progress()) == (not walk.state)
+    assert walk.share < 1.0
