@@ -15,8 +15,8 @@ import rclpy
 from ros_client import RosClient
 from servo_listener import ServoListener, TIMEOUT
 
-from arm_servo.teleop.servo_gamepad import ServoGamepad, Session
-from operator_input.ros import run_session
+from arm_servo.teleop.servo_gamepad import ServoGamepad
+from operator_input.ros import serve_teleop
 
 pytestmark = pytest.mark.scenario
 ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
@@ -36,7 +36,7 @@ def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
     rclpy.init(domain_id=isolation.domain_id)
     stop = threading.Event()
     node = ServoGamepad(InjectedDevices(pad))
-    thread = threading.Thread(target=run_session, args=[Session(node, stop), node])
+    thread = threading.Thread(target=serve_teleop, args=[node, stop])
     thread.start()
     try:
         with RosClient(isolation.domain_id, 'servo_node') as client:
@@ -50,6 +50,7 @@ def servo(pad: InjectedDevice, isolation: Isolation) -> Iterator[ServoListener]:
     finally:
         stop.set()
         thread.join()
+        assert pad.is_closed
         rclpy.shutdown()
 
 

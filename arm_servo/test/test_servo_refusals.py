@@ -75,6 +75,7 @@ def parameters(folder: Path, **values: object) -> list[str]:
             'another group of this robot',
         ),
         (ServoKeyboardInput, {'sped': 0.1}, "did you mean 'speed'"),
+        (ServoKeyboardInput, {'speed': 1.5}, 'speed is 1.5: it must be 0.01 to 1.0'),
         (ServoKeyboardInput, {'rate': 1}, 'rate is 1: it must be 10.0 to 500.0'),
         (gamepad, {'enable_button': 'eastt'}, "did you mean 'east'"),
         (gamepad, {'deadman_timeout': 20}, 'must be at least deadman_timeout, 20'),

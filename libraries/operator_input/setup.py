@@ -11,12 +11,12 @@ from setuptools import find_packages, setup
 FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
-    'show_keys = operator_input.show_keys:main',
-    'show_gamepad = operator_input.show_gamepad:main',
+    'show_keys = operator_input.show_input:show_keys',
+    'show_gamepad = operator_input.show_input:show_gamepad',
 ]
 COMMANDS = [
-    'operator-show-gamepad = operator_input.show_gamepad:main',
-    'operator-show-keys = operator_input.show_keys:main',
+    'operator-show-gamepad = operator_input.show_input:show_gamepad',
+    'operator-show-keys = operator_input.show_input:show_keys',
 ]
 
 CHECKOUT = Path(__file__).resolve().parents[2]

@@ -2,11 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keyboard and gamepad for a walking robot, and a multiplexer of velocity commands."""
 
-from .body_pose import BodyPose
 from .exceptions import CommandError, SettingError, TeleopError
-from .modes import Mode
-from .speeds import Speeds
-from .velocity import Velocity
+from .motion import BodyPose, Mode, Speeds, Velocity
 
 __all__ = [
     'BodyPose',

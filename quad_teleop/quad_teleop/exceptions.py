@@ -19,14 +19,8 @@ class TeleopError(Exception):
 
 
 class SettingError(TeleopError, ValueError):
-    """A parameter is misspelt, or its value makes no sense.
-
-    Scenarios: a priority above 255, two sources on one topic, a speed above its limit.
-    """
+    """Such as a priority above 255, two sources on one topic, a speed above its limit."""
 
 
 class CommandError(TeleopError, ValueError):
-    """A velocity is not finite.
-
-    Scenarios: a planner divided by zero and sends NaN.
-    """
+    """Such as NaN from a planner that divided by zero."""

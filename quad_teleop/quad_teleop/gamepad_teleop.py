@@ -1,17 +1,25 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Driving with a gamepad: from its state to velocities and requests. Pure; time is handed in."""
+"""Driving with a gamepad: from its state to velocities and requests. Pure; times are in [s]."""
 
 from __future__ import annotations
 
-from operator_input import CommandStream
-from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, GamepadState, Grip
+from collections.abc import Callable
 
-from .body_pose import BodyPose, NEUTRAL, PoseSteps
-from .modes import Mode
-from .requests import ClearFault, ModeRequest, PoseRequest, Request
-from .speeds import Speeds
-from .velocity import Direction, Velocity, ZERO
+from operator_input import CommandStream, DeadmanMapping, Robot
+from operator_input.gamepad import Axis, Button, Deadman, GamepadState, Grip
+
+from .motion import (
+    BodyPose,
+    Direction,
+    Mode,
+    NEUTRAL,
+    PoseSteps,
+    RobotRequest,
+    Speeds,
+    Velocity,
+    ZERO,
+)
 
 MODE_BUTTONS = {
     Button.SOUTH: Mode.STAND,
@@ -25,8 +33,8 @@ MODE_BUTTONS = {
 NEUTRAL_BUTTON, CLEAR_BUTTON = Button.START, Button.SELECT
 
 
-class GamepadTeleop(DeadmanTeleop[Velocity]):
-    """Moves while the deadman is held.
+class GamepadTeleop(DeadmanMapping):
+    """Moves while the deadman is held: the left stick walks, the right one turns.
 
     Attributes:
         pose: The pose of the body that was requested last.
@@ -34,27 +42,22 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
 
     def __init__(
         self,
+        robot: Robot,
+        deadman: Deadman,
+        stream: CommandStream[Velocity],
         normal: Speeds,
         turbo: Speeds,
-        deadman: Deadman,
+        *,
         steps: PoseSteps,
-        stream: CommandStream[Velocity],
+        warn: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Start idle.
-
-        Args:
-            normal: Speeds at the end of a stick's way.
-            turbo: The same with the turbo button.
-            deadman: Which buttons allow motion.
-            steps: How far a press of the d-pad tilts and lifts the body.
-            stream: Decides when to publish.
-        """
-        super().__init__(deadman, stream)
+        """Start idle, with the speeds at the end of a stick's way, and the steps of the d-pad."""
+        super().__init__(robot, deadman, stream, warn)
         self.pose = NEUTRAL
         self._speeds = {Grip.HELD: normal, Grip.TURBO: turbo}
         self._steps = steps
 
-    def wanted(self) -> Velocity | None:
+    def wanted(self, now: float) -> Velocity | None:
         """Return the velocity that is wanted; None without the deadman.
 
         Without a deadman button, a gamepad at rest requests nothing.
@@ -62,57 +65,39 @@ class GamepadTeleop(DeadmanTeleop[Velocity]):
         speeds = self._speeds.get(self.grip)
         if speeds is None:
             return None
-        velocity = direction(self.state).at(speeds.linear, speeds.angular)
+        axis = self.state.axis
+        velocity = Direction(axis(Axis.LEFT_Y), axis(Axis.LEFT_X), axis(Axis.RIGHT_X)).at(speeds)
         return None if velocity == ZERO and self._deadman.enable is None else velocity
 
-    def feed(self, state: GamepadState) -> list[Request]:
-        """Take a state of the gamepad.
+    def feed(self, state: GamepadState) -> list[Mode | BodyPose | RobotRequest]:
+        """Take a state of the gamepad; return what the person requests besides a velocity.
 
-        Args:
-            state: At rest when there is none.
-
-        Returns:
-            What the person requests besides a velocity. Whatever makes the robot move needs the
-            deadman, as walking does; lying down and clearing a fault, which moves nothing, need
-            none.
+        Whatever makes the robot move needs the deadman, as walking does; lying down and clearing a
+        fault, which moves nothing, need none.
         """
         before = self.take(state)
         allowed = self.grip is not Grip.RELEASED
-        requests: list[Request] = []
+        requests: list[Mode | BodyPose | RobotRequest] = []
         for button in state.pressed_since(before):
             mode = MODE_BUTTONS.get(button)
             if mode is not None and (allowed or mode is Mode.LIE):
-                requests.append(ModeRequest(mode))
+                requests.append(mode)
             elif button is CLEAR_BUTTON:
-                requests.append(ClearFault())
+                requests.append(RobotRequest.CLEAR_FAULT)
             elif button is NEUTRAL_BUTTON and allowed:
                 self.pose = NEUTRAL
-                requests.append(PoseRequest(self.pose))
-        return requests + (self._tilt(before, state) if allowed else [])
-
-    def _tilt(self, before: GamepadState, state: GamepadState) -> list[Request]:
-        way = BodyPose(
-            height=_pressed(Axis.DPAD_Y, before, state),
-            roll=-_pressed(Axis.DPAD_X, before, state),
-        )
-        pose = self._steps.moved(self.pose, way)
-        if pose == self.pose:
-            return []
-        self.pose = pose
-        return [PoseRequest(pose)]
+                requests.append(NEUTRAL)
+        pose = self._steps.moved(self.pose, _tilt(before, state))
+        if allowed and pose != self.pose:
+            self.pose = pose
+            requests.append(pose)
+        return requests
 
 
-def direction(state: GamepadState) -> Direction:
-    """Return where the sticks point: the left one walks, the right one turns.
+def _tilt(before: GamepadState, state: GamepadState) -> BodyPose:
+    """Return the steps of the sides of the d-pad that went down."""
 
-    Args:
-        state: The gamepad.
-    """
-    return Direction(
-        x=state.axis(Axis.LEFT_Y), y=state.axis(Axis.LEFT_X), yaw=state.axis(Axis.RIGHT_X)
-    )
+    def pressed(axis: Axis) -> float:
+        return state.axis(axis) if state.axis(axis) != before.axis(axis) else 0.0
 
-
-def _pressed(axis: Axis, before: GamepadState, state: GamepadState) -> float:
-    """Return the side of a d-pad that went down, 0 for none."""
-    return state.axis(axis) if state.axis(axis) != before.axis(axis) else 0.0
+    return BodyPose(height=pressed(Axis.DPAD_Y), roll=-pressed(Axis.DPAD_X))

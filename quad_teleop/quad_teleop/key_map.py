@@ -8,9 +8,7 @@ letters are those of champ_teleop.
 
 from __future__ import annotations
 
-from .body_pose import BodyPose
-from .modes import Mode
-from .velocity import Direction
+from .motion import BodyPose, Direction, Mode
 
 MOVES = {
     'u': Direction(x=1, yaw=1),

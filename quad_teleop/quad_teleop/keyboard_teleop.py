@@ -1,12 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Driving with keys: from key events to velocities and requests. Pure; time is handed in."""
+"""Driving with keys: from key events to velocities and requests. Pure; times are in [s]."""
 
 from __future__ import annotations
 
-from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, Note, Quit, Suspend
+from typing import Protocol
 
-from .body_pose import BodyPose, NEUTRAL, PoseSteps
+from operator_input import (
+    CommandStream,
+    HeldKeys,
+    KeyAction,
+    KeyEvent,
+    KeyMapping,
+    ProgramRequest,
+    Robot,
+    StatusPart,
+)
+
 from .key_map import (
     CLEAR_KEY,
     HELP,
@@ -21,12 +31,37 @@ from .key_map import (
     STOP_KEYS,
     SUSPEND_KEY,
 )
-from .requests import ClearFault, ModeRequest, PoseRequest, Request, StopRobot
-from .speeds import Speeds
-from .velocity import Velocity
+from .motion import BodyPose, Mode, NEUTRAL, PoseSteps, RobotRequest, Speeds, Velocity
+from .status import ControllerReport, hint, motion_parts, state_part
+
+REQUESTS: dict[str, ProgramRequest | RobotRequest] = {
+    CLEAR_KEY: RobotRequest.CLEAR_FAULT,
+    SUSPEND_KEY: ProgramRequest.SUSPEND,
+    ROBOT_STOP_KEY: RobotRequest.STOP,
+    **dict.fromkeys(QUIT_KEYS, ProgramRequest.QUIT),
+}
+
+Request = Mode | BodyPose | RobotRequest | ProgramRequest | str
 
 
-class KeyboardTeleop:
+class WatchedRobot(Robot, Protocol):
+    """The robot as the status line needs it.
+
+    Attributes:
+        mode: The mode that was granted last; None before.
+    """
+
+    mode: Mode | None
+
+    @property
+    def has_subscriber(self) -> bool:
+        """Whether anybody listens to the velocities."""
+
+    def report(self, now: float) -> ControllerReport | None:
+        """Return what the controller reported last; None when that is long ago."""
+
+
+class KeyboardTeleop(KeyMapping):
     """Moves while a key of the map is held, and stops when it is not.
 
     Attributes:
@@ -34,103 +69,70 @@ class KeyboardTeleop:
         pose: The pose of the body that was requested last.
     """
 
-    def __init__(
-        self, speeds: Speeds, steps: PoseSteps, held: HeldKeys, stream: CommandStream[Velocity]
-    ) -> None:
-        """Start idle.
+    introduction = HELP
+    robot: WatchedRobot
 
-        Args:
-            speeds: The speeds at the start.
-            steps: How far a key tilts and lifts the body.
-            held: Decides which key is held.
-            stream: Decides when to publish.
-        """
+    def __init__(
+        self,
+        robot: WatchedRobot,
+        held: HeldKeys,
+        stream: CommandStream[Velocity],
+        speeds: Speeds,
+        steps: PoseSteps,
+    ) -> None:
+        super().__init__(robot, held, stream)
         self.speeds = speeds
         self.pose = NEUTRAL
         self._steps = steps
-        self._held = held
-        self._stream = stream
+        self._hint = ''
 
     def wanted(self, now: float) -> Velocity | None:
-        """Return the velocity that is wanted; None when no key requests one.
-
-        Args:
-            now: Time [s].
-        """
+        """Return the velocity that is wanted; None when no key requests one."""
         key = self._held.current(now)
-        if key is None:
-            return None
-        return MOVES[key].at(self.speeds.linear, self.speeds.angular)
-
-    def step(self, now: float) -> Velocity | None:
-        """Return what to publish now; call it after every event and when it is due.
-
-        Args:
-            now: Time [s].
-        """
-        return self._stream.step(self.wanted(now), now)
-
-    def due(self, now: float) -> float:
-        """Return when step() has to be called at the latest [s]; may be infinite.
-
-        Args:
-            now: Time [s].
-        """
-        return min(self._held.deadline(now), self._stream.due())
-
-    def end(self) -> None:
-        """Let go of everything at the end of the program."""
-        self._held.clear()
-        self._stream.end()
+        return None if key is None else MOVES[key].at(self.speeds)
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Take an event.
-
-        Args:
-            event: What happened to a key.
-
-        Returns:
-            What the person requests besides a velocity.
-        """
-        if event.key in MOVES or not event.is_stroke:
+        """Take an event; return what the person requests besides a velocity."""
+        key = event.key
+        if key in MOVES or not event.is_stroke:
             self._held.feed(event)
             return []
-        if event.key in SPEEDS:
-            return self._change_speeds(*SPEEDS[event.key])
-        if event.key in POSES:
-            return self._move_body(self._steps.moved(self.pose, POSES[event.key]))
-        if event.action is KeyAction.REPEATED:
-            return []
-        return self._stroke(event.key)
+        if key in SPEEDS:
+            before, self.speeds = self.speeds, self.speeds.scaled(*SPEEDS[key])
+            return ['this speed is the limit'] if self.speeds == before else []
+        if key in POSES:
+            return self._move_body(self._steps.moved(self.pose, POSES[key]))
+        return [] if event.action is KeyAction.REPEATED else self._stroke(key)
+
+    def status(self, now: float) -> list[StatusPart]:
+        """Return what the status line shows; tell the person what keeps the robot from moving."""
+        robot, velocity = self.robot, self.wanted(now)
+        report, has_subscriber = robot.report(now), robot.has_subscriber
+        text = hint(robot.mode, report, velocity, has_subscriber=has_subscriber)
+        if text and text != self._hint:
+            robot.say(text)
+        if text or velocity:  # said once for each reason, and again after the next motion
+            self._hint = text
+        motion = motion_parts(self.speeds, velocity, self.pose, has_subscriber=has_subscriber)
+        return [state_part(robot.mode, report), *motion]
 
     def _stroke(self, key: str) -> list[Request]:
         if key in MODES:
             mode = MODES[key]
             if not mode.moves:
                 self._held.clear()
-            return [ModeRequest(mode)]
+            return [mode]
         if key in NEUTRAL_KEYS:
             return self._move_body(NEUTRAL)
         if key == HELP_KEY:
-            return [Note(HELP)]
+            return [HELP]
         self._held.clear()
-        if key == CLEAR_KEY:
-            return [ClearFault()]
-        if key in QUIT_KEYS:
-            return [Quit()]
-        if key == SUSPEND_KEY:
-            return [Suspend()]
         if key in STOP_KEYS:
             self._stream.stop()
-            return [StopRobot()] if key == ROBOT_STOP_KEY else []
-        return []
-
-    def _change_speeds(self, linear: int, angular: int) -> list[Request]:
-        before, self.speeds = self.speeds, self.speeds.scaled(linear, angular)
-        return [Note('this speed is the limit')] if self.speeds == before else []
+        return [REQUESTS[key]] if key in REQUESTS else []
 
     def _move_body(self, pose: BodyPose) -> list[Request]:
         before, self.pose = self.pose, pose
         if pose == before and pose != NEUTRAL:
-            return [Note('the body does not go further')]
-        return [PoseRequest(pose)]
+            return ['the body does not go further']
+        return [pose]

@@ -15,8 +15,9 @@ from teleop_robot import TEST_TIMEOUT
 
 from quad_msgs.srv import SetMode
 from quad_teleop import Mode
-from quad_teleop.nodes import controller as controller_module
-from quad_teleop.nodes.controller import Controller
+from quad_teleop.motion import RobotRequest
+from quad_teleop.nodes import robot_link
+from quad_teleop.nodes.robot_link import RobotLink
 
 pytestmark = pytest.mark.scenario
 
@@ -26,7 +27,7 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
 ) -> None:
     """A mode that still waits for its service is not sent later; answers are shown once."""
     clock = SimpleNamespace(monotonic=lambda: 0.0)
-    monkeypatch.setattr(controller_module, 'time', clock)
+    monkeypatch.setattr(robot_link, 'time', clock)
     shown: list[str] = []
     handled: list[str] = []
 
@@ -41,31 +42,31 @@ def test_each_stop_is_sent_and_ends_what_was_requested_before(
         return response
 
     with RosClient(isolation.domain_id) as client:
-        controller = Controller(client.node, shown.append)
+        robot = RobotLink(client.node, shown.append)
 
         def wait_for_service(name: str) -> None:
             service = next(c for c in client.node.clients if c.srv_name.endswith(name))
             client.spin_until(service.service_is_ready, TEST_TIMEOUT, name)
 
         def stopped(times: int) -> bool:
-            return handled == ['stop'] * times and controller._stops._future is None
+            return handled == ['stop'] * times and robot._stops._future is None
 
         client.node.create_service(Trigger, 'stop', stop)
         wait_for_service('stop')
-        controller.ask_mode(Mode.WALK, 0.0)
-        controller.stop(0.1)
+        robot.handle(Mode.WALK, 0.0)
+        robot.handle(RobotRequest.STOP, 0.1)
         client.spin_until(lambda: stopped(1), TEST_TIMEOUT, 'stop')
-        controller.stop(0.2)
+        robot.handle(RobotRequest.STOP, 0.2)
         client.spin_until(lambda: stopped(2), TEST_TIMEOUT, 'second stop')
         assert shown == ['stop: stands']
         clock.monotonic = lambda: 1.0
-        controller.stop(0.3)
+        robot.handle(RobotRequest.STOP, 0.3)
         client.spin_until(lambda: stopped(3), TEST_TIMEOUT, 'third stop')
         assert shown == ['stop: stands'] * 2
 
         client.node.create_service(SetMode, 'set_mode', set_mode)
         wait_for_service('set_mode')
-        controller.check(0.4)
-        controller.ask_mode(Mode.STAND, 0.5)
-        client.spin_until(lambda: controller.mode is Mode.STAND, TEST_TIMEOUT, 'stand')
+        robot.serve(0.4)
+        robot.handle(Mode.STAND, 0.5)
+        client.spin_until(lambda: robot.mode is Mode.STAND, TEST_TIMEOUT, 'stand')
         assert handled == ['stop'] * 3 + ['stand']

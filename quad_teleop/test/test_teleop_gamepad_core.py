@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,24 +12,24 @@ import pytest
 from operator_input import CommandStream
 from operator_input.gamepad import AT_REST, Axis, Button, Deadman, GamepadState
 from quad_teleop import BodyPose, Mode, Speeds, Velocity
-from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.gamepad_teleop import GamepadTeleop, MODE_BUTTONS
-from quad_teleop.requests import ClearFault, ModeRequest, PoseRequest
-from quad_teleop.velocity import rest_of, ZERO
+from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
 
 pytestmark = pytest.mark.slow
 
+NO_ROBOT: Any = None
 DEADMAN, TURBO = Button.LEFT_SHOULDER, Button.RIGHT_SHOULDER
 
 
 def teleop(deadman: Deadman | None = None) -> GamepadTeleop:
     """Make one: normal speeds 0.15 and 0.6, turbo 0.3 and 1.2."""
     return GamepadTeleop(
+        NO_ROBOT,
+        deadman or Deadman(),
+        CommandStream(0.05, rest_of),
         Speeds(0.15, 0.6),
         Speeds(0.3, 1.2),
-        deadman or Deadman(),
-        PoseSteps(),
-        CommandStream(0.05, rest_of),
+        steps=PoseSteps(),
     )
 
 
@@ -83,14 +84,14 @@ def test_without_a_deadman_button_rest_is_silence() -> None:
 @pytest.mark.parametrize(('button', 'mode'), MODE_BUTTONS.items())
 def test_modes_that_move_need_the_deadman(button: Button, mode: Mode) -> None:
     """A button hit by accident does not make the robot stand up; lying down is always allowed."""
-    assert teleop().feed(state(DEADMAN, button)) == [ModeRequest(mode)]
-    assert teleop().feed(state(button)) == ([ModeRequest(mode)] if mode is Mode.LIE else [])
+    assert teleop().feed(state(DEADMAN, button)) == [mode]
+    assert teleop().feed(state(button)) == ([mode] if mode is Mode.LIE else [])
 
 
 def test_a_fault_is_cleared_by_a_button() -> None:
     """Once for a press, with the deadman or without; nothing moves by it."""
     target = teleop()
-    assert target.feed(state(Button.SELECT)) == [ClearFault()]
+    assert target.feed(state(Button.SELECT)) == [RobotRequest.CLEAR_FAULT]
     assert target.feed(state(Button.SELECT, LEFT_Y=0.5)) == []
     assert target.step(0.0) is None
 
@@ -147,11 +148,11 @@ def test_held_button_asks_once() -> None:
 def test_d_pad_lifts_and_tilts_step_by_step() -> None:
     """Each press is a step, as far as the limit; start is neutral."""
     target = teleop()
-    assert target.feed(state(DEADMAN, DPAD_Y=1.0)) == [PoseRequest(BodyPose(height=0.005))]
+    assert target.feed(state(DEADMAN, DPAD_Y=1.0)) == [BodyPose(height=0.005)]
     assert target.feed(state(DEADMAN, DPAD_Y=1.0)) == []
     target.feed(state(DEADMAN))
-    assert target.feed(state(DEADMAN, DPAD_X=-1.0)) == [PoseRequest(BodyPose(0.005, 0.05))]
-    assert target.feed(state(DEADMAN, Button.START, DPAD_X=-1.0)) == [PoseRequest(NEUTRAL)]
+    assert target.feed(state(DEADMAN, DPAD_X=-1.0)) == [BodyPose(0.005, 0.05)]
+    assert target.feed(state(DEADMAN, Button.START, DPAD_X=-1.0)) == [NEUTRAL]
     assert target.feed(state(DPAD_Y=-1.0)) == []
 
 
@@ -171,7 +172,7 @@ def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) 
         velocity = target.step(0.1 * index)
         if not each.buttons & {DEADMAN, TURBO}:
             assert velocity in {None, ZERO}
-        elif velocity is not None:
+        elif isinstance(velocity, Velocity):
             limit = 0.3 if TURBO in each.buttons else 0.15
             assert max(abs(velocity.x), abs(velocity.y)) <= limit
             assert abs(velocity.yaw) <= limit * 4
@@ -180,7 +181,8 @@ def test_speed_is_bounded_and_only_with_the_deadman(states: list[GamepadState]) 
 @given(st.lists(STATES, max_size=10))
 def test_lost_gamepad_stops(states: list[GamepadState]) -> None:
     """At rest, as after it was unplugged, the last word is zero and then there is none."""
-    target, last = teleop(), ZERO
+    target = teleop()
+    last: object = ZERO
     for index, each in enumerate([*states, *[AT_REST] * 10]):
         target.feed(each)
         last = target.step(0.1 * index) or last

@@ -15,8 +15,8 @@ from ros_client import RosClient
 from std_srvs.srv import Trigger
 from teleop_robot import Robot, TEST_TIMEOUT
 
-from operator_input.ros import run_session
-from quad_teleop.nodes.teleop_gamepad import Session, TeleopGamepad
+from operator_input.ros import serve_teleop
+from quad_teleop.nodes.teleop_gamepad import TeleopGamepad
 
 pytestmark = pytest.mark.scenario
 ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
@@ -46,17 +46,18 @@ def robot(context: None, pad: InjectedDevice, isolation: Isolation) -> Iterator[
     """Run the node's own loop on the pad, and listen."""
     stop = threading.Event()
     node = TeleopGamepad(InjectedDevices(pad))
-    thread = threading.Thread(target=run_session, args=[Session(node, stop), node])
+    thread = threading.Thread(target=serve_teleop, args=[node, stop])
     thread.start()
     try:
         with RosClient(isolation.domain_id) as client:
             robot = Robot(client)
             robot.wait_until_linked()
-            client.spin_until(lambda: node.outputs.has_subscriber, TEST_TIMEOUT, 'link')
+            client.spin_until(lambda: node.robot.has_subscriber, TEST_TIMEOUT, 'link')
             yield robot
     finally:
         stop.set()
         thread.join()
+        assert pad.is_closed
 
 
 def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:

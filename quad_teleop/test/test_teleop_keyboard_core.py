@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -14,18 +15,15 @@ from operator_input import (
     HeldKeys,
     KeyAction,
     KeyEvent,
-    Note,
-    Quit,
-    Suspend,
+    ProgramRequest,
 )
-from operator_input.terminal.decoder import KeyDecoder
+from operator_input.key_decoder import KeyDecoder
 from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
-from quad_teleop.body_pose import NEUTRAL, PoseSteps
 from quad_teleop.key_map import HELP, MODES, MOVES, NEUTRAL_KEYS, POSES, SPEEDS, STOP_KEYS
-from quad_teleop.keyboard_teleop import KeyboardTeleop
-from quad_teleop.requests import ModeRequest, PoseRequest, Request, StopRobot
-from quad_teleop.velocity import rest_of, ZERO
+from quad_teleop.keyboard_teleop import KeyboardTeleop, Request
+from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
 
+NO_ROBOT: Any = None
 V, W = 0.15, 0.6
 PRESSED, TYPED, RELEASED = KeyAction.PRESSED, KeyAction.TYPED, KeyAction.RELEASED
 ALL_KEYS = sorted({*MOVES, *SPEEDS, *MODES, *POSES, *NEUTRAL_KEYS, *STOP_KEYS, 's', 'ctrl+c'})
@@ -34,7 +32,8 @@ LONGEST = AutoRepeat().longest
 
 def teleop() -> KeyboardTeleop:
     """Make one with the default settings."""
-    return KeyboardTeleop(Speeds(), PoseSteps(), HeldKeys(), CommandStream(0.05, rest_of))
+    stream = CommandStream(0.05, rest_of)
+    return KeyboardTeleop(NO_ROBOT, HeldKeys(), stream, Speeds(), PoseSteps())
 
 
 def feed(
@@ -48,7 +47,7 @@ def published(target: KeyboardTeleop, start: float, end: float) -> list[Velocity
     """Return what is published in a time."""
     steps = round((end - start) / 0.01)
     found = (target.step(start + 0.01 * index) for index in range(steps + 1))
-    return [velocity for velocity in found if velocity is not None]
+    return [velocity for velocity in found if isinstance(velocity, Velocity)]
 
 
 @pytest.mark.parametrize(
@@ -113,9 +112,7 @@ def test_never_two_speeds(events: list[tuple[str, KeyAction, float]]) -> None:
     """Every word is one key's direction at the speeds that are set, or zero; never a sum."""
     target, now = teleop(), 0.0
     for key, action, gap in events:
-        allowed = {ZERO} | {
-            way.at(target.speeds.linear, target.speeds.angular) for way in MOVES.values()
-        }
+        allowed = {ZERO} | {way.at(target.speeds) for way in MOVES.values()}
         assert set(published(target, now, now + gap)) <= allowed
         now += gap
         feed(target, key, action, now)
@@ -168,7 +165,7 @@ def test_any_other_key_stops(key: str) -> None:
 def test_stop_key_says_zero_even_when_idle(key: str) -> None:
     """Something else may be driving the robot."""
     target = teleop()
-    assert feed(target, key) == ([StopRobot()] if key == 'space' else [])
+    assert feed(target, key) == ([RobotRequest.STOP] if key == 'space' else [])
     assert published(target, 0.0, 1.0) == [ZERO] * 3
 
 
@@ -219,14 +216,14 @@ def test_limit_is_reported() -> None:
     target = teleop()
     answers = [feed(target, 'w') for _ in range(20)]
     assert answers[0] == []
-    assert answers[-1] == [Note('this speed is the limit')]
+    assert answers[-1] == ['this speed is the limit']
 
 
 @pytest.mark.parametrize(('key', 'mode'), MODES.items())
 def test_mode_keys_ask_once(key: str, mode: Mode) -> None:
     """A held mode key is one question, not twenty a second."""
     target = teleop()
-    assert feed(target, key, PRESSED) == [ModeRequest(mode)]
+    assert feed(target, key, PRESSED) == [mode]
     assert feed(target, key, KeyAction.REPEATED) == []
     assert feed(target, key, RELEASED) == []
 
@@ -244,8 +241,8 @@ def test_standing_and_lying_end_the_motion() -> None:
 def test_pose_keys_move_step_by_step() -> None:
     """Each stroke is a step; the opposite key comes back to exactly neutral."""
     target = teleop()
-    assert feed(target, 't') == [PoseRequest(BodyPose(height=0.005))]
-    assert feed(target, 'h', PRESSED) == [PoseRequest(BodyPose(height=0.005, roll=0.05))]
+    assert feed(target, 't') == [BodyPose(height=0.005)]
+    assert feed(target, 'h', PRESSED) == [BodyPose(height=0.005, roll=0.05)]
     feed(target, 'f')
     feed(target, 'b')
     assert target.pose == NEUTRAL
@@ -256,17 +253,17 @@ def test_pose_stays_within_its_limits_and_says_so() -> None:
     target = teleop()
     answers = [feed(target, 'up', KeyAction.REPEATED) for _ in range(20)]
     assert target.pose.pitch == pytest.approx(-0.3)
-    assert answers[-1] == [Note('the body does not go further')]
-    assert feed(target, 'g') == [PoseRequest(NEUTRAL)]
+    assert answers[-1] == ['the body does not go further']
+    assert feed(target, 'g') == [NEUTRAL]
 
 
 def test_leaving_keys() -> None:
     """Ctrl-C, Ctrl-D and Ctrl-backslash quit, Ctrl-Z suspends, the question mark helps."""
     target = teleop()
     for key in ('ctrl+c', 'ctrl+d', 'ctrl+\\'):
-        assert feed(target, key) == [Quit()]
-    assert feed(target, 'ctrl+z') == [Suspend()]
-    assert feed(target, '?') == [Note(HELP)]
+        assert feed(target, key) == [ProgramRequest.QUIT]
+    assert feed(target, 'ctrl+z') == [ProgramRequest.SUSPEND]
+    assert feed(target, '?') == [HELP]
 
 
 def test_no_key_has_two_meanings() -> None:

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_teleop import CommandError, SettingError
-from quad_teleop.mux import Input, Inputs, Multiplexer, read_inputs
-from quad_teleop.mux.sources import DEFAULTS
+from quad_teleop.mux import DEFAULTS, Input, Inputs, Multiplexer, read_inputs
 
 FORWARD = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 STILL = (0.0,) * 6

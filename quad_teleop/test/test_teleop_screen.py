@@ -1,20 +1,38 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
+"""The status line, and what a person reads above it."""
+
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field
 import re
+from typing import Any
 
 import pytest
 
-from operator_input import ReleaseSource
-from quad_teleop import BodyPose, Mode, Speeds, Velocity
-from quad_teleop.body_pose import NEUTRAL
-from quad_teleop.controller_report import ControllerReport, Level, read_report
-from quad_teleop.nodes.screen import hint, status, View
+from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, status_text
+from quad_teleop import Mode, Speeds
+from quad_teleop.keyboard_teleop import KeyboardTeleop
+from quad_teleop.motion import PoseSteps, rest_of
+from quad_teleop.status import ControllerReport, Level, read_report
 
-VIEW = View(None, None, Speeds(), None, NEUTRAL, ReleaseSource.TIME_OUT, has_subscriber=True)
-MOVING = replace(VIEW, velocity=Velocity(0.15, 0.0, 0.0))
+
+@dataclass
+class Robot:
+    """Knows of itself what the test says, and writes down what is said."""
+
+    mode: Mode | None = None
+    known: ControllerReport | None = None
+    has_subscriber: bool = True
+    said: list[str] = field(default_factory=list)
+
+    def report(self, now: float) -> ControllerReport | None:
+        """Return the report of the controller."""
+        return self.known if self.known and self.known.is_fresh(now) else None
+
+    def say(self, text: str) -> None:
+        """Write it down."""
+        self.said.append(text)
 
 
 def report(state: str, goal: str, level: Level = Level.OK, message: str = '') -> ControllerReport:
@@ -22,49 +40,83 @@ def report(state: str, goal: str, level: Level = Level.OK, message: str = '') ->
     return ControllerReport(state, goal, level, message, 0.0)
 
 
+def teleop(robot: Robot, *keys: str) -> KeyboardTeleop:
+    """Make one, and press keys."""
+    watched: Any = robot
+    made = KeyboardTeleop(watched, HeldKeys(), CommandStream(0.05, rest_of), Speeds(), PoseSteps())
+    for key in keys:
+        made.feed(KeyEvent(key, KeyAction.PRESSED, 0.0))
+    return made
+
+
+def line(robot: Robot, *keys: str, colour: bool = False) -> str:
+    """Return the status line after keys were pressed."""
+    return status_text(teleop(robot, *keys).status(0.0), colour=colour)
+
+
 def test_what_matters_most_stands_first() -> None:
-    """Mode and speeds survive the narrowest pane; body and release come last."""
-    text = status(replace(MOVING, pose=BodyPose(0.01, 0.1)), colour=False)
-    assert text == (
-        'mode ? | 0.15 m/s 0.60 rad/s | x +0.15 y +0.00 yaw +0.00 | body +10 mm +6 +0 +0 deg'
-        ' | timed releases'
+    """Mode and speeds survive the narrowest pane; the body comes last."""
+    assert line(Robot(), 'i', 't', 'h') == (
+        'mode ? | 0.15 m/s 0.60 rad/s | x +0.15 y +0.00 yaw +0.00 | body +5 mm +3 +0 +0 deg'
+    )
+    idle = f'{"idle":<27}'
+    assert line(Robot(has_subscriber=False), 'q') == (
+        f'mode ? | 0.17 m/s 0.66 rad/s | {idle} | no subscriber'
     )
 
 
 def test_colours_change_no_words() -> None:
     """With colours the line reads the same."""
-    coloured = status(MOVING, colour=True)
-    assert re.sub('\x1b\\[[0-9;]*m', '', coloured) == status(MOVING, colour=False)
-    assert coloured != status(MOVING, colour=False)
+    coloured = line(Robot(), 'i', colour=True)
+    assert re.sub('\x1b\\[[0-9;]*m', '', coloured) == line(Robot(), 'i')
+    assert coloured != line(Robot(), 'i')
 
 
 def test_state_of_the_controller_is_shown() -> None:
     """What the controller says counts more than what it granted once."""
-    view = replace(VIEW, mode=Mode.WALK, report=report('to stand', 'walk'))
-    assert status(view, colour=False).startswith('to stand | ')
-    assert status(replace(view, report=None), colour=False).startswith('walk | ')
+    robot = Robot(Mode.WALK, report('to stand', 'walk'))
+    assert line(robot).startswith('to stand | ')
+    robot.known = None
+    assert line(robot).startswith('walk | ')
 
 
 @pytest.mark.parametrize(
-    ('view', 'word'),
+    ('robot', 'keys', 'word'),
     [
-        (VIEW, ''),
-        (MOVING, ''),
-        (replace(MOVING, mode=Mode.WALK), ''),
-        (replace(MOVING, mode=Mode.STAND), r'does not walk now \(stand\): press 2'),
-        (replace(MOVING, report=report('relax', 'relax')), r'\(relax\): press 2'),
-        (replace(MOVING, report=report('to stand', 'walk')), ''),
-        (replace(MOVING, report=report('walk', 'walk'), mode=Mode.LIE), ''),
-        (replace(MOVING, mode=Mode.STAND, has_subscriber=False), ''),
+        (Robot(), '', ''),
+        (Robot(), 'i', ''),
+        (Robot(Mode.WALK), 'i', ''),
+        (Robot(Mode.STAND), 'i', r'does not walk now \(stand\): press 2'),
+        (Robot(known=report('relax', 'relax')), 'i', r'\(relax\): press 2'),
+        (Robot(known=report('to stand', 'walk')), 'i', ''),
+        (Robot(Mode.LIE, report('walk', 'walk')), 'i', ''),
+        (Robot(Mode.STAND, has_subscriber=False), 'i', ''),
         (
-            replace(VIEW, report=report('fault', 'fault', Level.ERROR, 'it fell over')),
+            Robot(known=report('fault', 'fault', Level.ERROR, 'it fell over')),
+            '',
             'fault: it fell over; Backspace clears it, 0 lies down, 9 gets up',
         ),
     ],
 )
-def test_hint_says_why_nothing_moves(view: View, word: str) -> None:
+def test_hint_says_why_nothing_moves(robot: Robot, keys: str, word: str) -> None:
     """A person who holds a key and sees nothing move reads what to press; else nothing."""
-    assert re.search(word, hint(view)) if word else not hint(view)
+    line(robot, *keys)
+    assert len(robot.said) == bool(word)
+    assert re.search(word, ''.join(robot.said))
+
+
+def test_hint_is_said_once_for_each_motion() -> None:
+    """Not in each turn of the loop; again after a motion that was followed."""
+    robot = Robot(Mode.STAND)
+    target = teleop(robot, 'i')
+    for _ in range(3):
+        target.status(0.0)
+    assert len(robot.said) == 1
+    robot.mode = Mode.WALK
+    target.status(0.0)
+    robot.mode = Mode.STAND
+    target.status(0.0)
+    assert len(robot.said) == 2
 
 
 def test_report_is_read_from_diagnostics() -> None:

@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Jogging by hand: keyboard and gamepad for a servo node, of this package or of MoveIt."""
 
-from .jog import CartesianJog, Frame, Jog, JointJog
+from .jog import CartesianJog, Frame, Jog, JointJog, Scales
 from .keyboard_teleop import KeyboardTeleop
-from .scales import Scales
 
 __all__ = [
     'CartesianJog',

@@ -1,13 +1,16 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging with a gamepad: from its state to motions. Pure; time is handed in."""
+"""Jogging with a gamepad: from its state to motions. Pure; times are in [s]."""
 
 from __future__ import annotations
 
-from operator_input import CommandStream
-from operator_input.gamepad import Axis, Button, Deadman, DeadmanTeleop, GamepadState, Grip
+from collections.abc import Callable
+
+from operator_input import CommandStream, DeadmanMapping
+from operator_input.gamepad import Axis, Button, Deadman, GamepadState, Grip
 
 from .jog import CartesianJog, Frame, Jog, JointJog
+from .keyboard_teleop import WatchedServo
 
 FRAME_BUTTONS = {Button.SELECT: Frame.BASE, Button.START: Frame.TOOL}
 """Buttons that choose along whose axes the tool is jogged."""
@@ -16,7 +19,7 @@ JOINT_BUTTONS = {Button.WEST: -1, Button.EAST: 1}
 """Buttons that choose the joint before and the next one."""
 
 
-class GamepadTeleop(DeadmanTeleop[Jog]):
+class GamepadTeleop(DeadmanMapping):
     """Moves while the deadman is held and a stick is away from rest.
 
     At rest it asks for nothing, so that it does not overrule a trajectory.
@@ -24,27 +27,25 @@ class GamepadTeleop(DeadmanTeleop[Jog]):
     Attributes:
         frame: Along whose axes the tool is jogged.
         joint: Place of the joint that the d-pad moves.
-        joints: How many joints the arm has; None while that is not known.
     """
 
-    def __init__(
-        self, speed: float, turbo: float, deadman: Deadman, stream: CommandStream[Jog]
-    ) -> None:
-        """Start idle.
+    robot: WatchedServo
 
-        Args:
-            speed: Share of full speed at the end of a stick's way.
-            turbo: The same with the turbo button.
-            deadman: Which buttons allow motion.
-            stream: Decides when to publish.
-        """
-        super().__init__(deadman, stream)
+    def __init__(
+        self,
+        robot: WatchedServo,
+        deadman: Deadman,
+        stream: CommandStream[Jog],
+        speeds: tuple[float, float],
+        warn: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """Start idle, with the shares of full speed at a stick's end, without and with turbo."""
+        super().__init__(robot, deadman, stream, warn)
         self.frame = Frame.BASE
         self.joint = 0
-        self.joints: int | None = None
-        self._speeds = {Grip.HELD: speed, Grip.TURBO: turbo}
+        self._speeds = dict(zip((Grip.HELD, Grip.TURBO), speeds, strict=True))
 
-    def wanted(self) -> Jog | None:
+    def wanted(self, now: float) -> Jog | None:
         """Return the motion that is wanted; None without the deadman, and at rest."""
         speed = self._speeds.get(self.grip)
         if speed is None:
@@ -55,35 +56,24 @@ class GamepadTeleop(DeadmanTeleop[Jog]):
         jog = direction(self.state, self.frame).scaled(speed, speed)
         return jog if any(jog.linear) or any(jog.angular) else None
 
-    def feed(self, state: GamepadState) -> str:
-        """Take a state of the gamepad.
-
-        Args:
-            state: At rest when there is none.
-
-        Returns:
-            What was chosen, in words; empty for nothing.
-        """
-        before = self.take(state)
+    def feed(self, state: GamepadState) -> list[str]:
+        """Take a state of the gamepad; return what was chosen, in words."""
+        before, joints = self.take(state), len(self.robot.names.joints)
         for button in state.pressed_since(before):
             if button in FRAME_BUTTONS:
                 self.frame = FRAME_BUTTONS[button]
-                return f'{self.frame.value} frame'
-            if button in JOINT_BUTTONS and self.joints:
-                self.joint = (self.joint + JOINT_BUTTONS[button]) % self.joints
-                return f'the d-pad moves joint {self.joint + 1}'
-        return ''
+                return [f'{self.frame.value} frame']
+            if button in JOINT_BUTTONS and joints:
+                self.joint = (self.joint + JOINT_BUTTONS[button]) % joints
+                return [f'the d-pad moves joint {self.joint + 1}']
+        return []
 
 
 def direction(state: GamepadState, frame: Frame) -> CartesianJog:
-    """Return where the sticks point.
+    """Return where the sticks point, along the axes of a frame.
 
     The left stick moves along x and y, the triggers along z (right up, left down); the right stick
     turns about y and z, the d-pad's sides about x.
-
-    Args:
-        state: The gamepad.
-        frame: Along whose axes.
     """
     z = state.axis(Axis.RIGHT_TRIGGER) - state.axis(Axis.LEFT_TRIGGER)
     return CartesianJog(

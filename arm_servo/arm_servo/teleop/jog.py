@@ -1,14 +1,18 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What a person wants to be moved, in shares of full speed."""
+"""What a person wants to be moved in shares of full speed, and what that means to a servo."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, replace
+from enum import auto, Enum, IntEnum
+import math
 
 Vector = tuple[float, float, float]
 """Along or about x, y and z."""
+
+UNITLESS = 'unitless'
+"""command_in_type of a servo that multiplies by its scales itself."""
 
 
 class Frame(Enum):
@@ -18,58 +22,118 @@ class Frame(Enum):
     TOOL = 'tool'
 
 
+class CommandType(IntEnum):
+    """Kinds of commands that a servo is switched to; as in moveit_msgs/srv/ServoCommandType."""
+
+    JOINT_JOG = 0
+    TWIST = 1
+
+
+class ServoRequest(Enum):
+    """What else a person can request besides a motion."""
+
+    TOGGLE_PAUSE = auto()
+    """Pause the servo, or let it go on."""
+
+    STOP_ROBOT = auto()
+    """Stop the whole robot, whatever moves it."""
+
+
 @dataclass(frozen=True, slots=True)
 class CartesianJog:
-    """Move the tool.
-
-    Attributes:
-        linear: Shares of the full linear speed, -1 to 1.
-        angular: Shares of the full rotational speed.
-        frame: Along whose axes.
-    """
+    """Move the tool, by shares of its full linear and rotational speed, -1 to 1."""
 
     linear: Vector = (0.0, 0.0, 0.0)
     angular: Vector = (0.0, 0.0, 0.0)
     frame: Frame = Frame.BASE
 
     def scaled(self, linear: float, angular: float) -> CartesianJog:
-        """Return the same motion, slower or faster.
-
-        Args:
-            linear: Factor of the linear shares.
-            angular: Factor of the others.
-        """
+        """Return the same motion, slower or faster by these factors."""
         return CartesianJog(_times(self.linear, linear), _times(self.angular, angular), self.frame)
 
 
 @dataclass(frozen=True, slots=True)
 class JointJog:
-    """Move one joint.
-
-    Attributes:
-        joint: Its place, 0 for the first.
-        velocity: Share of the full joint speed, -1 to 1.
-    """
+    """Move a joint by its place, 0 for the first, by a share of the full joint speed, -1 to 1."""
 
     joint: int
     velocity: float = 0.0
+
+    def scaled(self, factor: float) -> JointJog:
+        """Return the same motion, slower or faster by a factor."""
+        return replace(self, velocity=self.velocity * factor)
 
 
 Jog = CartesianJog | JointJog
 
 
 def rest_of(jog: Jog | None) -> Jog:
-    """Return the command that ends a motion, in the kind of the motion.
-
-    Args:
-        jog: The motion; None for none.
-    """
+    """Return the command that ends a motion, in the kind of the motion."""
     match jog:
         case JointJog(joint):
             return JointJog(joint)
         case CartesianJog(frame=frame):
             return CartesianJog(frame=frame)
     return CartesianJog()
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """Full speeds of the servo [m/s], [rad/s]; the defaults are those of moveit_servo.
+
+    Attributes:
+        unitless: The servo multiplies by these itself; else it receives speeds.
+    """
+
+    linear: float = 0.4
+    rotational: float = 0.8
+    joint: float = 0.5
+    unitless: bool = True
+
+    def to_message(self, jog: Jog) -> Jog:
+        """Return the numbers that the servo is sent for a motion."""
+        if self.unitless:
+            return jog
+        if isinstance(jog, JointJog):
+            return jog.scaled(self.joint)
+        return jog.scaled(self.linear, self.rotational)
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """How far a stroke moves in step mode.
+
+    A step is a motion of a certain time, so it works with every servo; begin and end have the same
+    ramps, so the way is speed times time.
+
+    Attributes:
+        linear: Of the tool [m].
+        angular: Of the tool, and of a joint [rad].
+        duration: Least time of a step [s].
+    """
+
+    linear: float = 1e-3
+    angular: float = math.radians(1.0)
+    duration: float = 0.2
+
+    def pulse(self, jog: Jog, scales: Scales) -> tuple[Jog, float]:
+        """Return the motion that makes a step, and how long it takes [s].
+
+        Args:
+            jog: The direction, with the greatest speed that is wished for.
+            scales: Full speeds of the servo.
+        """
+        if isinstance(jog, JointJog):
+            speed, way = abs(jog.velocity) * scales.joint, self.angular
+        elif any(jog.linear):
+            speed, way = max(map(abs, jog.linear)) * scales.linear, self.linear
+        else:
+            speed, way = max(map(abs, jog.angular)) * scales.rotational, self.angular
+        duration = max(self.duration, way / speed)
+        slower = way / speed / duration
+        if isinstance(jog, JointJog):
+            return jog.scaled(slower), duration
+        return jog.scaled(slower, slower), duration
 
 
 def _times(vector: Vector, factor: float) -> Vector:

@@ -8,7 +8,9 @@ Rotation keys, speed keys, steps, stop and pause are ours. Letters count with an
 
 from __future__ import annotations
 
-from .jog import CartesianJog
+from operator_input import ProgramRequest
+
+from .jog import CartesianJog, CommandType, Frame, ServoRequest
 
 TOOL = {
     'up': CartesianJog(linear=(1.0, 0.0, 0.0)),
@@ -31,26 +33,16 @@ TOOL = {
 JOINTS = {str(number): number - 1 for number in range(1, 9)}
 """Keys that move a joint as long as they are held."""
 
-REVERSE_KEY = 'r'
-BASE_KEY = 'w'
-TOOL_KEY = 'e'
-JOINT_TYPE_KEY = 'j'
-TWIST_TYPE_KEY = 't'
-STEP_KEY = 'm'
-PAUSE_KEY = 'p'
-HELP_KEY = '?'
-
 SPEEDS = {'+': 1, '=': 1, '-': -1, '_': -1}
 """Keys that change the speed, in steps."""
 
+FRAMES = {'w': Frame.BASE, 'e': Frame.TOOL}
+REVERSE_KEY = 'r'
+STEP_KEY = 'm'
+HELP_KEY = '?'
+
 STOP_KEYS = frozenset({'space', 'k'})
 """Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
-
-ROBOT_STOP_KEY = 'space'
-"""The one of them that stops the whole robot, also what others move."""
-
-QUIT_KEYS = frozenset({'q', 'ctrl+c', 'ctrl+d', 'ctrl+\\'})
-SUSPEND_KEY = 'ctrl+z'
 
 HELP = """\
   hold to move the tool              rotate it             hold to move a joint
@@ -63,11 +55,14 @@ HELP = """\
 """
 """The map, for the eye: plain characters, fits into 82 columns."""
 
+Request = CommandType | ServoRequest | ProgramRequest | str
 
-def plain(key: str) -> str:
-    """Return a letter without Shift; other keys as they are.
-
-    Args:
-        key: Name of a key.
-    """
-    return key.lower() if len(key) == 1 else key
+REQUESTS: dict[str, Request] = {
+    HELP_KEY: HELP,
+    'j': CommandType.JOINT_JOG,
+    't': CommandType.TWIST,
+    'p': ServoRequest.TOGGLE_PAUSE,
+    'space': ServoRequest.STOP_ROBOT,  # also what others move
+    'ctrl+z': ProgramRequest.SUSPEND,
+    **dict.fromkeys(('q', 'ctrl+c', 'ctrl+d', 'ctrl+\\'), ProgramRequest.QUIT),
+}

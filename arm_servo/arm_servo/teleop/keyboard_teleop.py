@@ -1,61 +1,68 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Jogging with keys: from key events to motions and requests. Pure; time is handed in."""
+"""Jogging with keys: from key events to motions and requests. Pure; times are in [s]."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol
 
+from arm_model import ArmNames
 from operator_input import (
     CommandStream,
     HeldKeys,
     KeyAction,
     KeyEvent,
-    Note,
-    Quit,
-    Suspend,
+    KeyMapping,
+    Robot,
+    StatusPart,
+    Style,
 )
 
-from .exceptions import SettingError
-from .jog import Frame, Jog, JointJog
+from .jog import Frame, Jog, JointJog, Scales, Steps
 from .key_map import (
-    BASE_KEY,
+    FRAMES,
     HELP,
     HELP_KEY,
-    JOINT_TYPE_KEY,
     JOINTS,
-    PAUSE_KEY,
-    plain,
-    QUIT_KEYS,
+    Request,
+    REQUESTS,
     REVERSE_KEY,
-    ROBOT_STOP_KEY,
     SPEEDS,
     STEP_KEY,
     STOP_KEYS,
-    SUSPEND_KEY,
     TOOL,
-    TOOL_KEY,
-    TWIST_TYPE_KEY,
 )
-from .requests import CommandType, Request, StopRobot, SwitchType, TogglePause
-from .scales import Scales, Steps
+from .screen import motion_part, servo_part, ServoReport
 
 SPEED_STEP_FACTOR = 1.25  # of a speed key
 MIN_SPEED = 0.01  # share of full speed
 TAP_SPEED_FACTOR = 0.2  # while a key may be up already: without releases that takes 0.5 s
-NOTE_PERIOD = 1.0  # [s] in which a stroke that moves nothing is not reported again
-
-REQUESTS: dict[str, Request] = {
-    HELP_KEY: Note(HELP),
-    JOINT_TYPE_KEY: SwitchType(CommandType.JOINT_JOG),
-    TWIST_TYPE_KEY: SwitchType(CommandType.TWIST),
-    PAUSE_KEY: TogglePause(),
-    SUSPEND_KEY: Suspend(),
-    **dict.fromkeys(QUIT_KEYS, Quit()),
-}
+NOTE_PERIOD = 1.0  # in which a stroke that moves nothing is not reported again
 
 
-class KeyboardTeleop:
+class WatchedServo(Robot, Protocol):
+    """The servo as keys and the status line need it.
+
+    Attributes:
+        names: Names of the arm's parts, as far as they are known.
+        scales: Its full speeds.
+        paused: Whether the person paused it.
+    """
+
+    names: ArmNames
+    scales: Scales
+    paused: bool
+
+    @property
+    def has_subscriber(self) -> bool:
+        """Whether anything subscribes to the commands."""
+
+    def report(self, now: float) -> ServoReport | None:
+        """Return what the servo reported lately."""
+
+
+class KeyboardTeleop(KeyMapping):
     """Moves while a key of the map is held, or by one step for each stroke.
 
     Attributes:
@@ -63,50 +70,30 @@ class KeyboardTeleop:
         frame: Along whose axes the tool is jogged.
         sign: Direction of the joint keys, 1 or -1.
         stepping: Each stroke is one step.
-        scales: Full speeds of the servo, for the length of a step.
-        joints: How many joints the arm has; None while that is not known.
     """
+
+    introduction = HELP
+    robot: WatchedServo
 
     def __init__(
         self,
-        speed: float,
-        steps: Steps,
+        robot: WatchedServo,
         held: HeldKeys,
         stream: CommandStream[Jog],
-        frame: Frame = Frame.BASE,
+        speed: float,
+        steps: Steps,
     ) -> None:
-        """Start idle.
-
-        Args:
-            speed: Share of full speed at the start.
-            steps: How far a stroke moves in step mode.
-            held: Decides which key is held.
-            stream: Decides when to publish.
-            frame: Along whose axes the tool is jogged at the start.
-
-        Raises:
-            SettingError: The speed is not between 0.01 and 1.
-        """
-        if not MIN_SPEED <= speed <= 1.0:
-            raise SettingError(f'speed is {speed}: it must be {MIN_SPEED} to 1, of full speed')
+        super().__init__(robot, held, stream)
         self.speed = speed
-        self.frame = frame
+        self.frame = Frame.BASE
         self.sign = 1
         self.stepping = False
-        self.scales = Scales()
-        self.joints: int | None = None
         self._steps = steps
-        self._held = held
-        self._stream = stream
-        self._step: tuple[Jog, float] | None = None  # motion, end [s]
-        self._last_note = ('', 0.0)  # a key that moves nothing, and when it was struck last [s]
+        self._step: tuple[Jog, float] | None = None  # motion and its end
+        self._last_note = ('', 0.0)  # a key that moves nothing, and when it was struck last
 
     def wanted(self, now: float) -> Jog | None:
-        """Return the motion that is wanted; None when no key asks for one.
-
-        Args:
-            now: Time [s].
-        """
+        """Return the motion that is wanted; None when no key asks for one."""
         if self._step is not None:
             jog, end = self._step
             return jog if now < end else None
@@ -115,96 +102,89 @@ class KeyboardTeleop:
             return None
         return self._motion(key, TAP_SPEED_FACTOR if self._held.is_tap(now) else 1.0)
 
-    def step(self, now: float) -> Jog | None:
-        """Say what to publish now; call it after every event and when it is due.
-
-        Args:
-            now: Time [s].
-        """
+    def step(self, now: float) -> object | None:
+        """Return what to publish now; call it after every event and when it is due."""
         if self._step is not None and now >= self._step[1]:
             self._step = None
-        return self._stream.step(self.wanted(now), now)
+        return super().step(now)
 
     def due(self, now: float) -> float:
-        """Return when step() has to be called at the latest [s]; may be infinite.
-
-        Args:
-            now: Time [s].
-        """
-        due = min(self._held.deadline(now), self._stream.due())
+        """Return when step() has to be called at the latest; may be infinite."""
+        due = super().due(now)
         return due if self._step is None else min(due, self._step[1])
 
     def end(self) -> None:
         """Let go of everything at the end of the program."""
-        self._let_go()
-        self._stream.end()
+        self._step = None
+        super().end()
 
     def feed(self, event: KeyEvent) -> list[Request]:
-        """Take an event.
-
-        Args:
-            event: What happened to a key.
-
-        Returns:
-            What the person asks for besides a motion.
-        """
-        key = plain(event.key)
-        event = KeyEvent(key, event.action, event.time)
-        if key in JOINTS and self.joints is not None and JOINTS[key] >= self.joints:
-            return self._no_joint(event)
+        """Take an event; return what the person requests besides a motion."""
+        key = event.key.lower() if len(event.key) == 1 else event.key
+        event = replace(event, key=key)
+        joints = len(self.robot.names.joints)
+        if key in JOINTS and joints and JOINTS[key] >= joints:
+            return self._no_joint(event, joints)
         if key in TOOL or key in JOINTS or not event.is_stroke:
-            return self._move(event)
+            self._move(event)
+            return []
         if key in SPEEDS:
-            return self._change_speed(SPEEDS[key])
+            before = self.speed
+            self.speed = min(max(before * SPEED_STEP_FACTOR ** SPEEDS[key], MIN_SPEED), 1.0)
+            return ['this speed is the limit'] if self.speed == before else []
         return [] if event.action is KeyAction.REPEATED else self._stroke(key)
 
-    def _move(self, event: KeyEvent) -> list[Request]:
+    def status(self, now: float) -> list[StatusPart]:
+        """Return what the status line shows, what matters most first."""
+        robot = self.robot
+        speed = f'{self.speed * 100:.0f} %: {self.speed * robot.scales.linear:.3f} m/s'
+        parts = [
+            servo_part(robot.report(now), paused=robot.paused),
+            motion_part(self.wanted(now), robot.names.joints),
+            (f'{self.frame.value} frame, joints {"+" if self.sign > 0 else "-"}', Style.BOLD),
+            (speed, Style.BOLD),
+        ]
+        if self.stepping:
+            parts.append(('steps', Style.YELLOW))
+        if not robot.has_subscriber:
+            parts.append(('nobody listens', Style.YELLOW))
+        return parts
+
+    def _move(self, event: KeyEvent) -> None:
         if not self.stepping:
             self._held.feed(event)
         elif event.is_stroke and self._step is None:
-            jog, duration = self._steps.pulse(self._motion(event.key), self.scales)
+            jog, duration = self._steps.pulse(self._motion(event.key), self.robot.scales)
             self._step = jog, event.time + duration
-        return []
 
     def _motion(self, key: str, share: float = 1.0) -> Jog:
         speed = share * self.speed
         if key in JOINTS:
             return JointJog(JOINTS[key], self.sign * speed)
-        jog = TOOL[key].scaled(speed, speed)
-        return replace(jog, frame=self.frame)
+        return replace(TOOL[key].scaled(speed, speed), frame=self.frame)
 
-    def _no_joint(self, event: KeyEvent) -> list[Request]:
+    def _no_joint(self, event: KeyEvent, joints: int) -> list[Request]:
         self._let_go()
-        again = self._last_note[0] == event.key and event.time < self._last_note[1] + NOTE_PERIOD
         if not event.is_stroke or event.action is KeyAction.REPEATED:
             return []
+        key, time = self._last_note
         self._last_note = event.key, event.time
-        return [Note(f'the arm has {self.joints} joints: there is no joint {event.key}')] * (
-            not again
-        )
+        if key == event.key and event.time < time + NOTE_PERIOD:
+            return []
+        return [f'the arm has {joints} joints: there is no joint {event.key}']
 
     def _stroke(self, key: str) -> list[Request]:
-        if key == HELP_KEY:
-            return [REQUESTS[key]]
-        self._let_go()
-        if key in REQUESTS:
-            return [REQUESTS[key]]
+        if key != HELP_KEY:
+            self._let_go()
+        self.frame = FRAMES.get(key, self.frame)
         if key == REVERSE_KEY:
             self.sign = -self.sign
-        elif key in {BASE_KEY, TOOL_KEY}:
-            self.frame = Frame.BASE if key == BASE_KEY else Frame.TOOL
         elif key == STEP_KEY:
             self.stepping = not self.stepping
         elif key in STOP_KEYS:
             self._stream.stop()
-            return [StopRobot()] if key == ROBOT_STOP_KEY else []
-        return []
+        return [REQUESTS[key]] if key in REQUESTS else []
 
     def _let_go(self) -> None:
         self._held.clear()
         self._step = None
-
-    def _change_speed(self, steps: int) -> list[Request]:
-        before = self.speed
-        self.speed = min(max(before * SPEED_STEP_FACTOR**steps, MIN_SPEED), 1.0)
-        return [Note('this speed is the limit')] if self.speed == before else []

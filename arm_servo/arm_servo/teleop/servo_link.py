@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The servo node as a person's program sees it: commands to it, what it says, what it is asked."""
+"""The servo node as a person's program commands it: motions, requests, and what it reports."""
 
 from __future__ import annotations
 
@@ -15,19 +15,17 @@ from moveit_msgs.msg import ServoStatus
 from moveit_msgs.srv import ServoCommandType
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.publisher import Publisher
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from arm_model import ArmNames, ModelError
 from node_runner import LATCHED, ParameterReader
+from operator_input import CommandStream
 
-from .jog import Frame, Jog, JointJog, Vector
-from .requests import CommandType
-from .scales import Scales
-from .screen import ServoView
-from .servo_settings import ServoSettings, SettingsClient
+from .jog import CommandType, Frame, Jog, JointJog, rest_of, Scales, ServoRequest, Vector
+from .screen import ServoReport
+from .servo_settings import ServoSettings
 
 FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 STATUS_TIMEOUT = 1.0  # [s] after which a status is history
@@ -41,20 +39,17 @@ class LinkSettings:
         servo: Name of the servo's node, relative to the namespace or full.
         base_frame: Frame of jogs in the base; empty takes the arm's base link.
         tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
-        period: Time between two commands [s].
+        stream: Decides when to publish.
     """
 
-    servo: str = 'servo_node'
-    base_frame: str = ''
-    tool_frame: str = ''
-    period: float = 0.02
+    servo: str
+    base_frame: str
+    tool_frame: str
+    stream: CommandStream[Jog]
 
 
 def declare_link(node: Node) -> LinkSettings:
     """Declare whom the program jogs, and how often.
-
-    Args:
-        node: The node.
 
     Raises:
         ParameterError: A value is of another kind or out of its range.
@@ -64,7 +59,9 @@ def declare_link(node: Node) -> LinkSettings:
         read.text('servo', 'servo_node', 'name of the servo node'),
         read.text('base_frame', '', "base frame; empty takes the arm's base link"),
         read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
-        1.0 / read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]'),
+        CommandStream(
+            1.0 / read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]'), rest_of
+        ),
     )
 
 
@@ -72,41 +69,27 @@ class ServoLink:
     """Publishes jogs, and knows the arm's names from the servo, or else from the robot.
 
     Attributes:
+        say: Shows the person a message.
         names: Names of the arm's parts, as far as they are known.
         scales: Full speeds of the servo.
         paused: Whether the person paused the servo.
     """
 
-    def __init__(
-        self,
-        node: Node,
-        settings: LinkSettings,
-        say: Callable[[str], None],
-    ) -> None:
-        """Advertise and subscribe.
-
-        Args:
-            node: The node.
-            settings: Whom to jog.
-            say: Shows the person a message.
-        """
+    def __init__(self, node: Node, settings: LinkSettings, say: Callable[[str], None]) -> None:
+        """Advertise and subscribe."""
         servo = settings.servo
         self._frames = settings.base_frame, settings.tool_frame
+        self.say = say
         self.names = ArmNames((), *self._frames)
         self.scales = Scales()
         self.paused = False
-        self._node, self._servo, self._say = node, servo, say
+        self._node = node
         self._urdf = ''
-        self._received: ServoSettings = ServoSettings()
-        self._status: tuple[ServoView, float] | None = None
+        self._report: tuple[ServoReport, float] | None = None
         self._complained = ''
-        self._twist: Publisher = node.create_publisher(
-            TwistStamped, f'{servo}/delta_twist_cmds', 10
-        )
-        self._jog: Publisher = node.create_publisher(
-            JointJogMessage, f'{servo}/delta_joint_cmds', 10
-        )
-        self._settings = SettingsClient(node, servo, self._learn)
+        self._twist = node.create_publisher(TwistStamped, f'{servo}/delta_twist_cmds', 10)
+        self._jog = node.create_publisher(JointJogMessage, f'{servo}/delta_joint_cmds', 10)
+        self._settings = ServoSettings(node, servo, self._learn)
         self._switch = node.create_client(ServoCommandType, f'{servo}/switch_command_type')
         self._pause = node.create_client(SetBool, f'{servo}/pause_servo')
         self._stop = node.create_client(Trigger, 'stop')
@@ -116,71 +99,52 @@ class ServoLink:
 
     @property
     def has_subscriber(self) -> bool:
-        """Whether anybody listens."""
+        """Whether anything subscribes to the commands."""
         return any(each.get_subscription_count() for each in (self._twist, self._jog))
 
-    def status(self, now: float) -> ServoView | None:
-        """Return what the servo said lately.
-
-        Args:
-            now: Time [s].
-        """
-        if self._status is None or now - self._status[1] > STATUS_TIMEOUT:
+    def report(self, now: float) -> ServoReport | None:
+        """Return what the servo reported lately."""
+        if self._report is None or now - self._report[1] > STATUS_TIMEOUT:
             return None
-        return self._status[0]
+        return self._report[0]
 
     def serve(self, now: float) -> None:
-        """Ask the servo what is not known yet.
-
-        Args:
-            now: Time [s].
-        """
+        """Ask the servo what is not known yet."""
         self._settings.serve(now)
 
-    def publish(self, jog: Jog) -> None:
-        """Publish a motion, or say why not.
-
-        Args:
-            jog: In shares of full speed.
-        """
-        message = self.scales.to_message(jog)
-        if isinstance(message, JointJog):
-            self._publish_joint(message)
+    def publish(self, command: Jog) -> None:
+        """Publish a motion in shares of full speed, or tell the person why not."""
+        jog = self.scales.to_message(command)
+        if isinstance(jog, JointJog):
+            self._publish_joint(jog)
             return
-        base = message.frame is Frame.BASE
-        frame = self.names.base if base else self.names.tool
+        frame = self.names.base if jog.frame is Frame.BASE else self.names.tool
         if not frame:
-            self._complain(f'no {message.frame.value} frame yet: there is no robot_description')
+            self._complain(f'no {jog.frame.value} frame yet: there is no robot_description')
             return
         twist = TwistStamped()
         twist.header.stamp = self._node.get_clock().now().to_msg()
         twist.header.frame_id = frame
-        twist.twist.linear = _vector(message.linear)
-        twist.twist.angular = _vector(message.angular)
+        twist.twist.linear = _vector(jog.linear)
+        twist.twist.angular = _vector(jog.angular)
         self._twist.publish(twist)
 
-    def switch(self, command_type: CommandType) -> None:
-        """Choose in the servo which kind of command comes.
+    def handle(self, request: CommandType | ServoRequest, now: float) -> None:
+        """Switch the kind of commands, pause or go on, or stop the robot; its jog has ended."""
+        match request:
+            case CommandType():
+                message = ServoCommandType.Request(command_type=int(request))
+                self._call(self._switch, message, f'{request.name.lower()} commands')
+            case ServoRequest.STOP_ROBOT:
+                self._call(self._stop, Trigger.Request(), 'stop')
+            case ServoRequest.TOGGLE_PAUSE:
+                paused = not self.paused
 
-        Args:
-            command_type: Which.
-        """
-        request = ServoCommandType.Request(command_type=int(command_type))
-        self._call(self._switch, request, f'{command_type.name.lower()} commands', lambda: None)
+                def granted() -> None:
+                    self.paused = paused
 
-    def toggle_pause(self) -> None:
-        """Pause the servo, or let it go on."""
-        paused = not self.paused
-
-        def granted() -> None:
-            self.paused = paused
-
-        request = SetBool.Request(data=paused)
-        self._call(self._pause, request, 'pause' if paused else 'go on', granted)
-
-    def stop_robot(self) -> None:
-        """Stop the whole robot; the jog itself has ended by its zeros."""
-        self._call(self._stop, Trigger.Request(), 'stop', lambda: None)
+                what = 'pause' if paused else 'go on'
+                self._call(self._pause, SetBool.Request(data=paused), what, granted)
 
     def flush(self) -> None:
         """Wait until what was published has arrived, before the program ends."""
@@ -198,9 +162,15 @@ class ServoLink:
         message.velocities = [jog.velocity]
         self._jog.publish(message)
 
-    def _call(self, client: Any, request: Any, what: str, granted: Callable[[], None]) -> None:  # noqa: ANN401
+    def _call(
+        self,
+        client: Any,  # noqa: ANN401
+        request: Any,  # noqa: ANN401
+        what: str,
+        granted: Callable[[], None] = lambda: None,
+    ) -> None:
         if not client.service_is_ready():
-            self._say(f'{what}: there is no service {client.service_name}; is the robot running?')
+            self.say(f'{what}: there is no service {client.service_name}; is the robot running?')
             return
 
         def take(future: Any) -> None:  # noqa: ANN401  # rclpy's Future
@@ -208,23 +178,22 @@ class ServoLink:
             if answer.success:
                 granted()
             words = getattr(answer, 'message', '') or ('done' if answer.success else 'refused')
-            self._say(f'{what}: {words}')
+            self.say(f'{what}: {words}')
 
         client.call_async(request).add_done_callback(take)
 
     def _complain(self, text: str) -> None:
         if text != self._complained:
-            self._say(text)
+            self.say(text)
         self._complained = text
 
-    def _learn(self, settings: ServoSettings) -> None:
-        self._received = settings
-        self.scales = settings.scales()
+    def _learn(self) -> None:
+        self.scales = self._settings.scales()
         self._name()
 
     def _name(self) -> None:
         try:
-            names = self._received.names(self._urdf)
+            names = self._settings.names(self._urdf)
         except ModelError as error:
             self._complain(str(error))
             return
@@ -240,7 +209,7 @@ class ServoLink:
             self.names = ArmNames(tuple(message.name), self.names.base, self.names.tool)
 
     def _take_status(self, message: ServoStatus) -> None:
-        self._status = ServoView(message.code, message.message), time.monotonic()
+        self._report = (message.code, message.message), time.monotonic()
 
 
 def _vector(vector: Vector) -> Vector3:

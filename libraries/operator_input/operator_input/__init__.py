@@ -2,38 +2,38 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person moves a robot with: keys, with their release, from any terminal; and gamepads."""
 
-from .auto_repeat import AutoRepeat
-from .command_stream import CommandStream
+from .command_stream import CommandStream, RESTS
 from .exceptions import DeviceError, OperatorInputError, PresetError, SettingError, TerminalError
-from .held_keys import HeldKeys
+from .held_keys import AutoRepeat, HeldKeys
 from .keyboard import Keyboard, ReleaseSource
-from .keyboard_session import KeyboardSession
 from .keys import all_released, KeyAction, KeyEvent
-from .requests import Note, Quit, Suspend
-from .session import Session
-from .status_text import RELEASE_WORDS, status_text, Style
-from .terminal import StatusLine, TerminalKeyboard
+from .mapping import DeadmanMapping, KeyMapping, ProgramRequest, Robot, TeleopMapping
+from .program import TeleopProgram
+from .status import status_text, StatusLine, StatusPart, Style
+from .terminal import TerminalKeyboard
 
 __all__ = [
-    'RELEASE_WORDS',
+    'RESTS',
     'AutoRepeat',
     'CommandStream',
+    'DeadmanMapping',
     'DeviceError',
     'HeldKeys',
     'KeyAction',
     'KeyEvent',
+    'KeyMapping',
     'Keyboard',
-    'KeyboardSession',
-    'Note',
     'OperatorInputError',
     'PresetError',
-    'Quit',
+    'ProgramRequest',
     'ReleaseSource',
-    'Session',
+    'Robot',
     'SettingError',
     'StatusLine',
+    'StatusPart',
     'Style',
-    'Suspend',
+    'TeleopMapping',
+    'TeleopProgram',
     'TerminalError',
     'TerminalKeyboard',
     'all_released',

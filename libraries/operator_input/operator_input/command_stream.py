@@ -15,7 +15,7 @@ RESTS = 3
 
 
 class CommandStream(Generic[T]):
-    """Turns what is wanted now into messages; pure, time is handed in.
+    """Turns what is wanted now into messages; pure, times are in [s].
 
     A change is published at once, an unchanged command once a period. A source that is idle is
     silent, so that it does not overrule others.
@@ -25,7 +25,7 @@ class CommandStream(Generic[T]):
         """Start idle.
 
         Args:
-            period: Time between two messages of the same command [s].
+            period: Time between two messages of the same command.
             rest: Gives the command that ends a motion; it gets the last command of the motion, or
                 None when there was none.
 
@@ -39,7 +39,7 @@ class CommandStream(Generic[T]):
         self._wanted: T | None = None
         self._moved: T | None = None
         self._rests = 0  # still to be published
-        self._due = -math.inf  # [s] of the next message
+        self._due = -math.inf  # time of the next message
 
     @property
     def is_idle(self) -> bool:
@@ -51,7 +51,7 @@ class CommandStream(Generic[T]):
         return command == self._rest(command)
 
     def due(self) -> float:
-        """Return when step() has to be called at the latest [s]; infinite when idle."""
+        """Return when step() has to be called at the latest; infinite when idle."""
         return math.inf if self.is_idle else self._due
 
     def stop(self) -> None:
@@ -64,15 +64,7 @@ class CommandStream(Generic[T]):
             self.stop()
 
     def step(self, wanted: T | None, now: float) -> T | None:
-        """Return what to publish now.
-
-        Args:
-            wanted: Command; None when the source is not active.
-            now: Time [s].
-
-        Returns:
-            None for nothing.
-        """
+        """Return what to publish now, None for nothing; None is wanted by an inactive source."""
         if wanted != self._wanted:
             if wanted is None:
                 self._rests = RESTS

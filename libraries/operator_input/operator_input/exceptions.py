@@ -21,28 +21,16 @@ class OperatorInputError(Exception):
 
 
 class TerminalError(OperatorInputError, OSError):
-    """There is no terminal to read keys from, or it is gone.
-
-    Scenarios: started by a service manager or with a pipe, the window was closed, SSH broke off.
-    """
+    """Started by a service manager or with a pipe; the window was closed, or SSH broke off."""
 
 
 class DeviceError(OperatorInputError, OSError):
-    """An input device cannot be opened or read.
-
-    Scenarios: the user is not in the group input, the device was unplugged.
-    """
+    """The user is not in the group input, or the device was unplugged."""
 
 
 class PresetError(OperatorInputError, ValueError):
-    """No gamepad can be chosen by preset or expression.
-
-    Scenarios: a preset misspelt (the message lists what there is), a malformed expression.
-    """
+    """A preset is misspelt (the message lists what there is), or an expression malformed."""
 
 
 class SettingError(OperatorInputError, ValueError):
-    """Settings make no sense together.
-
-    Scenarios: a time-out for still sticks that is shorter than the one for all others.
-    """
+    """Such as a time-out for still sticks that is shorter than the one for all others."""

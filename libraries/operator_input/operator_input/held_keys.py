@@ -1,17 +1,79 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Which key is held: one state machine for keyboards that report releases and for all others."""
+"""Which key is held: one state machine for keyboards that report releases and for all others.
+
+A keyboard repeats a held key: once after a delay (250 ms to 660 ms, the user's setting), then
+every 20 ms to 50 ms. A terminal passes on the characters alone. So a key whose release is not
+reported counts as held until its next character is overdue: first by the delay, later by the
+interval. The delay is learned from the first key that is held long enough; until then it is a
+guess.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 import math
 
-from .auto_repeat import AutoRepeat
 from .keys import KeyAction, KeyEvent
+
+FASTEST_DELAY, SLOWEST_DELAY = 0.18, 0.7  # [s] settings of desktops, with a margin
+SLOWEST_INTERVAL = 0.1  # [s] between two repeats; what is slower may be a finger
+MARGIN = 1.2  # a repeat may come later by this factor
+
+
+class AutoRepeat:
+    """Time-outs of the two stages [s], and what was learned of the keyboard's delay.
+
+    Attributes:
+        repeat: Longest time between two repeats of a held key.
+    """
+
+    def __init__(self, first: float = 0.5, repeat: float = 0.15) -> None:
+        """Start with guesses: after the first character of a key, and after each further one.
+
+        Raises:
+            ValueError: A time-out is not positive, or the second one is the longer one.
+        """
+        if not 0 < repeat <= first:
+            raise ValueError(f'time-outs {first} s and {repeat} s: wanted 0 < repeat <= first')
+        self.repeat = repeat
+        self._guess = first
+        self._delay: float | None = None
+        self._gaps: deque[float] = deque(maxlen=3)
+
+    @property
+    def first(self) -> float:
+        """Time-out after the first character of a key."""
+        if self._delay is None:
+            return self._guess
+        return max(self._delay * MARGIN, self.repeat)
+
+    @property
+    def longest(self) -> float:
+        """Bound of every time-out that this object will ever give."""
+        return max(self._guess, SLOWEST_DELAY * MARGIN, self.repeat)
+
+    def is_new_stroke(self, gap: float) -> bool:
+        """Return whether a character came from a finger, some time after the first one of its key.
+
+        Only a learned delay can decide: what comes much before it is no repeat.
+        """
+        return self._delay is not None and self.repeat < gap < self._delay / MARGIN
+
+    def learn(self, gap: float | None) -> None:
+        """Take the time since the same character; None where the one before was another."""
+        if gap is None:
+            self._gaps.clear()
+            return
+        self._gaps.append(gap)
+        if len(self._gaps) == self._gaps.maxlen:
+            delay, *repeats = self._gaps
+            if FASTEST_DELAY < delay < SLOWEST_DELAY and max(repeats) < SLOWEST_INTERVAL:
+                self._delay = delay
 
 
 class HeldKeys:
-    """The keys that are down, in the order in which they went down. Pure; time comes with events.
+    """The keys that are down, in the order in which they went down. Pure; times are in [s].
 
     A key that was PRESSED is held until it is RELEASED. A key that was TYPED is held until its
     next character is overdue. The newest key alone counts, so there is never more than one
@@ -20,22 +82,14 @@ class HeldKeys:
     """
 
     def __init__(self, auto_repeat: AutoRepeat | None = None) -> None:
-        """Start with all keys up.
-
-        Args:
-            auto_repeat: The time-outs of typed keys.
-        """
         self._auto_repeat = auto_repeat or AutoRepeat()
-        self._until: dict[str, float] = {}  # [s]; infinite where a release will be reported
-        self._typed: tuple[str, float, float] | None = None  # key, its first and last time [s]
+        self._until: dict[str, float] = {}  # infinite where a release will be reported
+        self._typed: tuple[str, float, float] | None = None  # key, its first and last time
 
     def feed(self, event: KeyEvent) -> None:
-        """Take an event.
-
-        Args:
-            event: In the order of their times.
-        """
-        self._expire(event.time)
+        """Take an event, in the order of their times."""
+        for key in [key for key, until in self._until.items() if until <= event.time]:
+            del self._until[key]
         match event.action:
             case KeyAction.PRESSED:
                 self._press(event.key, math.inf)
@@ -49,28 +103,15 @@ class HeldKeys:
                 pass  # held already, or let go of by clear() while it was down
 
     def current(self, now: float) -> str | None:
-        """Return the newest key that is held.
-
-        Args:
-            now: Time [s].
-        """
-        held = self.held(now)
-        return held[-1] if held else None
+        """Return the newest key that is held."""
+        return next(reversed(self.held(now)), None)
 
     def held(self, now: float) -> tuple[str, ...]:
-        """Return all keys that are held, the newest last.
-
-        Args:
-            now: Time [s].
-        """
+        """Return all keys that are held, the newest last."""
         return tuple(key for key, until in self._until.items() if now < until)
 
     def is_tap(self, now: float) -> bool:
-        """Whether the newest key may be up already: it was typed once, and is not repeated yet.
-
-        Args:
-            now: Time [s].
-        """
+        """Whether the newest key may be up already: typed once, and not repeated yet."""
         key = self.current(now)
         if key is None or self._typed is None or math.isinf(self._until[key]):
             return False
@@ -78,11 +119,7 @@ class HeldKeys:
         return first == last
 
     def deadline(self, now: float) -> float:
-        """Return when a held key is up unless an event of it comes before [s]; may be infinite.
-
-        Args:
-            now: Time [s]; the deadline is later.
-        """
+        """Return when a held key is up unless an event of it comes before; may be infinite."""
         return min((until for until in self._until.values() if now < until), default=math.inf)
 
     def clear(self) -> None:
@@ -114,7 +151,3 @@ class HeldKeys:
             return self._auto_repeat.first
         self._typed = (event.key, first, event.time)
         return self._auto_repeat.repeat
-
-    def _expire(self, now: float) -> None:
-        for key in [key for key, until in self._until.items() if until <= now]:
-            del self._until[key]

@@ -13,14 +13,11 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from .devices.events import InputDevices
-from .devices.kernel import KernelDevices
-from .devices.keyboards import Keyboards
-from .devices.local import is_local
-from .devices.release_matcher import ReleaseMatcher
+from .devices import InputDevices
 from .keys import KeyEvent
-from .terminal import Stage, StatusLine, TerminalKeyboard
-from .terminal.line import CONTROLLING_TERMINAL
+from .releases import is_local, Keyboards, ReleaseMatcher
+from .status import StatusLine
+from .terminal import CONTROLLING_TERMINAL, Stage, TerminalKeyboard
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -62,7 +59,7 @@ class Keyboard:
         """
         self._terminal = TerminalKeyboard(path, kitty=kitty)
         self._matcher = ReleaseMatcher()
-        self._keyboards = Keyboards(devices or KernelDevices(), self._matcher)
+        self._keyboards = Keyboards(devices or InputDevices(), self._matcher)
         self._watch_keyboards = evdev and is_local(environment)
 
     @property
@@ -73,12 +70,8 @@ class Keyboard:
         return ReleaseSource.KEYBOARD if self._keyboards.names else ReleaseSource.TIME_OUT
 
     def status_line(self) -> StatusLine:
-        """Return a status line on the same terminal.
-
-        Raises:
-            TerminalError: Outside of the context.
-        """
-        return StatusLine(self._terminal.line)
+        """Return a status line on the same terminal."""
+        return StatusLine(self._terminal)
 
     def wait(self, timeout: float, others: Iterable[int] = ()) -> list[KeyEvent]:
         """Wait for something to happen to a key.
@@ -96,19 +89,16 @@ class Keyboard:
         if self._watch_keyboards and self._terminal.stage is not Stage.ACTIVE:
             self._keyboards.scan(time.monotonic())
         waiting = [self._terminal.fileno(), *self._keyboards.filenos(), *others]
-        select.select(waiting, [], [], max(min(timeout, self._terminal.escape_timeout()), 0.0))
+        select.select(waiting, [], [], max(min(timeout, self._terminal.longest_wait()), 0.0))
         # the keyboard first: its press explains the character of the terminal
         events = self._keyboards.read(time.monotonic())
         for event in self._terminal.read():
             events += self._matcher.terminal(event)
         return events
 
-    def paused(self) -> contextlib.AbstractContextManager[None]:
-        """Give the terminal back for the time of a block, as for Ctrl-Z."""
-        return self._paused()
-
     @contextlib.contextmanager
-    def _paused(self) -> Iterator[None]:
+    def paused(self) -> Iterator[None]:
+        """Give the terminal back for the time of a block, as for Ctrl-Z."""
         self._keyboards.close()
         self._matcher.lose_all(time.monotonic())
         with self._terminal.paused():

@@ -29,15 +29,12 @@ class KeyAction(Enum):
 
 @dataclass(frozen=True, slots=True)
 class KeyEvent:
-    """One thing that happened to a key.
+    """One thing that happened to a key, on a monotonic clock [s].
 
-    Attributes:
-        key: Its name: the character that it types (``i``, ``I``, ``<``), or one of ``space``,
-            ``enter``, ``tab``, ``escape``, ``backspace``, ``up``, ``down``, ``left``, ``right``,
-            ``home``, ``end``, ``page_up``, ``page_down``, ``insert``, ``delete``, ``f1`` to
-            ``f12``; with ``ctrl+`` or ``alt+`` before it where these were down. Empty for all.
-        action: What happened to it.
-        time: When, on a monotonic clock [s].
+    A key is named by the character that it types (``i``, ``I``, ``<``), or ``space``, ``enter``,
+    ``tab``, ``escape``, ``backspace``, ``up``, ``down``, ``left``, ``right``, ``home``, ``end``,
+    ``page_up``, ``page_down``, ``insert``, ``delete``, ``f1`` to ``f12``; with ``ctrl+`` or
+    ``alt+`` before it where these were down. The name is empty for all keys.
     """
 
     key: str
@@ -51,9 +48,5 @@ class KeyEvent:
 
 
 def all_released(time: float) -> KeyEvent:
-    """Return the event that lets go of every key.
-
-    Args:
-        time: When, on a monotonic clock [s].
-    """
+    """Return the event that lets go of every key."""
     return KeyEvent('', KeyAction.ALL_RELEASED, time)

@@ -12,16 +12,21 @@ from operator_input.devices import (
     AxisRange,
     DeviceInfo,
     DeviceState,
+    EV_ABS,
+    EV_KEY,
+    EV_SYN,
     InputDevice,
+    InputDevices,
     InputEvent,
+    SYN_DROPPED,
+    SYN_REPORT,
 )
-from operator_input.devices.events import EV_ABS, EV_KEY, EV_SYN, SYN_REPORT
 
 STICK, TRIGGER, HAT = AxisRange(-32768, 32767), AxisRange(0, 255), AxisRange(-1, 1)
 BYTE_STICK = AxisRange(0, 255)
 
 
-class InjectedDevice:
+class InjectedDevice(InputDevice):
     """A device whose events a test makes; each of its methods is one report."""
 
     def __init__(
@@ -34,7 +39,7 @@ class InjectedDevice:
         path: str = '/dev/input/event7',
     ) -> None:
         """Describe it."""
-        self.info = DeviceInfo(path, name, vendor, 1, frozenset(keys), dict(axes or {}))
+        self.info = DeviceInfo(path, name, vendor, frozenset(keys), dict(axes or {}))
         self.keys: set[int] = set()
         self.axes = {
             code: 0
@@ -43,7 +48,7 @@ class InjectedDevice:
             for code, span in self.info.axes.items()
         }
         self.is_closed = False
-        self._gone = False
+        self._is_gone = False
         self._events: list[InputEvent] = []
         self._readable, self._writable = os.pipe()
 
@@ -70,11 +75,11 @@ class InjectedDevice:
     def drop_events(self) -> None:
         """Lose what was not read yet, as the kernel does when its buffer is full."""
         self._events = []
-        self.report(InputEvent(EV_SYN, 3, 0))
+        self.report(InputEvent(EV_SYN, SYN_DROPPED, 0))
 
     def unplug(self) -> None:
         """Pull the plug."""
-        self._gone = True
+        self._is_gone = True
         os.write(self._writable, b'.')
 
     def fileno(self) -> int:
@@ -83,7 +88,7 @@ class InjectedDevice:
 
     def read(self) -> Iterable[InputEvent]:
         """Return the events that have come."""
-        if self._gone:
+        if self._is_gone:
             raise DeviceError(f'{self.info.name} is gone')
         events, self._events = self._events, []
         if events:
@@ -99,10 +104,11 @@ class InjectedDevice:
         self.is_closed = True
 
 
-class InjectedDevices:
+class InjectedDevices(InputDevices):
     """The machine's devices; a test plugs them in and out."""
 
     def __init__(self, *devices: InjectedDevice) -> None:
+        super().__init__()
         self.plugged = list(devices)
 
     def paths(self) -> list[str]:

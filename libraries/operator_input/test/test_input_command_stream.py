@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from operator_input import CommandStream
-from operator_input.command_stream import RESTS
+from operator_input import CommandStream, RESTS
 
 PERIOD = 0.05
 COMMANDS = st.sampled_from([None, 0.1, 0.5, -0.2])

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 import pytest
 
 from operator_input import KeyAction, KeyEvent
-from operator_input.terminal.decoder import KeyDecoder
-from operator_input.terminal.reports import Kitty, Report, ReportKind
+from operator_input.key_decoder import KeyDecoder, Kitty, Report, ReportKind
 
 PRESSED, REPEATED = KeyAction.PRESSED, KeyAction.REPEATED
 RELEASED, TYPED = KeyAction.RELEASED, KeyAction.TYPED

@@ -21,6 +21,7 @@ from operator_input.gamepad import (
     Grip,
     Timeout,
 )
+from operator_input.gamepad.gamepad import position
 from operator_input.gamepad.presets import (
     ABS_BRAKE,
     ABS_GAS,
@@ -33,7 +34,6 @@ from operator_input.gamepad.presets import (
     ABS_Y,
     ABS_Z,
 )
-from operator_input.gamepad.reading import position
 
 BTN_SOUTH, BTN_NORTH, BTN_TL = 0x130, 0x133, 0x136
 STANDARD_KEYS = range(0x130, 0x13F)

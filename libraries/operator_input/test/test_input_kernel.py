@@ -12,10 +12,9 @@ from typing import Any
 import pytest
 
 from operator_input import DeviceError
-from operator_input.devices import KernelDevices
-from operator_input.devices.keyboards import Keyboards
-from operator_input.devices.release_matcher import ReleaseMatcher
+from operator_input.devices import InputDevices
 from operator_input.gamepad import AT_REST, Axis, Button, Gamepad, GamepadState
+from operator_input.releases import Keyboards, ReleaseMatcher
 
 UINPUT = Path('/dev/uinput')
 BTN_SOUTH, EV_KEY, EV_ABS, ABS_X, ABS_Y = 0x130, 1, 3, 0, 1
@@ -31,14 +30,14 @@ def wait_for(condition: Callable[[], bool]) -> None:
 
 def test_folder_without_devices(tmp_path: Path) -> None:
     """A container has no /dev/input; that is no error."""
-    assert KernelDevices(str(tmp_path / 'input')).paths() == []
+    assert InputDevices(str(tmp_path / 'input')).paths() == []
 
 
 def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     """event10 comes after event9, and what is no event device is left out."""
     for name in ('event10', 'event9', 'mouse0', 'by-id'):
         (tmp_path / name).touch()
-    paths = KernelDevices(str(tmp_path)).paths()
+    paths = InputDevices(str(tmp_path)).paths()
     assert [Path(path).name for path in paths] == ['event9', 'event10']
 
 
@@ -47,20 +46,20 @@ def test_file_that_is_no_device(tmp_path: Path) -> None:
     file = tmp_path / 'event0'
     file.touch()
     with pytest.raises(DeviceError, match=r'event0.*group input'):
-        KernelDevices(str(tmp_path)).open(str(file))
+        InputDevices(str(tmp_path)).open(str(file))
 
 
 def test_vanished_device(tmp_path: Path) -> None:
     """A device that went away between looking and opening is a DeviceError too."""
     with pytest.raises(DeviceError, match='event3'):
-        KernelDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
+        InputDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
 
 
 def test_problems_are_reported_with_their_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No package, no devices, no permission: each has words of its own; else there is none."""
-    devices = KernelDevices(str(tmp_path))
+    devices = InputDevices(str(tmp_path))
     assert 'plug one in, or give the container --device' in devices.problem()
     (tmp_path / 'event0').touch()
     assert not devices.problem()
@@ -74,7 +73,7 @@ def test_keys_work_without_the_package(tmp_path: Path, monkeypatch: pytest.Monke
     """Where evdev is not installed, a device is a DeviceError, and keyboards are simply none."""
     monkeypatch.setitem(sys.modules, 'evdev', None)
     (tmp_path / 'event0').touch()
-    devices = KernelDevices(str(tmp_path))
+    devices = InputDevices(str(tmp_path))
     with pytest.raises(DeviceError, match='package evdev is missing'):
         devices.open(str(tmp_path / 'event0'))
     keyboards = Keyboards(devices, ReleaseMatcher())
@@ -95,7 +94,7 @@ def test_gamepad_of_the_kernel() -> None:
         EV_ABS: [(ABS_X, stick), (ABS_Y, stick)],
     }
     name = f'Workspace test gamepad {os.getpid()}'
-    gamepad = Gamepad(KernelDevices(), device=name)
+    gamepad = Gamepad(InputDevices(), device=name)
     states: list[GamepadState] = []
 
     def look() -> bool:

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from operator_input import StatusLine
-from operator_input.terminal.status import fitted
+from operator_input.status import fitted
 
 
 class Paper:

@@ -21,7 +21,7 @@ from operator_input import (
     TerminalError,
     TerminalKeyboard,
 )
-from operator_input.terminal.negotiation import Stage
+from operator_input.terminal import Stage
 
 TIMEOUT = 10.0  # [s] of a test on a busy machine
 KEY_Q, KEY_I, KEY_SPACE = 16, 23, 57
@@ -208,7 +208,7 @@ def test_no_terminal(path: str) -> None:
 def test_process_without_a_terminal_names_the_remedy() -> None:
     """Started as a service, without a controlling terminal, the message says what to do."""
     result = subprocess.run(
-        [sys.executable, '-c', 'from operator_input.show_keys import main; main()'],
+        [sys.executable, '-c', 'from operator_input.show_input import show_keys; show_keys()'],
         start_new_session=True,
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -229,7 +229,7 @@ def test_stuck_terminal_does_not_hold_the_writer_up() -> None:
         signal.alarm(int(TIMEOUT))
         try:
             for _ in range(100):
-                keyboard.line.write('x' * 4096)
+                keyboard.write('x' * 4096)
         finally:
             signal.alarm(0)
 

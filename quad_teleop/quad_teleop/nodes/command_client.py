@@ -21,11 +21,11 @@ KEY_REPEAT_TIME = 0.7  # [s] within which the same question is the keyboard repe
 class _Question:
     what: str  # in words
     request: Any
-    requested_at: float  # [s]
+    requested_at: float
 
 
 class CommandClient:
-    """Client of a service that answers ``success`` and ``message``."""
+    """Client of a service that answers ``success`` and ``message``. Times are in [s]."""
 
     def __init__(
         self,
@@ -57,13 +57,7 @@ class CommandClient:
         self._is_waiting = False  # for the service to be found
 
     def request(self, what: str, request: Any, now: float) -> None:  # noqa: ANN401
-        """Ask; a question that is still open is dropped.
-
-        Args:
-            what: What is requested, in a word.
-            request: The request.
-            now: Time [s].
-        """
+        """Ask for something, named by a word; a question that is still open is dropped."""
         last = self._question
         if (
             self._drops_repeats
@@ -84,11 +78,7 @@ class CommandClient:
         self._forget()
 
     def check(self, now: float) -> None:
-        """Send what waits for the service; give up what is overdue.
-
-        Args:
-            now: Time [s].
-        """
+        """Send what waits for the service; give up what is overdue."""
         question = self._question
         if question is None:
             return

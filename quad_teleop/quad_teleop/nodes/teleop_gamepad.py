@@ -5,32 +5,25 @@
 from __future__ import annotations
 
 import sys
-import threading
-import time
 
 from node_runner import destroyed_when_refused, refuse_misspelt
 from operator_input.devices import InputDevices
-from operator_input.gamepad import GamepadSession, GamepadState
-from operator_input.ros import GamepadNode, run_gamepad
+from operator_input.ros import declare_gamepad, run_teleop, TeleopNode
 
 from ..exceptions import TeleopError
 from ..gamepad_teleop import GamepadTeleop
-from ..requests import ClearFault, ModeRequest, PoseRequest, Request
-from ..speeds import Speeds
-from ..velocity import Velocity
-from .controller import Controller
-from .outputs import Outputs
+from ..motion import Speeds
+from .robot_link import RobotLink
 from .settings import declare_speeds, declare_steps, declare_stream
 
-NORMAL, TURBO = Speeds(0.15, 0.6), Speeds(0.3, 1.2)
+SPEEDS = {'': Speeds(0.15, 0.6), 'turbo_': Speeds(0.3, 1.2)}
 
 
-class TeleopGamepad(GamepadNode):
+class TeleopGamepad(TeleopNode):
     """Publishes velocities and body poses, and requests modes.
 
     Attributes:
-        teleop: Decides what to publish.
-        outputs: Publishes it.
+        robot: What it publishes to.
     """
 
     @destroyed_when_refused
@@ -45,68 +38,25 @@ class TeleopGamepad(GamepadNode):
             SettingError: Parameters make no sense together.
             PresetError: There is no preset of that name.
         """
-        super().__init__('teleop_gamepad', devices)
-        self.outputs = Outputs(self)
-        self.teleop = GamepadTeleop(
-            declare_speeds(self, '', NORMAL),
-            declare_speeds(self, 'turbo_', TURBO),
-            self.deadman,
-            declare_steps(self),
+        super().__init__('teleop_gamepad')
+        self.source, deadman = declare_gamepad(self, devices)
+        self.robot = RobotLink(self, self.get_logger().info)
+        normal, turbo = declare_speeds(self, SPEEDS)
+        self.mapping = GamepadTeleop(
+            self.robot,
+            deadman,
             declare_stream(self),
+            normal,
+            turbo,
+            steps=declare_steps(self),
+            warn=self.get_logger().warning,
         )
         refuse_misspelt(self)
 
 
-class Session(GamepadSession[Velocity]):
-    """One person with one gamepad, and the controller."""
-
-    def __init__(self, node: TeleopGamepad, stop: threading.Event) -> None:
-        """Prepare.
-
-        Args:
-            node: The node.
-            stop: Ends it.
-        """
-        super().__init__(node.gamepad, node.teleop, stop)
-        self._node = node
-        self._controller = Controller(node, node.get_logger().info)
-
-    def publish(self, command: Velocity) -> None:
-        """Publish a velocity."""
-        self._node.outputs.publish(command)
-
-    def take(self, state: GamepadState) -> None:
-        """Do what the buttons request."""
-        for request in self._node.teleop.feed(state):
-            self._handle(request)
-
-    def warn(self, text: str) -> None:
-        """Log a warning."""
-        self._node.get_logger().warning(text)
-
-    def attend(self, now: float) -> None:
-        """Take answers of the controller."""
-        self._controller.check(now)
-
-    def flush(self) -> None:
-        """See the last velocities off."""
-        self._node.outputs.flush()
-
-    def _handle(self, request: Request) -> None:
-        match request:
-            case ModeRequest(mode):
-                self._controller.ask_mode(mode, time.monotonic())
-            case PoseRequest(pose):
-                self._node.outputs.publish_pose(pose)
-            case ClearFault():
-                self._controller.clear_fault(time.monotonic())
-            case _:
-                self.warn(f'{request} is nothing that a gamepad can do')
-
-
 def main() -> int:
     """Run until Ctrl-C; return the exit code."""
-    return run_gamepad('teleop_gamepad', TeleopGamepad, Session, TeleopError)
+    return run_teleop('teleop_gamepad', TeleopGamepad, TeleopError, patient=False)
 
 
 if __name__ == '__main__':

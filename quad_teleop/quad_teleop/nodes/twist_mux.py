@@ -94,42 +94,35 @@ class TwistMux(Node):
             self._output.publish(message)
 
     def _diagnose(self) -> None:
-        message = DiagnosticArray(status=[self._status(time.monotonic())])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
-
-    def _status(self, now: float) -> DiagnosticStatus:
-        active, lock_priority = self._mux.active(now), self._mux.lock_priority(now)
-        values = {
-            f'velocity {each.name}': _text(
-                'masked' if self._mux.is_masked(each, now) else 'unmasked', each
-            )
-            for each in self._mux.inputs.sources
-        }
-        values |= {
-            f'lock {each.name}': _text(
-                'locked' if self._mux.is_locked(each, now) else 'free', each
-            )
-            for each in self._mux.inputs.locks
-        }
-        values['current priority'] = str(lock_priority)
-        return DiagnosticStatus(
+        now, mux = time.monotonic(), self._mux
+        active, values = mux.active(now), {}
+        for each in mux.inputs.sources:
+            state = 'masked' if mux.is_masked(each, now) else 'unmasked'
+            values[f'velocity {each.name}'] = f'{state} {_text(each)}'
+        for each in mux.inputs.locks:
+            state = 'locked' if mux.is_locked(each, now) else 'free'
+            values[f'lock {each.name}'] = f'{state} {_text(each)}'
+        values['current priority'] = str(mux.lock_priority(now))
+        status = DiagnosticStatus(
             level=DiagnosticStatus.OK,
             name='twist_mux: Twist mux status',
             message=f'{active.name} is active' if active else 'no source is active',
             hardware_id='none',
             values=[KeyValue(key=key, value=value) for key, value in values.items()],
         )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
 
     def _log_inputs(self, inputs: Inputs) -> None:
         for kind, group in (('source', inputs.sources), ('lock', inputs.locks)):
             for each in sorted(group, key=lambda one: -one.priority):
-                self.get_logger().info(f'{kind} {each.name}: {_text("", each).strip()}')
+                self.get_logger().info(f'{kind} {each.name}: {_text(each)}')
 
 
-def _text(state: str, each: Input) -> str:
+def _text(each: Input) -> str:
     timeout = f'{each.timeout:g} s' if each.timeout else 'no'
-    return f'{state} ({each.topic}, priority {each.priority}, {timeout} time-out)'
+    return f'({each.topic}, priority {each.priority}, {timeout} time-out)'
 
 
 def main() -> int:

@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gamepads: presets, state, hot-plug, deadman."""
 
-from .controls import AT_REST, Axis, Button, GamepadState
-from .deadman import Deadman, DEADMAN_BUTTONS, Grip, is_pressed, Timeout
+from .controls import AT_REST, Axis, Button, Deadman, DEADMAN_BUTTONS, GamepadState, Grip, Timeout
 from .gamepad import Gamepad
 from .presets import AUTO, PRESETS
-from .session import GamepadSession
-from .teleop import DeadmanTeleop
 
 __all__ = [
     'AT_REST',
@@ -17,11 +14,8 @@ __all__ = [
     'Axis',
     'Button',
     'Deadman',
-    'DeadmanTeleop',
     'Gamepad',
-    'GamepadSession',
     'GamepadState',
     'Grip',
     'Timeout',
-    'is_pressed',
 ]

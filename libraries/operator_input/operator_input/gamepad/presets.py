@@ -10,11 +10,11 @@ knows, the order in which HID usages become BTN_TRIGGER and what follows (hid-in
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import difflib
 import re
 
-from ..devices.events import DeviceInfo
+from ..devices import DeviceInfo
 from ..exceptions import PresetError
 from .controls import Axis, Button
 
@@ -45,46 +45,21 @@ HID_AXES = _LEFT_STICK_AND_DPAD | {
 }
 """Axes of a pad that describes itself (HID usages Z and Rz, Brake and Accelerator)."""
 
-STANDARD_BUTTONS = {
-    0x130: Button.SOUTH,
-    0x131: Button.EAST,
-    0x133: Button.NORTH,
-    0x134: Button.WEST,
-    0x136: Button.LEFT_SHOULDER,
-    0x137: Button.RIGHT_SHOULDER,
-    0x138: Button.LEFT_TRIGGER,
-    0x139: Button.RIGHT_TRIGGER,
-    0x13A: Button.SELECT,
-    0x13B: Button.START,
-    0x13C: Button.GUIDE,
-    0x13D: Button.LEFT_STICK,
-    0x13E: Button.RIGHT_STICK,
-}
+_ORDER = (
+    *('south', 'east', '', 'north', 'west', '', 'left_shoulder', 'right_shoulder'),
+    *('left_trigger', 'right_trigger', 'select', 'start', 'guide', 'left_stick', 'right_stick'),
+)
+STANDARD_BUTTONS = {BTN_SOUTH + code: Button(name) for code, name in enumerate(_ORDER) if name}
 """Buttons of the kernel's specification."""
 
 XBOX_BUTTONS = STANDARD_BUTTONS | {0x133: Button.WEST, 0x134: Button.NORTH}
 """Buttons of the driver xpad, and of pads that imitate it."""
 
-HID_BUTTONS = {
-    BTN_JOYSTICK + index: button
-    for index, button in enumerate(
-        (
-            Button.WEST,
-            Button.SOUTH,
-            Button.EAST,
-            Button.NORTH,
-            Button.LEFT_SHOULDER,
-            Button.RIGHT_SHOULDER,
-            Button.LEFT_TRIGGER,
-            Button.RIGHT_TRIGGER,
-            Button.SELECT,
-            Button.START,
-            Button.LEFT_STICK,
-            Button.RIGHT_STICK,
-            Button.GUIDE,
-        )
-    )
-}
+_HID_ORDER = (
+    *('west', 'south', 'east', 'north', 'left_shoulder', 'right_shoulder', 'left_trigger'),
+    *('right_trigger', 'select', 'start', 'left_stick', 'right_stick', 'guide'),
+)
+HID_BUTTONS = {BTN_JOYSTICK + code: Button(name) for code, name in enumerate(_HID_ORDER)}
 """Buttons of pads without a driver, in the order that most of them have."""
 
 DPAD_BUTTONS = {
@@ -104,47 +79,30 @@ class Preset:
         name: What the user calls it.
         names: Expression for names of such devices.
         vendors: USB vendor ids of such devices.
-        axes: Its axes by code; a stick's are reversed, the kernel counts down and right as up.
         buttons: Its buttons by code.
+        axes: Its axes by code; a stick's are reversed, the kernel counts down and right as up.
     """
 
     name: str
     names: re.Pattern[str]
     vendors: frozenset[int]
-    axes: Mapping[int, Axis]
     buttons: Mapping[int, Button]
+    axes: Mapping[int, Axis]
 
     def fits(self, info: DeviceInfo) -> bool:
-        """Return whether a device is of this kind.
-
-        Args:
-            info: The device.
-        """
+        """Return whether a device is of this kind."""
         return info.vendor in self.vendors or self.names.search(info.name) is not None
 
 
+def _preset(name: str, names: str, vendors: set[int], buttons: Mapping[int, Button]) -> Preset:
+    expression = re.compile(names, re.IGNORECASE)
+    return Preset(name, expression, frozenset(vendors), buttons, STANDARD_AXES)
+
+
 PRESETS = (
-    Preset(
-        'xbox',
-        re.compile(r'x-?box|x-input|xinput', re.IGNORECASE),
-        frozenset({0x045E}),
-        STANDARD_AXES,
-        XBOX_BUTTONS,
-    ),
-    Preset(
-        'ps',
-        re.compile(r'playstation|dualshock|dualsense|sony', re.IGNORECASE),
-        frozenset({0x054C}),
-        STANDARD_AXES,
-        STANDARD_BUTTONS,
-    ),
-    Preset(
-        'generic',
-        re.compile(''),
-        frozenset(),
-        HID_AXES,
-        STANDARD_BUTTONS | HID_BUTTONS,
-    ),
+    _preset('xbox', 'x-?box|x-input|xinput', {0x045E}, XBOX_BUTTONS),
+    _preset('ps', 'playstation|dualshock|dualsense|sony', {0x054C}, STANDARD_BUTTONS),
+    _preset('generic', '', set(), STANDARD_BUTTONS | HID_BUTTONS),
 )
 """All presets, the first that fits is used."""
 
@@ -153,36 +111,27 @@ AUTO = 'auto'
 
 
 def is_gamepad(info: DeviceInfo) -> bool:
-    """Return whether a device is a gamepad or joystick, not a keyboard, mouse or tilt sensor.
-
-    Args:
-        info: The device.
-    """
+    """Return whether a device is a gamepad or joystick, not a keyboard, mouse or tilt sensor."""
     buttons = {BTN_SOUTH, *range(BTN_JOYSTICK, BTN_JOYSTICK + 4)} & info.keys
     return bool(buttons) and {ABS_X, ABS_Y} <= info.axes.keys()
 
 
 def choose_preset(name: str, info: DeviceInfo) -> Preset:
-    """Choose the preset of a device.
+    """Choose the preset of a device, by its name or by :data:`AUTO`.
 
-    Args:
-        name: Name of a preset, or :data:`AUTO`.
-        info: The device. One that has a stick on ABS_RX is no self-describing one.
+    A device that has a stick on ABS_RX is no self-describing one.
 
     Raises:
         PresetError: There is no preset of that name.
     """
     preset = next(each for each in PRESETS if each.fits(info)) if name == AUTO else _named(name)
-    axes = STANDARD_AXES if {ABS_RX, ABS_RY} <= info.axes.keys() else HID_AXES
+    has_standard_axes = {ABS_RX, ABS_RY} <= info.axes.keys()
     # a pad by Bluetooth without its driver has the buttons of its kind, but axes of its own
-    return Preset(preset.name, preset.names, preset.vendors, axes, preset.buttons)
+    return replace(preset, axes=STANDARD_AXES if has_standard_axes else HID_AXES)
 
 
 def check_preset(name: str) -> None:
-    """Refuse a name that is no preset.
-
-    Args:
-        name: Name of a preset, or :data:`AUTO`.
+    """Refuse a name that is neither that of a preset nor :data:`AUTO`.
 
     Raises:
         PresetError: There is none of that name.

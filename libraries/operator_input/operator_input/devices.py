@@ -1,18 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The input devices of this machine, by the package evdev."""
+"""Input devices of the kernel, by the package evdev.
+
+Codes: include/uapi/linux/input-event-codes.h.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 import contextlib
+from dataclasses import dataclass
 import importlib.util
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..exceptions import DeviceError
-from .events import AxisRange, DeviceInfo, DeviceState, EV_ABS, EV_KEY, InputDevice, InputEvent
+from .exceptions import DeviceError
+
+EV_SYN, EV_KEY, EV_ABS = 0x00, 0x01, 0x03
+SYN_REPORT, SYN_DROPPED = 0, 3
 
 FOLDER = '/dev/input'
 MISSING = 'the Python package evdev is missing: sudo apt-get install python3-evdev'
@@ -21,14 +27,55 @@ PERMISSION = (
 )
 
 
-class KernelDevice:
-    """An open file of /dev/input."""
+class InputEvent(NamedTuple):
+    """One event; the value is 0 up, 1 down, 2 repeated, or a position in [device units]."""
+
+    type: int
+    code: int
+    value: int
+
+
+class AxisRange(NamedTuple):
+    """Range of an axis; values that are flat about the middle mean rest. In [device units]."""
+
+    minimum: int
+    maximum: int
+    flat: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What a device is: its file, what it calls itself, its USB or Bluetooth vendor.
+
+    Attributes:
+        keys: Codes of its keys and buttons.
+        axes: Its axes by code.
+    """
+
+    path: str
+    name: str
+    vendor: int
+    keys: frozenset[int]
+    axes: Mapping[int, AxisRange]
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    """The codes that are pressed, and where each axis is by its code [device units]."""
+
+    keys: frozenset[int]
+    axes: Mapping[int, int]
+
+
+class InputDevice:
+    """An open file of /dev/input.
+
+    Attributes:
+        info: What it is.
+    """
 
     def __init__(self, path: str) -> None:
         """Open it.
-
-        Args:
-            path: such as ``/dev/input/event3``.
 
         Raises:
             DeviceError: It is gone, or may not be read, or the package evdev is missing.
@@ -44,19 +91,13 @@ class KernelDevice:
         except OSError as error:
             raise DeviceError(f'{path}: {error.strerror}; {PERMISSION}') from None
         axes: list[Any] = capabilities.get(EV_ABS, [])  # its types do not know of absinfo
-        self._info = DeviceInfo(
+        self.info = DeviceInfo(
             path=path,
             name=self._device.name,
             vendor=self._device.info.vendor,
-            product=self._device.info.product,
             keys=frozenset(capabilities.get(EV_KEY, [])),
             axes={code: AxisRange(info.min, info.max, info.flat) for code, info in axes},
         )
-
-    @property
-    def info(self) -> DeviceInfo:
-        """What it is."""
-        return self._info
 
     def fileno(self) -> int:
         """Return what to wait for."""
@@ -82,7 +123,7 @@ class KernelDevice:
             DeviceError: It was unplugged.
         """
         try:
-            axes = {code: self._device.absinfo(code).value for code in self._info.axes}
+            axes = {code: self._device.absinfo(code).value for code in self.info.axes}
             return DeviceState(frozenset(self._device.active_keys()), axes)
         except OSError as error:
             raise self._gone(error) from None
@@ -93,18 +134,13 @@ class KernelDevice:
             self._device.close()
 
     def _gone(self, error: OSError) -> DeviceError:
-        return DeviceError(f'{self._info.name} ({self._info.path}) is gone: {error.strerror}')
+        return DeviceError(f'{self.info.name} ({self.info.path}) is gone: {error.strerror}')
 
 
-class KernelDevices:
+class InputDevices:
     """All devices of this machine that this user may read."""
 
     def __init__(self, folder: str = FOLDER) -> None:
-        """Look in a folder.
-
-        Args:
-            folder: Where the kernel has them.
-        """
         self._folder = folder
 
     def paths(self) -> list[str]:
@@ -113,15 +149,12 @@ class KernelDevices:
         return [str(file) for file in files if os.access(file, os.R_OK)]
 
     def open(self, path: str) -> InputDevice:
-        """Open a device.
-
-        Args:
-            path: One of paths().
+        """Open one of paths().
 
         Raises:
             DeviceError: It is gone, or may not be read.
         """
-        return KernelDevice(path)
+        return InputDevice(path)
 
     def problem(self) -> str:
         """Return why nothing can be read, and what helps; empty when something can."""
@@ -133,6 +166,49 @@ class KernelDevices:
         if not self.paths():
             return f'no device of {folder} may be read; {PERMISSION}'
         return ''
+
+
+class DeviceSearch:
+    """Looks for devices of a kind that are plugged in at any time. Times are in [s]."""
+
+    def __init__(
+        self,
+        devices: InputDevices,
+        fits: Callable[[DeviceInfo], bool],
+        period: float,
+        others_period: float,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            devices: Where to look.
+            fits: Whether a device is of the kind.
+            period: Time between two looks.
+            others_period: Time for which a device of another kind is not opened again: that wakes
+                a sleeping one.
+        """
+        self._devices = devices
+        self._fits = fits
+        self._period = period
+        self._others_period = others_period
+        self._others: dict[str, float] = {}  # until when a path is passed over
+        self._next = float('-inf')
+
+    def found(self, now: float, skip: Callable[[str], bool]) -> Iterator[InputDevice]:
+        """Open the devices that fit, but some paths, if it is time to look for them."""
+        if now < self._next:
+            return
+        self._next = now + self._period
+        for path in self._devices.paths():
+            if skip(path) or now < self._others.get(path, now):
+                continue
+            with contextlib.suppress(DeviceError):
+                device = self._devices.open(path)
+                if self._fits(device.info):
+                    yield device
+                else:
+                    self._others[path] = now + self._others_period
+                    device.close()
 
 
 def _number(file: Path) -> int:

@@ -4,12 +4,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from enum import Enum
 import re
 from typing import Protocol
 import unicodedata
 
 _CONTROL = re.compile('\x1b\\[[0-9;]*m')
 RESET, CLEAR_LINE = '\x1b[0m', '\r\x1b[K'
+
+
+class Style(Enum):
+    """How a part looks, as a control sequence of ECMA-48 (SGR)."""
+
+    PLAIN = ''
+    BOLD = '\x1b[1m'
+    DIM = '\x1b[2m'
+    GREEN = '\x1b[32m'
+    YELLOW = '\x1b[33m'
+    RED = '\x1b[1;31m'
+
+
+StatusPart = tuple[str, Style]
+
+
+def status_text(parts: Iterable[StatusPart], *, colour: bool) -> str:
+    """Join the parts of a status line, what matters most first: a narrow window cuts the rest."""
+    return ' | '.join(
+        f'{style.value}{text}{RESET}' if colour and style.value else text for text, style in parts
+    )
 
 
 class Output(Protocol):
@@ -23,34 +46,24 @@ class Output(Protocol):
 
 
 class StatusLine:
-    """Shows a line in place; never wider than the window, so that it never wraps."""
+    """Shows a line in place; never wider than the window, so that it never wraps.
+
+    Texts may contain colours.
+    """
 
     def __init__(self, output: Output) -> None:
-        """Start without a line.
-
-        Args:
-            output: The terminal.
-        """
         self._output = output
         self._shown = ''
 
     def show(self, text: str) -> None:
-        """Show a line, if it is not there yet.
-
-        Args:
-            text: May contain colours.
-        """
+        """Show a line, if it is not there yet."""
         line = fitted(text, self._output.width() - 1)
         if line != self._shown:
             self._output.write(CLEAR_LINE + line)
             self._shown = line
 
     def message(self, text: str) -> None:
-        """Write lines above it, which stay.
-
-        Args:
-            text: May contain colours and several lines.
-        """
+        """Write lines above it, which stay."""
         self._output.write(f'{CLEAR_LINE}{text}\n{self._shown}')
 
     def end(self) -> None:
@@ -61,12 +74,7 @@ class StatusLine:
 
 
 def fitted(text: str, width: int) -> str:
-    """Cut a line so that it needs no more than some columns.
-
-    Args:
-        text: May contain colours; they are kept, and switched off where it is cut.
-        width: Columns.
-    """
+    """Cut a line to some columns; colours are kept, and switched off where it is cut."""
     result: list[str] = []
     left, position = width, 0
     while position < len(text):

@@ -18,26 +18,19 @@ import pytest
 
 from operator_input import (
     CommandStream,
+    DeadmanMapping,
     HeldKeys,
     Keyboard,
-    KeyboardSession,
     KeyEvent,
-    Note,
-    Quit,
-    Suspend,
+    KeyMapping,
+    ProgramRequest,
+    RESTS,
+    StatusPart,
+    Style,
+    TeleopProgram,
     TerminalError,
 )
-from operator_input.command_stream import RESTS
-from operator_input.gamepad import (
-    Axis,
-    Button,
-    Deadman,
-    DeadmanTeleop,
-    Gamepad,
-    GamepadSession,
-    GamepadState,
-    Grip,
-)
+from operator_input.gamepad import Axis, Button, Deadman, Gamepad, GamepadState, Grip
 
 TIMEOUT = 10.0  # [s]
 PERIOD = 0.01  # [s]
@@ -64,81 +57,78 @@ class Record:
             assert self._changed.wait_for(lambda: condition(self.commands), TIMEOUT), self.commands
 
 
-class Keys:
-    """Each held key is a command; some strokes are requests."""
-
-    def __init__(self) -> None:
-        self._held = HeldKeys()
-        self._stream: CommandStream[str] = CommandStream(PERIOD, lambda _: 'rest')
-
-    def feed(self, event: KeyEvent) -> list[str | Note | Quit | Suspend]:
-        """Take a key."""
-        self._held.feed(event)
-        if not event.is_stroke:
-            return []
-        requests: dict[str, str | Note | Quit | Suspend]
-        requests = {'q': Quit(), '?': Note('nobody helps'), 'z': Suspend(), 'a': 'request'}
-        return [requests[event.key]] if event.key in requests else []
-
-    def step(self, now: float) -> str | None:
-        """Publish the held key."""
-        key = self._held.current(now)
-        return self._stream.step(key if key in {'i', 'k'} else None, now)
-
-    def due(self, now: float) -> float:
-        """Return when."""
-        return min(self._held.deadline(now), self._stream.due())
-
-    def end(self) -> None:
-        """Rest."""
-        self._held.clear()
-        self._stream.end()
-
-
-class AtTerminal(KeyboardSession[str, 'str | Note | Quit | Suspend']):
+class RecordedRobot:
     """Writes down."""
 
-    def __init__(self, keyboard: Keyboard, record: Record, stop: threading.Event) -> None:
-        super().__init__(keyboard, Keys(), 'press i', stop)
+    def __init__(self, record: Record) -> None:
         self._record = record
+        self.say: Callable[[str], None] = record.add
         self.fails = False
 
-    def publish(self, command: str) -> None:
+    def publish(self, command: object) -> None:
         """Write it down."""
         self._record.add(command)
 
-    def handle(self, request: str | Note | Quit | Suspend) -> None:
+    def handle(self, request: object, now: float) -> None:
         """Write it down."""
+        assert now <= time.monotonic()
         self._record.add(request)
 
-    def attend(self, now: float) -> None:
+    def serve(self, now: float) -> None:
         """Fail when it is to."""
+        assert now <= time.monotonic()
         if self.fails:
             raise RuntimeError('the robot is gone')
-
-    def show(self, now: float) -> None:
-        """Show nothing much."""
-        self.line.show('status')
 
     def flush(self) -> None:
         """Write it down."""
         self._record.add('flush')
 
 
+REQUESTS: dict[str, object] = {
+    'q': ProgramRequest.QUIT,
+    'z': ProgramRequest.SUSPEND,
+    '?': 'nobody helps',
+    'a': Button.SOUTH,
+}
+
+
+class Keys(KeyMapping):
+    """Each held key is a command; some strokes are requests."""
+
+    introduction = 'press i'
+
+    def feed(self, event: KeyEvent) -> list[object]:
+        """Take a key."""
+        self._held.feed(event)
+        return [REQUESTS[event.key]] if event.is_stroke and event.key in REQUESTS else []
+
+    def wanted(self, now: float) -> str | None:
+        """Want the held key."""
+        key = self._held.current(now)
+        return key if key in {'i', 'k'} else None
+
+    def status(self, now: float) -> list[StatusPart]:
+        """Show nothing much."""
+        assert now <= time.monotonic()
+        return [('status', Style.PLAIN)]
+
+
 @contextmanager
 def at_terminal() -> Any:
-    """Run a session on a scripted terminal in a thread; yield both and the record."""
+    """Run a program on a scripted terminal in a thread; yield terminal, robot and record."""
     record, stop = Record(), threading.Event()
     with (
         ScriptedTerminal(kitty=True) as terminal,
         Keyboard(terminal.path, evdev=False) as keyboard,
     ):
-        session = AtTerminal(keyboard, record, stop)
+        robot, stream = RecordedRobot(record), CommandStream(PERIOD, lambda _: 'rest')
+        program = TeleopProgram(keyboard, Keys(robot, HeldKeys(), stream), stop)
         ended: list[BaseException] = []
 
         def run() -> None:
             try:
-                session.run()
+                program.run()
             except (RuntimeError, TerminalError) as error:
                 ended.append(error)
 
@@ -146,7 +136,7 @@ def at_terminal() -> Any:
         thread.start()
         terminal.wait_written(b'press i')
         try:
-            yield terminal, session, record, ended, thread
+            yield terminal, robot, record, ended, thread
         finally:
             stop.set()
             thread.join(TIMEOUT)
@@ -163,8 +153,9 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
         terminal.key('i', 3)
         record.wait_for(lambda commands: commands[-RESTS:] == ['rest'] * RESTS)
         terminal.send('a?')
-        record.wait_for(lambda commands: commands[-1] == 'request')
-        terminal.wait_written(b'nobody helps')
+        record.wait_for(lambda commands: commands[-1] == Button.SOUTH)
+        terminal.wait_written(rb'nobody helps\r?\n')
+        terminal.wait_written(rb'status \| .*true releases')
         terminal.send('q')
         thread.join(TIMEOUT)
         assert record.commands[-RESTS - 1 :] == END
@@ -173,11 +164,11 @@ def test_a_key_moves_as_long_as_it_is_held() -> None:
 @pytest.mark.parametrize('how', ['robot', 'window'])
 def test_whatever_ends_it_the_robot_rests(how: str) -> None:
     """An error while a key is held is passed on after the rests."""
-    with at_terminal() as (terminal, session, record, ended, thread):
+    with at_terminal() as (terminal, robot, record, ended, thread):
         terminal.key('i', 1)
         record.wait_for(lambda commands: commands.count('i') >= 2)
         if how == 'robot':
-            session.fails = True
+            robot.fails = True
         else:
             terminal.hang_up()
         thread.join(TIMEOUT)
@@ -201,48 +192,35 @@ def test_ctrl_z_rests_before_the_shell_has_the_terminal(monkeypatch: pytest.Monk
         record.wait_for(lambda commands: 'k' in commands)
 
 
-class Sticks(DeadmanTeleop[float]):
-    """The left stick, while the deadman is held."""
+class Sticks(DeadmanMapping):
+    """The left stick, while the deadman is held; new buttons are requests."""
 
-    def wanted(self) -> float | None:
+    def wanted(self, now: float) -> float | None:
         """Return how far the stick is away."""
+        assert now <= time.monotonic()
         return None if self.grip is Grip.RELEASED else self.state.axis(Axis.LEFT_Y)
 
+    def feed(self, state: GamepadState) -> list[Button]:
+        """Take a state."""
+        return list(state.pressed_since(self.take(state)))
 
-class WithPad(GamepadSession[float]):
-    """Writes down."""
 
-    def __init__(
-        self,
-        gamepad: Gamepad,
-        record: Record,
-        stop: threading.Event,
-        deadman: Deadman | None = None,
-    ) -> None:
-        self._teleop = Sticks(deadman or Deadman(), CommandStream(PERIOD, lambda _: 0.0))
-        super().__init__(gamepad, self._teleop, stop)
-        self._record = record
+def with_pad(
+    record: Record,
+    stop: threading.Event,
+    *pads: InjectedDevice,
+    deadman: Deadman | None = None,
+) -> Callable[[], None]:
+    """Return what runs a program with the pads that are there."""
+    gamepad = Gamepad(InjectedDevices(*pads), warn=record.add)
+    stream = CommandStream(PERIOD, lambda _: 0.0)
+    mapping = Sticks(RecordedRobot(record), deadman or Deadman(), stream, record.add)
 
-    def publish(self, command: float) -> None:
-        """Write it down."""
-        self._record.add(command)
+    def run() -> None:
+        with gamepad:
+            TeleopProgram(gamepad, mapping, stop).run()
 
-    def take(self, state: GamepadState) -> None:
-        """Write new buttons down."""
-        for button in state.pressed_since(self._teleop.take(state)):
-            self._record.add(button)
-
-    def warn(self, text: str) -> None:
-        """Write it down."""
-        self._record.add(text)
-
-    def attend(self, now: float) -> None:
-        """Look at the clock."""
-        assert now <= time.monotonic()
-
-    def flush(self) -> None:
-        """Write it down."""
-        self._record.add('flush')
+    return run
 
 
 def xbox_pad() -> InjectedDevice:
@@ -263,8 +241,7 @@ def test_a_gamepad_that_does_not_change_names_the_timeout(position: int, paramet
     """The motion ends, and the person reads which parameter says after which time."""
     pad, record, stop = xbox_pad(), Record(), threading.Event()
     deadman = Deadman(timeout=0.05, full_deflection_timeout=0.05)
-    session = WithPad(Gamepad(InjectedDevices(pad)), record, stop, deadman)
-    thread = threading.Thread(target=session.run)
+    thread = threading.Thread(target=with_pad(record, stop, pad, deadman=deadman))
     thread.start()
     try:
         pad.move(ABS_Y, position)
@@ -280,8 +257,7 @@ def test_a_gamepad_that_does_not_change_names_the_timeout(position: int, paramet
 def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
     """The stick counts while the deadman is held; then, or without the gamepad, rests follow."""
     pad, record, stop = xbox_pad(), Record(), threading.Event()
-    session = WithPad(Gamepad(InjectedDevices(pad)), record, stop)
-    thread = threading.Thread(target=session.run)
+    thread = threading.Thread(target=with_pad(record, stop, pad))
     thread.start()
     try:
         pad.move(ABS_Y, -32768)
@@ -304,7 +280,10 @@ def test_a_gamepad_moves_with_its_deadman(unplugged: bool) -> None:
 def test_without_a_gamepad_it_says_so() -> None:
     """A message says what to do; nothing is published, and it ends as usual."""
     record, stop = Record(), threading.Event()
+    thread = threading.Thread(target=with_pad(record, stop))
+    thread.start()
+    record.wait_for(lambda commands: len(commands) == 1)
     stop.set()
-    WithPad(Gamepad(InjectedDevices()), record, stop).run()
+    thread.join(TIMEOUT)
     assert record.commands[0].startswith('no gamepad yet: ')
     assert record.commands[1:] == ['flush']

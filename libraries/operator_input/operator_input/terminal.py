@@ -1,0 +1,316 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Keys of a terminal, with their releases where the terminal reports them.
+
+A terminal with the Kitty keyboard protocol answers ``CSI ? u``; every terminal answers ``CSI c``.
+If the second answer comes without the first, there is no such protocol. Nothing waits for either:
+until the protocol is there, keys are read the old way.
+
+A key whose release the terminal reports is held until then. Should the line to the terminal stall,
+the report never comes; so the terminal is probed as long as a key is held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+import contextlib
+from enum import Enum
+import os
+import select
+import termios
+import time
+from types import TracebackType
+from typing import Any, TYPE_CHECKING
+
+from .exceptions import TerminalError
+from .key_decoder import KeyDecoder, Kitty, Report, ReportKind
+from .keys import all_released, KeyEvent
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+CONTROLLING_TERMINAL = '/dev/tty'
+
+QUERY = '\x1b[?u\x1b[c'
+WANTED = (
+    Kitty.DISAMBIGUATE | Kitty.EVENT_TYPES | Kitty.ALTERNATE_KEYS | Kitty.ALL_KEYS | Kitty.TEXT
+)
+# without ALL_KEYS the keys that type a character do not report their release
+NEEDED = Kitty.EVENT_TYPES | Kitty.ALL_KEYS
+PUSH, POP = f'\x1b[>{WANTED:d}u', '\x1b[<u'
+PROBE = '\x1b[5n'  # device status report (ECMA-48, 8.3.35): every terminal answers CSI 0 n
+PROBE_PERIOD = 0.25  # [s] between two probes
+PROBE_TIMEOUT = 1.0  # [s] without any sign
+ESCAPE_TIMEOUT = 0.05  # [s] after which an escape is the key, not the begin of a sequence
+DRAIN_TIMEOUT = 0.3  # [s] at the end for answers that would otherwise appear in the shell
+
+_MODES = '?1004', '?2004'  # focus reports and bracketed paste (xterm)
+_MODES_ON = ''.join(f'\x1b[{mode}h' for mode in _MODES)
+_MODES_OFF = ''.join(f'\x1b[{mode}l' for mode in _MODES)
+_IFLAG, _LFLAG, _CC = 0, 3, 6  # of the list that termios.tcgetattr returns
+
+
+class Stage(Enum):
+    """How far the negotiation of the Kitty keyboard protocol is."""
+
+    IDLE = 'idle'
+    REQUESTED = 'requested'
+    PUSHED = 'switched on, not confirmed'
+    ACTIVE = 'active'
+    ABSENT = 'absent'
+
+
+class TerminalDialogue:
+    """What the terminal was asked; pure: takes reports, returns what to write. Times are in [s].
+
+    Attributes:
+        stage: How far its promise to report releases has got.
+    """
+
+    def __init__(self) -> None:
+        self.stage = Stage.IDLE
+        self._attributes_due = 0  # answers to CSI c
+        self._probed = 0.0
+        self._unanswered_since: float | None = None  # first probe without any sign since
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether answers may still come."""
+        return self._attributes_due > 0 or self._unanswered_since is not None
+
+    def start(self) -> str:
+        """Request the protocol."""
+        self.stage = Stage.REQUESTED
+        self._attributes_due += 1
+        return QUERY
+
+    def stop(self) -> str:
+        """Return what gives the terminal back as it was."""
+        was, self.stage = self.stage, Stage.IDLE
+        return POP if was in {Stage.PUSHED, Stage.ACTIVE} else ''
+
+    def take(self, report: Report) -> str:
+        """Take a report of the terminal; return what to write."""
+        if report.kind is ReportKind.DEVICE_ATTRIBUTES:
+            return self._take_attributes()
+        if report.kind is not ReportKind.KITTY_FLAGS:
+            return ''
+        if self.stage is Stage.REQUESTED:
+            self.stage = Stage.PUSHED
+            self._attributes_due += 1
+            return PUSH + QUERY
+        if self.stage is Stage.PUSHED:
+            self.stage = Stage.ACTIVE if NEEDED in report.flags else Stage.ABSENT
+            return '' if self.stage is Stage.ACTIVE else POP
+        return ''
+
+    def received(self) -> None:
+        """Count anything that the terminal sent as a sign of life."""
+        self._unanswered_since = None
+
+    def probe(self, now: float) -> str:
+        """Return the probe if it is time for one."""
+        if now - self._probed < PROBE_PERIOD:
+            return ''
+        self._probed = now
+        if self._unanswered_since is None:
+            self._unanswered_since = now
+        return PROBE
+
+    def is_lost(self, now: float) -> bool:
+        """Return whether the terminal has left probes unanswered for too long."""
+        return self._unanswered_since is not None and now - self._unanswered_since > PROBE_TIMEOUT
+
+    def _take_attributes(self) -> str:
+        self._attributes_due = max(self._attributes_due - 1, 0)
+        if self._attributes_due or self.stage not in {Stage.REQUESTED, Stage.PUSHED}:
+            return ''  # an answer to the first of two questions, or all is settled
+        was, self.stage = self.stage, Stage.ABSENT
+        return POP if was is Stage.PUSHED else ''
+
+
+class TerminalKeyboard:
+    """Reads keys from a terminal; a context manager that always gives the terminal back.
+
+    Works in any terminal, over SSH and inside tmux or screen. Characters come at once, unechoed,
+    and Ctrl-C is one of them. Nothing waits for the terminal's answers: a key that is pressed in
+    the first moment is simply TYPED.
+
+    The terminal is opened anew by its path, so that reading without waiting does not change the
+    standard input, which the shell shares. What is printed is formatted by it as usual.
+    """
+
+    def __init__(
+        self,
+        path: str = CONTROLLING_TERMINAL,
+        *,
+        kitty: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Prepare; the terminal is touched on entering the context.
+
+        Args:
+            path: Device of the terminal.
+            kitty: Request the Kitty keyboard protocol.
+            clock: Returns the time [s].
+        """
+        self._path = path
+        self._kitty = kitty
+        self._clock = clock
+        self._descriptor: int | None = None
+        self._before: list[Any] = []  # its settings
+        self._decoder, self._dialogue = KeyDecoder(), TerminalDialogue()
+        self._last_data = 0.0  # [s] when anything was read
+
+    @property
+    def stage(self) -> Stage:
+        """How far the terminal's promise to report releases has got."""
+        return self._dialogue.stage
+
+    def fileno(self) -> int:
+        """Return the file descriptor, to wait for it with others.
+
+        Raises:
+            TerminalError: Outside of the context.
+        """
+        if self._descriptor is None:
+            raise TerminalError('the terminal is not open: use the keyboard in a with statement')
+        return self._descriptor
+
+    def write(self, text: str) -> None:
+        """Write characters and control sequences, as many as the terminal takes at once.
+
+        A terminal that is stuck loses text; the robot must not wait for it.
+        """
+        descriptor = self.fileno()
+        with contextlib.suppress(OSError):
+            os.write(descriptor, text.encode())
+
+    def width(self) -> int:
+        """Return its width [characters]."""
+        descriptor = self.fileno()
+        try:
+            return os.get_terminal_size(descriptor).columns or 80
+        except OSError:
+            return 80
+
+    def read(self, timeout: float = 0.0) -> list[KeyEvent]:
+        """Read what has happened to the keys; a time-out [s] ends with the first byte.
+
+        Raises:
+            TerminalError: The terminal was closed. All keys count as released.
+        """
+        data = self._read_bytes(min(timeout, self.longest_wait()))
+        now = self._clock()
+        found: list[KeyEvent | Report] = []
+        if data:
+            self._dialogue.received()
+            self._last_data = now
+            found = self._decoder.feed(data, now)
+        elif self._decoder.is_pending and now - self._last_data >= ESCAPE_TIMEOUT:
+            found = self._decoder.flush(now)
+        events = [event for event in found if isinstance(event, KeyEvent)]
+        for report in found:
+            if isinstance(report, Report):
+                if answer := self._dialogue.take(report):
+                    self.write(answer)
+                self._decoder.reports_releases = self.stage is Stage.ACTIVE
+        return [*events, *self._check_line(now)]
+
+    def longest_wait(self) -> float:
+        """Return after which time read() wants to be called again [s], whatever happens."""
+        if self._decoder.is_pending:
+            return ESCAPE_TIMEOUT
+        return PROBE_PERIOD if self._decoder.is_holding else 60.0
+
+    def __enter__(self) -> Self:
+        """Open the terminal and negotiate with it.
+
+        Raises:
+            TerminalError: It cannot be opened, or is no terminal.
+        """
+        self._open()
+        self._decoder, self._dialogue = KeyDecoder(), TerminalDialogue()
+        self.write(_MODES_ON + (self._dialogue.start() if self._kitty else ''))
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None = None,
+        exc: BaseException | None = None,
+        traceback: TracebackType | None = None,
+    ) -> None:
+        """Give the terminal back."""
+        if self._descriptor is None:
+            return
+        self.write(_MODES_OFF + self._dialogue.stop())
+        with contextlib.suppress(TerminalError):
+            self._drain()
+        # the shell must not run what is unread; a closed window has nothing to restore
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(self._descriptor, termios.TCSAFLUSH, self._before)
+        os.close(self._descriptor)
+        self._descriptor = None
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """Give the terminal back for the time of the block, as for Ctrl-Z."""
+        self.__exit__()
+        try:
+            yield
+        finally:
+            self.__enter__()
+
+    def _open(self) -> None:
+        try:
+            descriptor = os.open(self._path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise TerminalError(
+                f'no terminal to read keys from ({self._path}: {error.strerror}); start this in a '
+                'terminal, with ros2 run or python, and not as a service or in the background'
+            ) from None
+        try:
+            self._before = termios.tcgetattr(descriptor)
+            raw = termios.tcgetattr(descriptor)
+        except termios.error as error:
+            os.close(descriptor)
+            raise TerminalError(f'{self._path} is no terminal ({error.args[-1]})') from None
+        raw[_IFLAG] &= ~(termios.IXON | termios.ICRNL | termios.INLCR | termios.ISTRIP)
+        raw[_LFLAG] &= ~(termios.ICANON | termios.ECHO | termios.ISIG | termios.IEXTEN)
+        raw[_CC][termios.VMIN], raw[_CC][termios.VTIME] = 1, 0
+        termios.tcsetattr(descriptor, termios.TCSANOW, raw)
+        self._descriptor = descriptor
+
+    def _read_bytes(self, timeout: float) -> bytes:
+        descriptor = self.fileno()
+        if not select.select([descriptor], [], [], max(timeout, 0.0))[0]:
+            return b''
+        try:
+            data = os.read(descriptor, 4096)
+        except BlockingIOError:
+            return b''
+        except OSError as error:
+            raise TerminalError(f'the terminal is gone: {error.strerror}') from None
+        if not data:
+            raise TerminalError('the terminal is gone: end of file')
+        return data
+
+    def _drain(self) -> None:
+        """Read the answers that are still on their way."""
+        deadline = self._clock() + DRAIN_TIMEOUT
+        while self._dialogue.is_waiting and (data := self._read_bytes(deadline - self._clock())):
+            self._dialogue.received()
+            for report in self._decoder.feed(data, 0.0):
+                if isinstance(report, Report):
+                    self._dialogue.take(report)
+
+    def _check_line(self, now: float) -> list[KeyEvent]:
+        """Probe the terminal while a key is held, and let go when it is silent."""
+        if not self._decoder.is_holding:
+            return []
+        if self._dialogue.is_lost(now):
+            self._decoder.forget()
+            return [all_released(now)]
+        if probe := self._dialogue.probe(now):
+            self.write(probe)
+        return []

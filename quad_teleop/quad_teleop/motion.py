@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""What a person requests of the robot: velocities, poses of the body, modes.
+
+Lengths are in [m], angles in [rad], velocities in [m/s] and [rad/s], in base_link (REP 103).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import auto, Enum
+
+from quad_description.rotations import from_roll_pitch_yaw, Quaternion
+
+from .exceptions import SettingError
+
+SPEED_STEP = 0.1  # share by which a key makes faster or slower
+MIN_SPEED = 0.01  # [m/s] and [rad/s]: slower is standing, and could not be made faster again
+
+
+class Mode(Enum):
+    """A mode of ``set_mode``, by its name there, that one key or button requests."""
+
+    LIE = 'lie'
+    STAND = 'stand'
+    WALK = 'walk'
+    TURN = 'turn'
+    GET_UP = 'get_up'
+
+    @property
+    def moves(self) -> bool:
+        """Whether velocity commands do anything in it."""
+        return self in {Mode.WALK, Mode.TURN}
+
+
+class RobotRequest(Enum):
+    """What a person can request of the robot besides velocities, poses and modes."""
+
+    STOP = auto()
+    """Stop the whole robot: gait or policy end, whatever follows the velocity."""
+
+    CLEAR_FAULT = auto()
+    """Forget the latched faults."""
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """Velocity of the body: forward, to the left, and turning to the left."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+
+ZERO = Velocity()
+"""Stand still."""
+
+
+def rest_of(_: Velocity | None) -> Velocity:
+    """Return the velocity that ends a motion."""
+    return ZERO
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """Which way to go, as factors of the two speeds, -1 to 1."""
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw: float = 0.0
+
+    def at(self, speeds: Speeds) -> Velocity:
+        """Return the velocity this way."""
+        return Velocity(self.x * speeds.linear, self.y * speeds.linear, self.yaw * speeds.angular)
+
+
+@dataclass(frozen=True, slots=True)
+class Speeds:
+    """Speed of walking and of turning, within limits.
+
+    Raises:
+        SettingError: A speed is above its limit, or too slow to be one.
+    """
+
+    linear: float = 0.15
+    angular: float = 0.6
+    linear_limit: float = 0.4
+    angular_limit: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name, speed, limit in (
+            ('speed', self.linear, self.linear_limit),
+            ('turn', self.angular, self.angular_limit),
+        ):
+            if not MIN_SPEED <= speed <= limit:
+                raise SettingError(
+                    f'{name} is {speed}: it must be between {MIN_SPEED} and its limit {limit}; '
+                    f'change {name} or {name}_limit'
+                )
+
+    def scaled(self, linear: int, angular: int) -> Speeds:
+        """Return other speeds by steps of 10 %, negative for slower; the limits are kept."""
+        return replace(
+            self,
+            linear=_scaled(self.linear, linear, self.linear_limit),
+            angular=_scaled(self.angular, angular, self.angular_limit),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPose:
+    """Offset of the body from how it stands by itself: upwards, right side down, nose down, left.
+
+    Roll, pitch, yaw about fixed axes, as in REP 103.
+    """
+
+    height: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+    def quaternion(self) -> Quaternion:
+        """Return the attitude as a unit quaternion (x, y, z, w)."""
+        return from_roll_pitch_yaw(self.roll, self.pitch, self.yaw)
+
+
+NEUTRAL = BodyPose()
+"""As the robot stands by itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSteps:
+    """By how much a stroke changes the pose, and how far it may go to either side.
+
+    Raises:
+        SettingError: A step is not positive, or above its limit.
+    """
+
+    height_step: float = 0.005
+    height_limit: float = 0.03
+    angle_step: float = 0.05
+    angle_limit: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name, step, limit in (
+            ('height', self.height_step, self.height_limit),
+            ('angle', self.angle_step, self.angle_limit),
+        ):
+            if not 0.0 < step <= limit:
+                raise SettingError(
+                    f'{name}_step is {step}: it must be above 0 and at most {name}_limit, {limit}'
+                )
+
+    def moved(self, pose: BodyPose, direction: BodyPose) -> BodyPose:
+        """Return the pose one stroke further; at a limit it stays there.
+
+        Args:
+            pose: Present pose.
+            direction: Steps of each part, 1 or -1 for those that change.
+        """
+
+        def angle(value: float, steps: float) -> float:
+            return _moved(value, steps, self.angle_step, self.angle_limit)
+
+        return BodyPose(
+            _moved(pose.height, direction.height, self.height_step, self.height_limit),
+            angle(pose.roll, direction.roll),
+            angle(pose.pitch, direction.pitch),
+            angle(pose.yaw, direction.yaw),
+        )
+
+
+def _scaled(speed: float, steps: int, limit: float) -> float:
+    return min(max(speed * (1.0 + SPEED_STEP * steps), MIN_SPEED), limit)
+
+
+def _moved(value: float, steps: float, step: float, limit: float) -> float:
+    moved = min(max(value + steps * step, -limit), limit)
+    return 0.0 if abs(moved) < step / 1000 else moved  # rounding must not leave the middle

@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Which of several sources of velocities is active. Pure; times are handed in, in [s].
+
+As in twist_mux: of the sources that are not stale and not below a lock, the one of the highest
+priority is forwarded; of equal ones the first by name. A lock is closed while its last message
+was true, and when it is stale. Other than there: when the source that is active falls silent or is
+locked, the robot is commanded to stop, and does not wait for its own time-out; and a source
+that never published does not block others, even with a time-out of 0.
+
+Parameters are named as in twist_mux 4: ``topics.<name>.{topic, timeout, priority}`` and
+``locks.<name>.{topic, timeout, priority}``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+import difflib
+import math
+
+from .exceptions import CommandError, SettingError
+
+MAX_PRIORITY = 255
+FIELDS = ('topic', 'timeout', 'priority')
+NEVER = -math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """A topic with velocities, or one with a lock.
+
+    Attributes:
+        name: Name among the parameters.
+        topic: Name of the topic.
+        timeout: Silence after which it is stale; 0 for never.
+        priority: 0 to 255; of those that publish, the highest is active.
+    """
+
+    name: str
+    topic: str
+    timeout: float
+    priority: int
+
+    def is_stale(self, received: float, now: float) -> bool:
+        """Return whether it has been silent for too long since it was received last."""
+        return self.timeout > 0.0 and now - received > self.timeout
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """All that the multiplexer subscribes: velocities and locks, in the order of their names."""
+
+    sources: tuple[Input, ...]
+    locks: tuple[Input, ...]
+
+
+DEFAULTS = Inputs(
+    sources=(
+        Input('joystick', 'joy_vel', 0.5, 100),
+        Input('keyboard', 'key_vel', 0.5, 90),
+        Input('navigation', 'nav_vel', 0.5, 10),
+    ),
+    locks=(
+        Input('e_stop', 'e_stop', 0.0, 255),
+        Input('pause_navigation', 'pause_navigation', 0.0, 50),
+    ),
+)
+"""What is used without any parameters."""
+
+
+class Multiplexer:
+    """Decides for each message whether it is forwarded, and when to send a zero."""
+
+    def __init__(self, inputs: Inputs) -> None:
+        """Start without a message; locks that have a time-out are closed."""
+        self.inputs = inputs
+        self._received: dict[str, float] = {}  # when a source published last
+        self._locks = {each.name: (NEVER, False) for each in inputs.locks}  # when, and what
+        self._forwarded: str | None = None  # the source whose motion was forwarded last
+
+    def lock_priority(self, now: float) -> int:
+        """Return the priority below which sources are locked; 0 when nothing is locked."""
+        return max(
+            (lock.priority for lock in self.inputs.locks if self.is_locked(lock, now)), default=0
+        )
+
+    def is_locked(self, lock: Input, now: float) -> bool:
+        """Return whether a lock is closed."""
+        received, locked = self._locks[lock.name]
+        return locked or lock.is_stale(received, now)
+
+    def is_masked(self, source: Input, now: float) -> bool:
+        """Return whether a source is not active: stale, or locked."""
+        received = self._received.get(source.name)
+        silent = received is None or source.is_stale(received, now)
+        return silent or source.priority < self.lock_priority(now)
+
+    def active(self, now: float) -> Input | None:
+        """Return the source that is active; None when there is none."""
+        active = [each for each in self.inputs.sources if not self.is_masked(each, now)]
+        return max(active, key=lambda each: each.priority, default=None)
+
+    def velocity(self, name: str, parts: tuple[float, ...], now: float) -> bool:
+        """Take a velocity of a source, linear and angular; return whether to forward it.
+
+        Raises:
+            CommandError: One of its numbers is none; the message does not count as received.
+        """
+        if not all(math.isfinite(part) for part in parts):
+            raise CommandError(f'{name} sends {parts}, which is not finite; it is not forwarded')
+        self._received[name] = now
+        active = self.active(now)
+        if active is None or active.name != name:
+            return False
+        self._forwarded = name if any(parts) else None
+        return True
+
+    def lock(self, name: str, locked: bool, now: float) -> None:
+        """Take a message of a lock."""
+        self._locks[name] = now, locked
+
+    def zero_due(self, now: float) -> bool:
+        """Return whether to send a zero now: the robot moves, and no source is active any more."""
+        if self._forwarded is None or self.active(now) is not None:
+            return False
+        self._forwarded = None
+        return True
+
+
+def read_inputs(topics: Mapping[str, object], locks: Mapping[str, object]) -> Inputs:
+    """Read the parameters.
+
+    Args:
+        topics: Values below ``topics.``, by what follows it: ``keyboard.topic``.
+        locks: Values below ``locks.``.
+
+    Returns:
+        The inputs; :data:`DEFAULTS` when there is not one parameter.
+
+    Raises:
+        SettingError: One is misspelt, missing or wrong; the message names it.
+    """
+    if not topics and not locks:
+        return DEFAULTS
+    sources = _read('topics', topics)
+    if not sources:
+        raise SettingError('there are locks but no topics: nothing could ever be forwarded')
+    inputs = Inputs(sources, _read('locks', locks))
+    seen: dict[str, str] = {}
+    for each in (*inputs.sources, *inputs.locks):
+        if each.topic in seen:
+            raise SettingError(f'{seen[each.topic]} and {each.name} both name {each.topic!r}')
+        seen[each.topic] = each.name
+    return inputs
+
+
+def _read(group: str, values: Mapping[str, object]) -> tuple[Input, ...]:
+    fields: dict[str, dict[str, object]] = {}
+    for path, value in sorted(values.items()):
+        name, _, field = path.rpartition('.')
+        if not name or field not in FIELDS:
+            close = difflib.get_close_matches(field, FIELDS, n=1)
+            hint = f'; did you mean {close[0]!r}?' if close else f'; there are {", ".join(FIELDS)}'
+            raise SettingError(f'unknown parameter {group}.{path}{hint}')
+        fields.setdefault(name, {})[field] = value
+    return tuple(_input(f'{group}.{name}', name, found) for name, found in fields.items())
+
+
+def _input(path: str, name: str, found: Mapping[str, object]) -> Input:
+    def wrong(field: str, wanted: str) -> SettingError:
+        return SettingError(f'{path}.{field} is {found[field]!r}: it must be {wanted}')
+
+    missing = [field for field in FIELDS if field not in found]
+    if missing:
+        raise SettingError(f'{path}.{missing[0]} is missing')
+    topic, timeout, priority = (found[field] for field in FIELDS)
+    if topic == '':
+        raise SettingError(f'{path}.topic is empty: name the topic')
+    if not isinstance(topic, str):
+        raise wrong('topic', 'the name of a topic')
+    if isinstance(timeout, bool) or not isinstance(timeout, float | int):
+        raise wrong('timeout', 'a time in [s]')
+    if not 0.0 <= timeout < math.inf:
+        raise wrong('timeout', 'a time in [s], or 0 for never')
+    if isinstance(priority, bool) or not isinstance(priority, int):
+        raise wrong('priority', 'a whole number')
+    if not 0 <= priority <= MAX_PRIORITY:
+        raise wrong('priority', f'0 to {MAX_PRIORITY}')
+    return Input(name, topic, float(timeout), priority)
