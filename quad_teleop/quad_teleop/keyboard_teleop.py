@@ -105,7 +105,7 @@ class KeyboardTeleop(KeyMapping):
         return [] if event.action is KeyAction.REPEATED else self._stroke(key)
 
     def status(self, now: float) -> list[StatusPart]:
-        """Return what the status line shows; tell the person what keeps the robot from moving."""
+        """Return what the status line shows; report what keeps the robot from moving."""
         robot, velocity = self.robot, self.wanted(now)
         report, has_subscriber = robot.report(now), robot.has_subscriber
         text = hint(robot.mode, report, velocity, has_subscriber=has_subscriber)

@@ -113,7 +113,7 @@ class ServoLink:
         self._settings.serve(now)
 
     def publish(self, command: Jog) -> None:
-        """Publish a motion in shares of full speed, or tell the person why not."""
+        """Publish a motion in shares of full speed, or show why not."""
         jog = self.scales.to_message(command)
         if isinstance(jog, JointJog):
             self._publish_joint(jog)
