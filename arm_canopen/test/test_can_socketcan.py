@@ -20,11 +20,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from arm_canopen import CanopenMaster
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.interfaces import CanInterface, missing_interface_text
 from arm_canopen.can.socketcan import failure_text, pack, SocketCanBus, unpack
 from arm_canopen.exceptions import BusError
-from arm_canopen.library.bus_master import BusMaster
 
 _numbers = itertools.count()
 
@@ -145,7 +145,7 @@ def test_two_cycles_of_a_master_wait_for_a_bus_that_takes_none(
     monkeypatch.setattr('arm_canopen.can.socketcan._open_socket', lambda name: ours)
     config = bus_config(*(drive_config(f'joint{number}', number) for number in range(2, 9)))
     with SocketCanBus('can0') as bus, theirs:
-        BusMaster(config, bus, lambda event: None)
+        CanopenMaster(config, bus)
         with pytest.raises(BusError, match='transmit queue of can0 is full'):
             send_for_ever(bus)
         cycle = 1 + 7 * 3  # SYNC and RPDOs

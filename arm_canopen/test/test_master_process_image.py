@@ -16,7 +16,7 @@ import pytest
 from arm_canopen.can.frame import Frame
 from arm_canopen.config.model import PdoConfig
 from arm_canopen.master.process_image import ProcessImage, ReceivedTpdo, SyncRound
-from arm_canopen.master.start_values import start_value
+from arm_canopen.master.remote_objects import start_value
 from arm_canopen.standard.datatypes import DataType
 from arm_canopen.standard.objects import is_controlword
 from arm_canopen.standard.pdo import MappedObject

@@ -85,7 +85,7 @@ def test_a_defect_that_ends_the_cycle_ends_a_boot(tmp_path: Path) -> None:
     """Its caller is given the reason, and waits no longer; the drives could not be stopped."""
     bus = VirtualBus('here', VirtualWire())
     made = CanopenMaster(load_text(tmp_path, added('joint1', '')), bus)
-    end_by_defect(made._master.thread)
+    end_by_defect(made.thread)
     with pytest.raises(BusError, match='has ended by a defect: ZeroDivisionError: injected'):
         made.boot(DEADLINE)
     with pytest.raises(DriveError, match='could not be stopped'):

@@ -46,7 +46,6 @@ from arm_canopen.exceptions import (
     OtherMasterError,
     SdoAbortError,
 )
-from arm_canopen.library.bus_master import BusMaster
 from arm_canopen.master import other_master
 from arm_canopen.standard.dictionary import ObjectDictionary
 from canopen_sim.runner import DeviceRunner
@@ -377,7 +376,7 @@ class Clinging:
     axes = ('joint1',)
 
     def __init__(self, master: CanopenMaster) -> None:
-        self._attach = master._master.attach
+        self._attach = master.begin_attach
         self.again: Future[None] | None = None
 
     def update(
@@ -469,7 +468,7 @@ def test_a_cycle_that_ends_by_a_defect_has_sent_a_quick_stop(
     """Nobody leads the drive any more; it does not fault, as at the loss of the heartbeat."""
     master = CanopenMaster.from_bus_yml(bus_yml, bus)
     master.boot(TIMEOUT)
-    drive, thread = master.drive('joint1'), master._master.thread
+    drive, thread = master.drive('joint1'), master.thread
     thread.network.nodes['joint1'].watch_slot = 0
     drive.enable()
     drive.select_mode(OperationMode.PROFILE_POSITION)
@@ -509,7 +508,7 @@ def test_a_last_quick_stop_that_the_bus_refuses_is_repeated_and_not_called_sent(
     """The text names the drives whose power has to be cut."""
     tries = count()
     with open_bus('virtual:last_stop') as virtual, open_bus('virtual:last_stop') as device:
-        master = BusMaster(bus_config(drive_config('joint1', 2)), virtual, lambda event: None)
+        master = CanopenMaster(bus_config(drive_config('joint1', 2)), virtual)
         master.network.nodes['joint1'].online = True
         send = virtual.send
 

@@ -8,18 +8,20 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any, TypeAlias, TypeVar
 
+from ..config.model.drive import RecoveryPolicy
 from ..exceptions import DriveError, SdoTimeoutError
+from ..master.events import Severity
 from ..master.scheduler import completed, Promise, Scheduler, Task
 from ..standard.dictionary import object_address
 from ..standard.drive import DriveState, OperationMode
 from ..standard.target_objects import TARGET_OBJECTS
 from .drive import Drive
 from .drive_control import NOT_TAKEN
+from .drive_view import FAULTY
 from .halt import RESUME_TIMEOUT
 from .homing import home, HomingProgress, method_at_init
 from .modes import Mode, NoMode
 from .position_modes import Move, ProfilePosition
-from .recovery import Recovery
 from .refusal import Refusal, RefusalCause
 from .sequences import DriveSequences
 from .stop_commands import StopCommands
@@ -30,6 +32,42 @@ Sequence: TypeAlias = Callable[[], Coroutine[Promise[Any], None, str]]
 
 SELECT_MODE = '; select a mode before the first target'
 TAKEN_TIMEOUT = RESUME_TIMEOUT + 1.0  # [s] after which nothing leads the drive out of its halt
+
+
+class Recovery:
+    """Enables a drive again in the mode that it had, where bus.yml wants that."""
+
+    def __init__(
+        self,
+        drive: Drive,
+        scheduler: Scheduler,
+        enable_in: Callable[[OperationMode], Promise[str]],
+    ) -> None:
+        """``enable_in`` begins a command that enables the drive in a mode."""
+        self._drive = drive
+        self._scheduler = scheduler
+        self._enable_in = enable_in
+        drive.on_ready = self._go_on
+
+    def _go_on(self) -> None:
+        drive = self._drive
+        mode, drive.interrupted = drive.interrupted, None
+        if mode is None or drive.config.recovery is not RecoveryPolicy.AUTO:
+            return
+        self._scheduler.background(self._recover(mode))
+
+    async def _recover(self, mode: OperationMode) -> None:
+        drive = self._drive
+        if drive.view.state in FAULTY:
+            await drive.view.read_error_code()
+            drive.report(Severity.WARNING, f'not enabled again: {drive.describe()}; recover it')
+            return
+        try:
+            await self._enable_in(mode)
+        except DriveError as error:
+            drive.report(Severity.ERROR, f'not enabled again: {error}')
+        else:
+            drive.report(Severity.INFO, f'enabled again (recovery: auto): {drive.describe()}')
 
 
 class DriveCommands:

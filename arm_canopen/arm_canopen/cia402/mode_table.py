@@ -60,13 +60,13 @@ def _profile_modes(
         yield ProfilePosition(units, position, warn, target_leads=leads)
     vl_target = objects.profile_target_writer(OperationMode.VELOCITY)
     if vl_target is not None:
-        yield Velocity(units, vl_target)
+        yield Velocity(vl_target, units.vl_velocity_to_device)
     velocity = target(OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY)
     if velocity is not None:
-        yield ProfileVelocity(units, velocity)
+        yield ProfileVelocity(velocity, units.velocity_to_device)
     torque = target(OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
     if torque is not None:
-        yield ProfileTorque(units, torque)
+        yield ProfileTorque(torque, units.effort_to_device)
 
 
 def _cyclic_modes(
@@ -88,7 +88,17 @@ def _cyclic_modes(
         yield InterpolatedPosition(units, interpolation, lambda: parameters().profile)
     velocity = target(OperationMode.CYCLIC_VELOCITY)
     if velocity is not None:
-        yield CyclicVelocity(units, velocity, lambda: parameters().profile.acceleration)
+        yield CyclicVelocity(
+            velocity,
+            units.velocity_to_device,
+            units.velocity_commanded,
+            lambda: parameters().profile.acceleration,
+        )
     torque = target(OperationMode.CYCLIC_TORQUE)
     if torque is not None:
-        yield CyclicTorque(units, torque, lambda: parameters().torque_slope)
+        yield CyclicTorque(
+            torque,
+            units.effort_to_device,
+            units.effort_commanded,
+            lambda: parameters().torque_slope,
+        )

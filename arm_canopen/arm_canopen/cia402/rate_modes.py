@@ -8,14 +8,12 @@ follows each value at once, so the master makes it.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
 
 from ..master.process_image import IN_THE_IMAGE, Writer
 from ..master.scheduler import completed, Promise
 from ..standard.drive import OperationMode
 from .modes import Actual, fitting, Mode, NO_BITS
-from .units import Units
 
 VL_RAMP = 0x70
 """Bits 4 to 6 of the velocity mode: ramp enabled, not locked, reference used (CiA 402-2, 16.3)."""
@@ -26,9 +24,10 @@ class DriveRamped(Mode):
 
     bits = NO_BITS
 
-    def __init__(self, units: Units, target: Writer) -> None:
-        self._units = units
+    def __init__(self, target: Writer, to_device: Callable[[float], int]) -> None:
+        """``to_device`` converts a target to device units."""
         self._target = target
+        self._to_device = to_device
         self._delivery = completed()
 
     @property
@@ -57,10 +56,6 @@ class DriveRamped(Mode):
         self._delivery = self._target.deliver(value)
         return self._delivery
 
-    @abstractmethod
-    def _to_device(self, target: float) -> int:
-        """Convert a target to device units."""
-
 
 class ProfileVelocity(DriveRamped):
     """Mode 3: velocity 0x60FF in user units per second."""
@@ -71,18 +66,12 @@ class ProfileVelocity(DriveRamped):
         """Command standstill."""
         return self._deliver(0)
 
-    def _to_device(self, target: float) -> int:
-        return self._units.velocity_to_device(target)
-
 
 class Velocity(ProfileVelocity):
     """Mode 2, of frequency converters: velocity 0x6042, which has 16 bits."""
 
     number = OperationMode.VELOCITY
     bits = VL_RAMP
-
-    def _to_device(self, target: float) -> int:
-        return self._units.vl_velocity_to_device(target)
 
 
 class ProfileTorque(DriveRamped):
@@ -97,19 +86,23 @@ class ProfileTorque(DriveRamped):
     def brake(self) -> None:
         """Leave it to bit 8: no torque at all would drop a load."""
 
-    def _to_device(self, target: float) -> int:
-        return self._units.effort_to_device(target)
-
 
 class MasterRamped(Mode):
     """A value in each cycle, which the master ramps to the target."""
 
     cyclic = True
 
-    def __init__(self, units: Units, target: Writer, slope: Callable[[], float]) -> None:
-        """``slope`` returns the greatest rate of change in user units per second."""
-        self._units = units
+    def __init__(
+        self,
+        target: Writer,
+        to_device: Callable[[float], int],
+        commanded: Callable[[float], float],
+        slope: Callable[[], float],
+    ) -> None:
+        """``commanded`` undoes ``to_device``; ``slope`` is in user units per second, at most."""
         self._target = target
+        self._to_device = to_device
+        self._commanded = commanded
         self._slope = slope
         self._value = 0.0
         self._goal = 0.0
@@ -132,10 +125,6 @@ class MasterRamped(Mode):
         self._target.write(self._to_device(self._value))
         return NO_BITS
 
-    @abstractmethod
-    def _to_device(self, target: float) -> int:
-        """Convert a target to device units."""
-
 
 class CyclicVelocity(MasterRamped):
     """Mode 9: velocity 0x60FF in user units per second, each cycle."""
@@ -150,11 +139,8 @@ class CyclicVelocity(MasterRamped):
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Begin at the actual velocity, and brake from it."""
-        self._value, self._goal = self._units.velocity_commanded(actual.velocity_dev), 0.0
+        self._value, self._goal = self._commanded(actual.velocity_dev), 0.0
         return self._target.deliver(actual.velocity_dev)
-
-    def _to_device(self, target: float) -> int:
-        return self._units.velocity_to_device(target)
 
 
 class CyclicTorque(MasterRamped):
@@ -170,8 +156,5 @@ class CyclicTorque(MasterRamped):
 
     def preload(self, actual: Actual) -> Promise[None]:
         """Keep the torque that the drive has, so that it drops no load."""
-        self._value = self._goal = self._units.effort_commanded(actual.torque)
+        self._value = self._goal = self._commanded(actual.torque)
         return self._target.deliver(actual.torque)
-
-    def _to_device(self, target: float) -> int:
-        return self._units.effort_to_device(target)

@@ -5,14 +5,16 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TYPE_CHECKING
 
 from ..exceptions import CodecError, SdoError, SdoTimeoutError
 from ..standard.pdo import Number
 from .events import EventKind, Severity
 from .process_image import Limits, Source
 from .scheduler import Promise, Scheduler
+
+if TYPE_CHECKING:
+    from .remote_objects import RemoteObjects
 
 WRITE_PAUSE = 0.05  # [s] between two writes of a value of which the newest counts
 REFUSED_PAUSE = 1.0  # [s] before a value that was refused is written again, doubled each time
@@ -37,28 +39,6 @@ class BackgroundReader:
         return self.value is None or now - self.timestamp > self.stale_after
 
 
-class WritableObjects(Protocol):
-    """The objects of a device, as who writes them sees them.
-
-    Attributes:
-        name: Name of the device.
-        report: Takes what goes wrong with an object.
-    """
-
-    name: str
-    report: Callable[[EventKind, Severity, str], None]
-
-    @property
-    def online(self) -> bool:
-        """Whether the device was booted, and not lost since."""
-
-    def limits(self, index: int, subindex: int = 0) -> Limits:
-        """Return the smallest and largest value that an object holds."""
-
-    def write_object(self, index: int, subindex: int, value: Number) -> Promise[None]:
-        """Write an object by SDO."""
-
-
 class QueuedWrite(NamedTuple):
     """A value that waits for its transfer."""
 
@@ -79,7 +59,7 @@ class SdoWriter:
     by_sdo = True
 
     def __init__(
-        self, objects: WritableObjects, scheduler: Scheduler, index: int, subindex: int
+        self, objects: RemoteObjects, scheduler: Scheduler, index: int, subindex: int
     ) -> None:
         self._objects = objects
         self._scheduler = scheduler

@@ -4,23 +4,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+from enum import Enum
+from functools import partial
 
 from ..config.model import BusConfig, SdoWrite
 from ..config.model.identity import Identity
 from ..exceptions import BootError, BusError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index
-from .boot_fault import BootFault
+from .bus_sender import Send
 from .configuration import Configurator
 from .events import EventKind, Severity
+from .life_signs import guarding_request
 from .nmt_sender import SendNmt
 from .remote_node import BootPhase, RemoteNode
-from .scheduler import Scheduler
+from .scheduler import Scheduler, Task
 from .sdo_channel import SECOND_ANSWER_TIME
 from .startup import Startup
 from .takeover import preset_outputs, read_outputs
+
+STATE_TIMEOUT = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
+RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
+
+
+class BootFault(Enum):
+    """A reason why a boot failed, by its letter in CiA 302-2."""
+
+    NO_ANSWER = 'B', 'no answer to the read of 0x1000'
+    DEVICE_TYPE = 'C', 'device type 0x1000 differs'
+    VENDOR = 'D', 'vendor id 0x1018:01 differs'
+    NO_GUARDING = 'F', 'no answer to node guarding'
+    CONFIGURATION = 'J', 'configuration failed'
+    NO_HEARTBEAT = 'K', 'no heartbeat'
+    RUNNING = 'L', 'was operational already'
+    PRODUCT = 'M', 'product code 0x1018:02 differs'
+    REVISION = 'N', 'revision number 0x1018:03 differs'
+    SERIAL = 'O', 'serial number 0x1018:04 differs'
+
+    def __str__(self) -> str:
+        """Return the letter with where it is from, as manuals of masters list it."""
+        letter, text = self.value
+        return f'CiA 302-2 boot error {letter}: {text}'
+
 
 IDENTITY_FAULTS = {
     'device_type': BootFault.DEVICE_TYPE,
@@ -30,9 +57,6 @@ IDENTITY_FAULTS = {
     'serial_number': BootFault.SERIAL,
 }
 """The fault of each attribute of Identity that differs."""
-
-STATE_TIMEOUT = 0.5  # [s] to wait for a life sign beyond the period of the heartbeat
-RESTORE_SIGNATURE = b'load'  # CiA 301, 7.5.2.14
 
 
 class BootProcess:
@@ -299,3 +323,52 @@ class BootProcess:
         if text != self._reported:
             self._reported = text
             self._node.report(EventKind.BOOT_FAILED, Severity.WARNING, text)
+
+
+class BootManager:
+    """Begins the boot of a device when it appears, restarts or drops out."""
+
+    def __init__(
+        self,
+        bus: BusConfig,
+        nodes: Iterable[RemoteNode],
+        scheduler: Scheduler,
+        startup: Startup,
+        *,
+        send: Send,
+        send_nmt: SendNmt,
+    ) -> None:
+        """Listen to the devices; nothing is booted before :meth:`start`."""
+        self._scheduler = scheduler
+        self._tasks: dict[str, Task[None]] = {}
+        self._processes: dict[str, BootProcess] = {}
+        for node in nodes:
+            self._processes[node.name] = BootProcess(
+                node,
+                bus,
+                scheduler,
+                send_nmt,
+                startup,
+                request_state=lambda node_id: send(guarding_request(node_id)),
+            )
+            node.on_boot_up = partial(self._restarted, node)
+            node.on_dropped_out = partial(self._dropped_out, node)
+
+    def start(self, node: RemoteNode, *, announced: bool = False, pause: float = 0.0) -> None:
+        """Boot a device, as of :meth:`BootProcess.run`; anew if a boot is on its way."""
+        self._end(node)
+        boot = self._processes[node.name].run(announced=announced, pause=pause)
+        self._tasks[node.name] = self._scheduler.background(boot)
+
+    def _dropped_out(self, node: RemoteNode, pause: float) -> None:
+        self.start(node, pause=pause)
+
+    def _restarted(self, node: RemoteNode) -> None:
+        self._end(node)
+        node.restarted()
+        self.start(node, announced=True)
+
+    def _end(self, node: RemoteNode) -> None:
+        running = self._tasks.get(node.name)
+        if running is not None:
+            running.cancel(SdoError('the boot starts again'))

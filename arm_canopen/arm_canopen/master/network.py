@@ -20,7 +20,7 @@ from ..standard.cob_id import CAN_ID_MASK, CobId
 from ..standard.dictionary import object_address
 from ..standard.nmt import ALL_NODES, COMMANDED_STATES, NmtCommand, NmtState, parse_nmt
 from ..standard.pdo import Number
-from .boot_manager import BootManager
+from .boot import BootManager
 from .bus_sender import BusSender
 from .controller_watch import ControllerWatch
 from .events import Event, EventKind, Report, Severity

@@ -8,7 +8,7 @@ are list look-ups. Objects that no PDO carries are read and written by SDO in th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 import math
 from typing import Protocol, TypeAlias
 
@@ -334,6 +334,11 @@ class ProcessImage:
         self.rpdos = sorted(
             used, key=lambda output: any(send_last(o.index) for o in output.config.mapping)
         )
+        self._places: dict[tuple[int, int], list[tuple[SentRpdo, int]]] = {}  # of each object
+        for output in self.rpdos:
+            for position, mapped in enumerate(output.config.mapping):
+                places = self._places.setdefault((mapped.index, mapped.subindex), [])
+                places.append((output, position))
 
     def clear(self) -> None:
         """Forget what the device sent."""
@@ -344,7 +349,7 @@ class ProcessImage:
 
     def store(self, index: int, subindex: int, value: Number) -> list[SentRpdo]:
         """Let the RPDOs carry a value of an object; return those that do."""
-        places = list(self._mapped_outputs(index, subindex))
+        places = self._places.get((index, subindex), ())
         for output, position in places:
             output.values[position] = value
         return [output for output, _ in places]
@@ -359,7 +364,7 @@ class ProcessImage:
 
     def writer(self, index: int, subindex: int = 0) -> OutputWriter | None:
         """Return a writer for an object, None when no RPDO carries it."""
-        places = list(self._mapped_outputs(index, subindex))
+        places = self._places.get((index, subindex))
         return OutputWriter(places) if places else None
 
     def is_applied_first(self, index: int, subindex: int, *, command: int) -> bool:
@@ -369,29 +374,23 @@ class ProcessImage:
         one or a faster one: event-driven, and sent before it. Several synchronous RPDOs are
         applied at SYNC in an order that is the device's own affair.
         """
-        commands = [entry for entry, _ in self._mapped_outputs(command, 0)]
+        commands = [entry for entry, _ in self._places.get((command, 0), ())]
         if len(commands) != 1:
             return False
         before = self.rpdos[: self.rpdos.index(commands[0])]
         return all(
             entry is commands[0] or (entry in before and not entry.synchronous)
-            for entry, _ in self._mapped_outputs(index, subindex)
+            for entry, _ in self._places.get((index, subindex), ())
         )
 
     def commanded(self, index: int, subindex: int = 0) -> Number | None:
         """Return what the RPDOs carry for an object, None when none carries it."""
-        for entry, position in self._mapped_outputs(index, subindex):
+        for entry, position in self._places.get((index, subindex), ()):
             return entry.values[position]
         return None
 
     def mapped_output(self, index: int, subindex: int = 0) -> MappedObject | None:
         """Return how an object stands in an RPDO, None when it is in none."""
-        for entry, position in self._mapped_outputs(index, subindex):
+        for entry, position in self._places.get((index, subindex), ()):
             return entry.config.mapping[position]
         return None
-
-    def _mapped_outputs(self, index: int, subindex: int) -> Iterator[tuple[SentRpdo, int]]:
-        for entry in self.rpdos:
-            for position, mapped in enumerate(entry.config.mapping):
-                if (mapped.index, mapped.subindex) == (index, subindex):
-                    yield entry, position

@@ -14,7 +14,6 @@ from ..exceptions import CodecError, SdoError
 from ..standard.nmt import COMMANDED_STATES, NmtCommand, NmtState, parse_heartbeat, RESETS
 from ..standard.objects import Index
 from .bus_sender import Send
-from .drop_backoff import DropBackoff
 from .emergency_log import EmergencyLog
 from .events import Event, EventKind, Report, Severity
 from .life_signs import LifeSigns
@@ -26,6 +25,8 @@ from .scheduler import Promise, Scheduler
 START_TIME = 0.25  # [s] in which a device follows the command to start
 LIVE_SHARE = 0.5  # of the consumer time of its life signs, in which a TPDO shows that it lives
 RESET_TIME = 10.0  # [s] in which a device that was reset has sent its boot-up message
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 30.0  # [s] before a device that drops out is booted again
+STABLE_TIME = 10.0  # [s] in operation after which a drop is the first one again
 
 
 class BootPhase(Enum):
@@ -41,6 +42,25 @@ class BootPhase(Enum):
     STARTING = 'starting'
     OPERATIONAL = 'operational'
     FAILED = 'failed'
+
+
+class DropBackoff:
+    """Doubles the pause with each drop that follows soon on the one before."""
+
+    def __init__(self) -> None:
+        self.drops = 0  # drops in a row
+        self._booted_at = 0.0
+
+    def booted(self, now: float) -> None:
+        """The device came into operation at a time in [s]."""
+        self._booted_at = now
+
+    def dropped(self, now: float) -> float:
+        """Return how long to wait after a drop at a time in [s], in [s]."""
+        if now - self._booted_at > STABLE_TIME:
+            self.drops = 0
+        self.drops += 1
+        return float(min(FIRST_PAUSE * 2 ** (self.drops - 1), LONGEST_PAUSE))
 
 
 class RemoteNode:

@@ -15,15 +15,34 @@ from ..standard.datatypes import DataType, decode, encode, Value
 from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import find_object
 from ..standard.objects import is_controlword
+from ..standard.pdo import MappedObject, Number, PdoCodec
 from .background_objects import BackgroundReader, SdoWriter
 from .bus_sender import Send
 from .events import EventKind, Severity
 from .process_image import Limits, limits_of, ProcessImage, Reader, SyncRound, Writer
 from .scheduler import Promise, Scheduler
 from .sdo_client import SdoClient
-from .start_values import start_value
 
 ReportOfDevice = Callable[[EventKind, Severity, str], None]
+
+
+def start_value(config: NodeConfig, mapped: MappedObject) -> Number:
+    """Return the value that an object has by the files when the device is booted.
+
+    An object that nobody commands (a torque limit, a profile velocity, digital outputs) must keep
+    what bus.yml wrote or else what its EDS has as default.
+
+    Returns:
+        The value; 0 when neither has one that fits the object.
+    """
+    value = config.value_after_boot(mapped.index, mapped.subindex, mapped.data_type)
+    if isinstance(value, (int, float)):
+        try:
+            PdoCodec([mapped]).pack([value])
+        except CodecError:
+            return 0
+        return value
+    return 0
 
 
 class RemoteObjects:

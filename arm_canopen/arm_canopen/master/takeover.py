@@ -16,7 +16,7 @@ from ..standard.pdo import MappedObject, Number
 from ..standard.target_objects import TARGET_OBJECTS
 from .process_image import SentRpdo
 from .remote_node import RemoteNode
-from .start_values import start_value
+from .remote_objects import start_value
 
 AXES_START = 0x6000  # objects of the first axis of a drive
 DUMMY_MAX = 0x001F  # objects below stand for gaps in a mapping (CiA 301, 7.4.7.1)

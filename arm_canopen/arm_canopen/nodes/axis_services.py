@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from functools import partial
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from canopen_interfaces.srv import COTargetDouble
 from std_msgs.msg import Float64
@@ -19,10 +19,10 @@ from ..cia402.position_modes import Move
 from ..master.runner import NetworkThread
 from ..master.scheduler import Promise
 from ..standard.drive import OperationMode
+from .device_node import DeviceNode
 from .home_action import HomeAction
-
-if TYPE_CHECKING:
-    from .device_node import DeviceNode
+from .joint_states import DriveJointStates
+from .units_service import BusFile, UnitsService
 
 MODE_SERVICES: dict[str, OperationMode] = {
     'position_mode': OperationMode.PROFILE_POSITION,
@@ -130,3 +130,27 @@ class AxisServices:
             return command()
 
         return self._thread.call(run)
+
+
+class DriveServices:
+    """Services and topics of a drive with one axis or several."""
+
+    def __init__(
+        self,
+        node: DeviceNode,
+        axes: Sequence[DriveCommands],
+        thread: NetworkThread,
+        file: BusFile,
+    ) -> None:
+        self.axes = [commands.drive for commands in axes]  # its axes
+        # their joint states
+        self.joint_states = DriveJointStates(node, [axis.view for axis in self.axes])
+        places = ['~' if len(axes) == 1 else axis.name for axis in self.axes]
+        self._services = [
+            AxisServices(node, commands, place, thread)
+            for commands, place in zip(axes, places, strict=True)
+        ]
+        self._units = [
+            UnitsService(node, axis, place, thread, file)
+            for axis, place in zip(self.axes, places, strict=True)
+        ]

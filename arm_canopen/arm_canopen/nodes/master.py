@@ -32,7 +32,7 @@ from ..config import load_bus
 from ..config.model import BusConfig
 from ..config.model.checks import check_bus
 from ..exceptions import CanopenError
-from ..library.bus_master import THREAD_PRIORITY
+from ..library.canopen_master import THREAD_PRIORITY
 from .managed_bus import MANAGER
 from .master_process import MasterProcess
 

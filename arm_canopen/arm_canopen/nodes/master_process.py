@@ -20,12 +20,12 @@ from ..cia402.motion import MotionSource
 from ..cia402.status import drive_status
 from ..config.model import BusConfig
 from ..exceptions import CanopenError
-from ..library.bus_master import BusMaster
+from ..library.canopen_master import CanopenMaster
 from ..master.events import Event
+from .axis_services import DriveServices
 from .device_node import DeviceNode
 from .device_topics import log_bus_event
 from .diagnostics import bus_diagnostics, DiagnosticsPublisher
-from .drive_services import DriveServices
 from .joint_states import BusJointStates
 from .managed_bus import ManagedBus
 from .master_node import MasterServices
@@ -59,11 +59,12 @@ class MasterProcess:
         self._node = node
         self._output = OutputThread(node.get_logger())
         self._thread_priority = thread_priority
-        self._master = BusMaster(
-            config, can, self._report, beside_master=beside_master, black_box=black_box
+        self._master = CanopenMaster(
+            config, can, on_event=self._report, beside_master=beside_master, black_box=black_box
         )
         self._master.on_operational = lambda: self._output.post(self._report_ready)
         self._network, self._thread = self._master.network, self._master.thread
+        self._thread.refuse_before_start('')  # what is handed over before waits for the start
         self._devices = {
             device.name: DeviceNode(device, self._thread, self._output)
             for device in self._network.nodes.values()
@@ -130,7 +131,7 @@ class MasterProcess:
         finally:
             last = self._request_diagnostics()  # in which states the drives are left
             wait([last], LAST_DIAGNOSTICS_TIMEOUT)
-            self._master.close()
+            self._master.end()
             self._output.stop()
 
     def publish_robot_joint_states(self, description: str) -> None:
@@ -150,7 +151,7 @@ class MasterProcess:
             Done before the next cycle; or KeyError: an axis is no drive of this bus, BusError: the
             cycle has ended.
         """
-        return self._master.attach(source)
+        return self._master.begin_attach(source)
 
     def detach(self, source: MotionSource) -> Future[None]:
         """End a motion source, from any thread; drives that it moved are braked.
@@ -158,7 +159,7 @@ class MasterProcess:
         Returns:
             Done before the next cycle.
         """
-        return self._master.detach(source)
+        return self._master.begin_detach(source)
 
     def _check_owner(self, node_id: int, index: int) -> None:
         for device in self._network.nodes.values():

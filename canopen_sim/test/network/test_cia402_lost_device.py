@@ -12,7 +12,7 @@ from arm_canopen.can.frame import Frame
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.exceptions import DriveError
-from arm_canopen.library.bus_master import leave_device
+from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.standard.drive import DriveState, OperationMode
 from arm_canopen.standard.nmt import NmtCommand

@@ -23,7 +23,7 @@ import pytest
 from virtual_network import VirtualNetwork
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.cia402.velocity_estimate import VelocityEstimate, WINDOW
+from arm_canopen.cia402.drive_view import VelocityEstimate, WINDOW
 from arm_canopen.config.model import NodeConfig
 from arm_canopen.standard.dictionary import ObjectDictionary
 from arm_canopen.standard.drive import Controlword, OperationMode

@@ -15,7 +15,7 @@ from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.exceptions import DriveError
-from arm_canopen.library.bus_master import leave_device
+from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.nodes.diagnostics import drive_diagnostic
 from arm_canopen.standard.drive import DriveState
 

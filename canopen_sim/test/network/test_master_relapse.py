@@ -14,8 +14,8 @@ from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
 from arm_canopen.can.frame import Frame
-from arm_canopen.master.drop_backoff import DropBackoff, LONGEST_PAUSE, STABLE_TIME
 from arm_canopen.master.events import EventKind
+from arm_canopen.master.remote_node import DropBackoff, LONGEST_PAUSE, STABLE_TIME
 from arm_canopen.standard.nmt import NmtCommand, NmtState
 
 OPERATING_TIME = 0.15  # [s] before it falls back

@@ -17,7 +17,7 @@ from arm_canopen.config.model import NodeConfig
 from arm_canopen.exceptions import CodecError
 from arm_canopen.master.emergency_log import EmergencyLog
 from arm_canopen.master.events import EventKind, Severity
-from arm_canopen.master.guarding import Guarding
+from arm_canopen.master.life_signs import Guarding
 from arm_canopen.master.network import Network
 from arm_canopen.master.status import node_status
 from arm_canopen.standard.emcy import Emergency
