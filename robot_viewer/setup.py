@@ -12,7 +12,6 @@ FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
 
 EXECUTABLES = [
     'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',
-    'rerun_sink = robot_viewer.nodes.rerun_sink:main',
     'robot_state_publisher = robot_viewer.nodes.robot_state_publisher:main',
     'web_viewer = robot_viewer.nodes.web_viewer:main',
 ]
@@ -52,7 +51,6 @@ setup(
             sibling('libraries/first_motion'),
         ],
         'foxglove': ['foxglove-sdk>=0.30'],
-        'rerun': ['numpy', 'rerun-sdk>=0.30', 'trimesh'],
         'ros': [sibling('libraries/message_definitions'), sibling('libraries/node_runner')],
     },
     zip_safe=True,

@@ -17,8 +17,7 @@ simulation, and a test compares them. `<joint>` is a drive or joint, `<group>` a
 *Fixed* parameters are set when a program starts, the others while it runs, too. A `master` without
 motion core has the node `/master` and those of its drives, as `motion_node` has. Left out is what
 every node has: `use_sim_time`, `qos_overrides`, `/rosout`, `/parameter_events`, services of types
-and parameters; and `rerun_sink`, whose library the tests do not install: the README of
-robot_viewer has its parameters.
+and parameters.
 """
 ONE_OF_MANY = re.compile(r'/panda_joint[2-9]$')  # drives are alike
 NAMES = (

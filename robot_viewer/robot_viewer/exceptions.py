@@ -11,7 +11,3 @@ class ViewerError(Exception):
 
 class BridgeError(ViewerError):
     """A bridge to Foxglove that cannot begin."""
-
-
-class SinkError(ViewerError):
-    """A sink to Rerun that cannot begin."""

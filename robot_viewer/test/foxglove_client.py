@@ -40,9 +40,7 @@ class FoxgloveClient:
         info: The first message of the server.
         channels: Offered channels by topic.
         services: Offered services by name.
-        parameters: Values as they were last sent.
         statuses: Texts of the server for people.
-        graph: All updates of the connection graph.
     """
 
     def __init__(self, url: str, origin: str | None = None) -> None:
@@ -65,12 +63,9 @@ class FoxgloveClient:
         self._subscribed: dict[int, str] = {}
         self._received: dict[str, deque[bytes]] = defaultdict(deque)
         self._answers: dict[int, bytes | str] = {}
-        self._sets: dict[str, dict[str, Any]] = {}
         self.channels: dict[str, dict[str, Any]] = {}
         self.services: dict[str, dict[str, Any]] = {}
-        self.parameters: dict[str, Any] = {}
         self.statuses: list[str] = []
-        self.graph: list[dict[str, Any]] = []
         self.info: dict[str, Any] = {}
         self.until(lambda: bool(self.info), 'serverInfo')
 
@@ -132,29 +127,6 @@ class FoxgloveClient:
         schema = self.services[service]['response']
         return decoder(schema['schemaName'], schema['schema'])(answer)
 
-    def get_parameters(self, *names: str) -> dict[str, Any]:
-        """Ask for parameters, all when no name is given."""
-        number = str(next(self._numbers))
-        self._send('getParameters', parameterNames=list(names), id=number)
-        self.until(lambda: number in self._sets, 'parameters')
-        return self._sets[number]
-
-    def set_parameter(self, name: str, value: object, kind: str | None = None) -> dict[str, Any]:
-        """Set a parameter; return the answer."""
-        number = str(next(self._numbers))
-        parameter = {'name': name, 'value': value} | ({'type': kind} if kind else {})
-        self._send('setParameters', parameters=[parameter], id=number)
-        self.until(lambda: number in self._sets, 'answer to setParameters')
-        return self._sets[number]
-
-    def watch_parameters(self, *names: str) -> None:
-        """Subscribe to changes."""
-        self._send('subscribeParameterUpdates', parameterNames=list(names))
-
-    def watch_graph(self) -> None:
-        """Subscribe to the connection graph."""
-        self._send('subscribeConnectionGraph')
-
     def fetch(self, uri: str) -> bytes | str:
         """Fetch a file; return its bytes, or the text of the failure."""
         number = next(self._numbers)
@@ -193,14 +165,8 @@ class FoxgloveClient:
         elif operation == 'unadvertiseServices':
             gone = set(message['serviceIds'])
             self.services = {n: s for n, s in self.services.items() if s['id'] not in gone}
-        elif operation == 'parameterValues':
-            values = {each['name']: each.get('value') for each in message['parameters']}
-            self.parameters.update(values)
-            self._sets[message.get('id', '')] = values
         elif operation == 'serviceCallFailure':
             self._answers[message['callId']] = message['message']
-        elif operation == 'connectionGraphUpdate':
-            self.graph.append(message)
         elif operation == 'status':
             self._take_status(message['message'])
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Who may connect to the bridge, which names match, and which values a parameter can have."""
+"""Who may connect to the bridge, which names match, and how bytes pass."""
 
 from __future__ import annotations
 
@@ -12,15 +12,7 @@ from hypothesis import given, strategies
 import pytest
 
 from robot_viewer.foxglove.admission import Admission, FOXGLOVE_ORIGINS
-from robot_viewer.foxglove.names import EVERYTHING, is_hidden, NameFilter, NOTHING
-from robot_viewer.foxglove.parameter_values import (
-    fitted,
-    full_name,
-    ParameterTable,
-    ParameterValueError,
-    split_name,
-    Value,
-)
+from robot_viewer.foxglove.names import EVERYTHING, is_hidden, NameFilter
 from robot_viewer.foxglove.relay import hidden_address, Relay
 
 HEAD = 'GET {path} HTTP/1.1\r\nHost: localhost:8765\r\nUpgrade: websocket\r\n{rest}\r\n'
@@ -81,7 +73,7 @@ def test_what_is_no_request_is_refused(data: bytes) -> None:
     ('patterns', 'accepted', 'refused'),
     [
         ([EVERYTHING], ['/a', '/a/b'], []),
-        ([NOTHING], [], ['/a', '']),
+        ([''], [], ['/a', '/']),
         (['/joint_.*', '/tf'], ['/joint_states', '/tf'], ['/tf_static', '/a/joint_states']),
     ],
 )
@@ -104,54 +96,6 @@ def test_hidden_names() -> None:
     """As ROS hides them."""
     assert is_hidden('/arm/_action/status')
     assert not is_hidden('/arm/joint_states')
-
-
-@pytest.mark.parametrize(
-    ('value', 'present', 'expected'),
-    [
-        (2, 1.0, 2.0),
-        (2, 1, 2),
-        (True, 1.0, True),
-        ([1, 2], [0.5], [1.0, 2.0]),
-        ([1, 2.5], None, [1.0, 2.5]),
-        ([1, 2], [3], [1, 2]),
-        ('x', None, 'x'),
-        (b'x', None, b'x'),
-        ([], None, []),
-    ],
-)
-def test_values_fit_their_parameter(value: object, present: Value | None, expected: Value) -> None:
-    """JSON has one kind of number, and ROS two."""
-    found = fitted('/n.p', value, present)
-    assert found == expected
-    assert type(found) is type(expected)
-    if isinstance(found, list) and isinstance(expected, list):
-        assert [type(each) for each in found] == [type(each) for each in expected]
-
-
-@pytest.mark.parametrize('value', [None, {'a': 1}, [1, 'a'], [[1]], [None]])
-def test_values_of_no_parameter(value: object) -> None:
-    """They are named."""
-    with pytest.raises(ParameterValueError, match=r'/n\.p cannot be'):
-        fitted('/n.p', value, None)
-
-
-def test_names_of_parameters() -> None:
-    """Those of nodes have no dot."""
-    assert split_name(full_name('/ns/node', 'a.b')) == ('/ns/node', 'a.b')
-    for name in ('speed', '.speed', '/node.'):
-        with pytest.raises(ParameterValueError):
-            split_name(name)
-
-
-def test_the_table_keeps_what_is_shown() -> None:
-    """And forgets a node, not one whose name begins alike."""
-    table = ParameterTable(lambda name: not name.endswith('secret'))
-    assert table.update({'/a.x': 1, '/a.secret': 2, '/ab.y': 3}) == {'/a.x': 1, '/ab.y': 3}
-    table.forget('/a')
-    assert table.get() == {'/ab.y': 3}
-    table.update({'/ab.y': None})
-    assert not table.get(['/ab.y'])
 
 
 @pytest.fixture

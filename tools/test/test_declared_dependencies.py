@@ -28,7 +28,7 @@ PACKAGES = {
     if package.build_type == 'ament_python'
 }
 DISTRIBUTIONS = {'can': 'python-can', 'pinocchio': 'pin', 'serial': 'pyserial', 'yaml': 'PyYAML'}
-DISTRIBUTIONS |= {'foxglove': 'foxglove-sdk', 'mujoco': 'mujoco-core', 'rerun': 'rerun-sdk'}
+DISTRIBUTIONS |= {'foxglove': 'foxglove-sdk', 'mujoco': 'mujoco-core'}
 """Names on PyPI of what is imported under another one."""
 ON_PYPI = {*DISTRIBUTIONS, 'coal', 'daqp', 'evdev', 'msgpack', 'numpy', 'onnxruntime', 'psutil'}
 ON_PYPI |= {'rich', 'ruckig', 'trimesh', 'viser', 'websockets', 'xacro'}
@@ -56,7 +56,7 @@ OPTIONAL = {
         *('control_msgs', 'moveit_msgs', 'pinocchio', 'shape_msgs'),
     },
     'quad_sim': {'python3-gymnasium-pip'},
-    'robot_viewer': {'foxglove-sdk', 'rerun-sdk'},
+    'robot_viewer': {'foxglove-sdk'},
 }
 """Packages that are used where they are built, and that colcon need not build for this one."""
 FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}

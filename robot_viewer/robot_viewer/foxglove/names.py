@@ -8,7 +8,6 @@ from collections.abc import Iterable
 import re
 
 EVERYTHING = '.*'
-NOTHING = '(?!)'
 
 
 class NameFilter:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""``ros2 run robot_viewer foxglove_bridge``: topics, services and parameters for Foxglove."""
+"""``ros2 run robot_viewer foxglove_bridge``: topics and services for Foxglove."""
 
 from __future__ import annotations
 

@@ -1,17 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What clients of Foxglove ask for, from the threads of the server to the thread of the node."""
+"""What clients of Foxglove request, from the threads of the server to the thread of the node."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-import threading
 
-from foxglove import Parameter
 from foxglove.websocket import ChannelView, Client, ClientChannel, ServerListener
 
-from .parameters import Parameters
 from .publishing import ClientPublishers
 from .topics import Topics
 
@@ -24,20 +21,9 @@ class Listener(ServerListener):
         order: Callable[[Callable[[], None]], None],
         topics: Topics,
         publishers: ClientPublishers,
-        parameters: Parameters | None,
-        graph_wanted: threading.Event,
     ) -> None:
-        """Pass requests on.
-
-        Args:
-            order: Has something done in the thread of the node.
-            topics: Subscribes.
-            publishers: Publish what clients send.
-            parameters: Knows and sets parameters; None where clients may not see them.
-            graph_wanted: Set while a client wants the connection graph.
-        """
+        """Pass requests on; ``order`` runs something in the thread of the node."""
         self._order, self._topics, self._publishers = order, topics, publishers
-        self._parameters, self._graph_wanted = parameters, graph_wanted
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         """Subscribe."""
@@ -58,23 +44,3 @@ class Listener(ServerListener):
     def on_message_data(self, client: Client, client_channel_id: int, data: bytes) -> None:
         """Publish a message."""
         self._order(partial(self._publishers.publish, client.id, client_channel_id, data))
-
-    def on_get_parameters(
-        self, client: Client, param_names: list[str], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Return parameters, all when no name is given."""
-        return self._parameters.get(param_names) if self._parameters is not None else []
-
-    def on_set_parameters(
-        self, client: Client, parameters: list[Parameter], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Set parameters, and return what they are then."""
-        return self._parameters.set(parameters) if self._parameters is not None else []
-
-    def on_connection_graph_subscribe(self) -> None:
-        """Begin to look at the connections."""
-        self._graph_wanted.set()
-
-    def on_connection_graph_unsubscribe(self) -> None:
-        """End it."""
-        self._graph_wanted.clear()

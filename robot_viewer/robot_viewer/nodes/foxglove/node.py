@@ -7,37 +7,23 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from socket import gethostname
-import threading
 from urllib.parse import quote
 
-from foxglove import Context, Parameter, start_server, StatusLevel
+from foxglove import Context, start_server, StatusLevel
 from foxglove.websocket import Capability
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
-from rosgraph_msgs.msg import Clock
 
 from node_runner import destroyed_when_refused
 
 from ...exceptions import BridgeError
 from ...foxglove.admission import Admission
-from ...foxglove.assets import Assets
+from ...foxglove.assets import read_asset
 from ...foxglove.relay import hidden_address, Relay
-from .graph import Links, links
 from .listener import Listener
-from .parameters import Parameters
 from .publishing import ClientPublishers
 from .services import Services
-from .settings import (
-    ASSETS,
-    CLIENT_PUBLISH,
-    CONNECTION_GRAPH,
-    PARAMETERS,
-    PARAMETERS_SUBSCRIBE,
-    read_settings,
-    SERVICES,
-    Settings,
-)
-from .topics import TopicChoice, Topics
+from .settings import read_settings, Settings
+from .topics import Topics
 
 LOOK_PERIOD = 1.0
 """Time between two looks at the graph in [s]."""
@@ -46,16 +32,13 @@ LOOK_PERIOD = 1.0
 class FoxgloveBridge(Node):
     """A server of Foxglove's protocol beside the robot.
 
-    Clients are served in threads of foxglove-sdk. What they ask for is left for the node's thread;
-    only calls of services and new values of parameters wait there, each for its own client.
+    Clients are served in threads of foxglove-sdk. What they request is left for the node's thread;
+    only calls of services wait there, each for its own client.
     """
 
     @destroyed_when_refused
     def __init__(self, name: str) -> None:
         """Listen.
-
-        Args:
-            name: Of the node.
 
         Raises:
             ParameterError: A parameter is wrong.
@@ -64,42 +47,20 @@ class FoxgloveBridge(Node):
         super().__init__(name)
         settings = read_settings(self)
         self._orders: deque[Callable[[], None]] = deque()
-        self._watched_graph = threading.Event()
-        self._links: Links | None = None
-        able = settings.capabilities
         context = Context()
-        choice = TopicChoice(
-            settings.topics, settings.hidden, settings.best_effort, settings.depth
-        )
-        self._topic_channels = Topics(self, context, choice, self._warn)
-        self._client_publishers = ClientPublishers(self, settings.client_topics, self._warn)
-        self._service_calls = (
-            Services(self, settings.services, self._order, self._warn, hidden=settings.hidden)
-            if SERVICES in able
-            else None
-        )
-        self._parameter_mirror = (
-            Parameters(self, settings.parameters, self._order, self._publish_values, self._warn)
-            if able & {PARAMETERS, PARAMETERS_SUBSCRIBE}
-            else None
-        )
+        self._topic_channels = Topics(self, context, settings.topics, self._warn)
+        self._service_calls = Services(self, settings.services, self._order, self._warn)
+        publishers = ClientPublishers(self, settings.client_topics, self._warn)
         behind = hidden_address()
         self._server = start_server(
             name=name,
             host=behind,
             port=0,
-            capabilities=self._capabilities(settings),
-            server_listener=Listener(
-                self._order,
-                self._topic_channels,
-                self._client_publishers,
-                self._parameter_mirror,
-                self._watched_graph,
-            ),
+            capabilities=[Capability.ClientPublish, Capability.Services],
+            server_listener=Listener(self._order, self._topic_channels, publishers),
             supported_encodings=['cdr'],
-            asset_handler=Assets(settings.assets).read if ASSETS in able else None,
+            asset_handler=read_asset,
             context=context,
-            message_backlog_size=settings.backlog,
         )
         admission = Admission.to(settings.address, settings.origins)
         address = (settings.address, settings.port)
@@ -117,8 +78,6 @@ class FoxgloveBridge(Node):
                 f'port {settings.port} of {settings.address}: {error.strerror or error}; '
                 'choose another with -p port:=8766, or 0 for a free one'
             ) from None
-        if self.get_parameter('use_sim_time').value:
-            self.create_subscription(Clock, '/clock', self._pass_clock, qos_profile_sensor_data)
         self.create_timer(LOOK_PERIOD, self._look)
         self._look()
         self.url = _url(settings, self._relay.port, admission.token)
@@ -130,47 +89,16 @@ class FoxgloveBridge(Node):
 
     def close(self) -> None:
         """Let all clients go."""
-        if self._service_calls is not None:
-            self._service_calls.close()
+        self._service_calls.close()
         self._relay.close()
         self._server.stop()
-
-    def _capabilities(self, settings: Settings) -> list[Capability]:
-        offered = {
-            CLIENT_PUBLISH: Capability.ClientPublish,
-            SERVICES: Capability.Services,
-            CONNECTION_GRAPH: Capability.ConnectionGraph,
-        }
-        able = [value for name, value in offered.items() if name in settings.capabilities]
-        if self._parameter_mirror is not None:
-            able.append(Capability.Parameters)
-        if self.get_parameter('use_sim_time').value:
-            able.append(Capability.Time)
-        return able
 
     # -- in the node's thread
 
     def _look(self) -> None:
-        topics = self.get_topic_names_and_types()
-        self._topic_channels.look(topics)
-        services = self.get_service_names_and_types()
-        if self._service_calls is not None:
-            self._service_calls.look(self._server, services)
-        if self._parameter_mirror is not None:
-            self._parameter_mirror.look(services)
-        if self._watched_graph.is_set():
-            found = links(self, [name for name, _ in topics])
-            if found != self._links:
-                self._links = found
-                self._server.publish_connection_graph(found.graph())
+        self._topic_channels.look(self.get_topic_names_and_types())
+        self._service_calls.look(self._server, self.get_service_names_and_types())
         self._work()
-
-    def _pass_clock(self, message: Clock) -> None:
-        self._server.broadcast_time(message.clock.sec * 1_000_000_000 + message.clock.nanosec)
-
-    def _publish_values(self, values: list[Parameter]) -> None:
-        if values:
-            self._server.publish_parameter_values(values)
 
     def _warn(self, text: str) -> None:
         self.get_logger().warning(text)

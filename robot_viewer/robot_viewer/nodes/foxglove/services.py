@@ -60,8 +60,6 @@ class Services:
         shown: NameFilter,
         order: Callable[[Callable[[], None]], None],
         warn: Callable[[str], None],
-        *,
-        hidden: bool,
     ) -> None:
         """Offer nothing yet.
 
@@ -70,10 +68,8 @@ class Services:
             shown: Names of services.
             order: Has something done in the thread of the node.
             warn: Takes what cannot be offered, in words.
-            hidden: Whether services that ROS hides are offered, too.
         """
         self._node, self._shown, self._order, self._warn = node, shown, order, warn
-        self._hidden = hidden
         self._types: dict[str, str] = {}
         self._refused: set[tuple[str, str]] = set()
         self._clients: dict[str, Client] = {}
@@ -83,16 +79,11 @@ class Services:
         self._retry.cancel()
 
     def look(self, server: WebSocketServer, services: Iterable[tuple[str, Sequence[str]]]) -> None:
-        """Offer what has appeared, and withdraw what has gone.
-
-        Args:
-            server: Where.
-            services: Names and types of all services in the graph.
-        """
+        """Offer what has appeared, withdraw what has gone, by names and types of all services."""
         wanted = {
             name: types[0]
             for name, types in services
-            if self._shown.accepts(name) and (self._hidden or not is_hidden(name))
+            if self._shown.accepts(name) and not is_hidden(name)
         }
         gone = [name for name, type_ in self._types.items() if wanted.get(name) != type_]
         if gone:

@@ -19,25 +19,9 @@ from message_definitions import DefinitionError, message_definition
 
 from ...foxglove.names import is_hidden, NameFilter
 
-UNKNOWN_DEPTH = 10
-"""Depth for a publisher whose depth is unknown: DDS does not report it."""
-
-
-@dataclass(frozen=True, slots=True)
-class TopicChoice:
-    """Which topics are offered, and how they are subscribed to.
-
-    Attributes:
-        shown: Names of topics.
-        hidden: Whether names that ROS hides are among them.
-        best_effort: Names of topics of which messages may be lost.
-        depth: Smallest and greatest depth of a subscription.
-    """
-
-    shown: NameFilter
-    hidden: bool
-    best_effort: NameFilter
-    depth: tuple[int, int]
+UNKNOWN_DEPTH, MAX_DEPTH = 10, 25
+"""Depth for a publisher whose depth is unknown, since DDS does not report it, and the greatest of
+a subscription."""
 
 
 @dataclass(slots=True)
@@ -65,31 +49,26 @@ class Topics:
     """Offers topics, and passes their messages on; used in the thread of the node only."""
 
     def __init__(
-        self, node: Node, context: Context, choice: TopicChoice, warn: Callable[[str], None]
+        self, node: Node, context: Context, shown: NameFilter, warn: Callable[[str], None]
     ) -> None:
         """Offer nothing yet.
 
         Args:
             node: Whose subscriptions they are.
             context: What the server publishes.
-            choice: Which topics.
+            shown: Names of topics.
             warn: Takes what cannot be shown, in words.
         """
-        self._node, self._context, self._choice, self._warn = node, context, choice, warn
+        self._node, self._context, self._shown, self._warn = node, context, shown, warn
         self._offered: dict[str, _Offered] = {}
         self._refused: set[tuple[str, str]] = set()
 
     def look(self, topics: Iterable[tuple[str, Sequence[str]]]) -> None:
-        """Offer what has appeared, and withdraw what has gone.
-
-        Args:
-            topics: Names and types of all topics in the graph.
-        """
-        choice = self._choice
+        """Offer what has appeared, withdraw what has gone, by names and types of all topics."""
         wanted = {
             name: types[0]
             for name, types in topics
-            if choice.shown.accepts(name) and (choice.hidden or not is_hidden(name))
+            if self._shown.accepts(name) and not is_hidden(name)
         }
         for name, offered in list(self._offered.items()):
             if wanted.get(name) != offered.type:
@@ -156,13 +135,10 @@ class Topics:
         offers = [each.qos_profile for each in self._node.get_publishers_info_by_topic(name)]
         reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in offers)
         latched = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offers)
-        lowest, highest = self._choice.depth
         depth = sum(each.depth or UNKNOWN_DEPTH for each in offers)
         return QoSProfile(
-            depth=min(max(depth, lowest), highest),
-            reliability=ReliabilityPolicy.RELIABLE
-            if reliable and not self._choice.best_effort.accepts(name)
-            else ReliabilityPolicy.BEST_EFFORT,
+            depth=min(max(depth, 1), MAX_DEPTH),
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL
             if latched and offers
             else DurabilityPolicy.VOLATILE,
@@ -170,10 +146,7 @@ class Topics:
 
 
 def class_of(name: str) -> Any:  # noqa: ANN401  # message types have no type
-    """Return the class of a message or service.
-
-    Args:
-        name: `package/msg/Name` or `package/srv/Name`.
+    """Return the class of a message or service, by its name as `package/srv/Name`.
 
     Raises:
         LookupError: It is not installed.
