@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
 from dataclasses import replace
-from itertools import pairwise
 import threading
 from typing import Any
 
@@ -81,42 +80,6 @@ def rates(drives: Drives, first: int) -> np.ndarray[tuple[int], np.dtype[np.floa
     return most
 
 
-@pytest.mark.parametrize('moving', [False, True])
-def test_a_long_trajectory_begins_without_a_jump(moving: bool) -> None:
-    """Speeds change by no more than the acceleration limit, from rest and out of a jog."""
-    drives = ready()
-    goal = wave(drives, 60)
-    if moving:
-        jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
-        drives.run(50)
-    before = len(drives.path) - 2
-    command = drives.gateway.request(goal)
-    begun(drives, command)
-    drives.run(450)
-    assert (rates(drives, before) <= 1.02 * drives.gateway.model.limits.acceleration).all()
-    assert command.execution is not None
-    assert command.execution.ending is not None
-    assert command.execution.ending.code is GoalCode.SUCCESSFUL, command.execution.ending.reason
-    assert drives.path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
-
-
-def test_one_trajectory_takes_over_from_another_in_motion() -> None:
-    """It is planned from where the first will be, and joins it there."""
-    drives = ready()
-    first = drives.gateway.request(wave(drives, 60))
-    begun(drives, first)
-    drives.run(120)
-    before = len(drives.path) - 2
-    goal = wave(drives, 20)
-    begun(drives, drives.gateway.request(goal))
-    drives.run(300)
-    assert (rates(drives, before) <= 1.02 * drives.gateway.model.limits.acceleration).all()
-    assert drives.path[-1] == pytest.approx(goal.points[-1].positions, abs=1e-6)
-    assert first.execution is not None
-    assert first.execution.ending is not None
-    assert first.execution.ending.code is GoalCode.INVALID_GOAL
-
-
 def test_a_jog_that_ends_while_a_long_goal_is_planned_does_no_harm() -> None:
     """It comes to rest first, and the trajectory begins there: nobody can foresee a jog."""
     drives = ready()
@@ -163,21 +126,6 @@ def test_an_arm_that_was_moved_meanwhile_is_planned_for_again(always: bool) -> N
     assert drives.path[-1] == pytest.approx(execution.feedback.desired.position, abs=0.02)
 
 
-def test_a_goal_that_is_refused_does_not_stop_a_jog() -> None:
-    """What moves the arm goes on."""
-    drives = ready()
-    goal = wave(drives, 300)
-    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
-    drives.run(45)
-    wrong = drives.gateway.request(replace(goal, joints=['elbow', *goal.joints[1:]]))
-    begun(drives, wrong)
-    error = wrong.future.exception()
-    assert isinstance(error, GoalError)
-    assert error.code is GoalCode.INVALID_JOINTS
-    drives.run(5)
-    assert drives.gateway.snapshot.source is Source.JOG
-
-
 def test_refusals_reach_whoever_asked() -> None:
     """What is wrong with the goal, and with the drives; attached again, a goal at once counts."""
     drives = ready()
@@ -194,24 +142,6 @@ def test_refusals_reach_whoever_asked() -> None:
     accepted = drives.gateway.request(wave(drives, 40))
     begun(drives, accepted)
     assert accepted.future.result() is not None
-
-
-def test_a_trajectory_that_was_cancelled_before_it_began_does_not_begin() -> None:
-    """Wherever it is on its way: the arm stays where it is."""
-    for cycles, jobs in ((0, 0), (1, 0), (1, 1), (2, 0)):
-        worker = SteppedWorker()
-        drives = ready(worker)
-        before = drives.path[-1].tolist()
-        command = drives.gateway.request(wave(drives, 60))
-        drives.run(cycles)
-        for _ in range(jobs):
-            worker.run()
-        drives.gateway.cancel(command, 'canceled')
-        while worker.run():
-            pass
-        drives.run(50)
-        assert command.future.cancelled()
-        assert drives.path[-1].tolist() == before
 
 
 def test_displacements_add_up_and_are_reached() -> None:
@@ -270,41 +200,6 @@ def test_a_flood_is_refused() -> None:
     assert all(command.future.done() for command in commands)
 
 
-def test_a_zero_stops_a_jog_and_nothing_else() -> None:
-    """A client that streams zeros while another moves the arm, or nobody, changes nothing."""
-    drives = ready()
-
-    def source() -> Source:
-        return drives.gateway.snapshot.source
-
-    command = drives.gateway.request(wave(drives, 20))
-    begun(drives, command)
-    drives.run(30)
-    zeros: list[Future[None]] = [
-        twist(drives.gateway, [0.0] * 6, drives.now),
-        jog(drives.gateway, {JOINT: 0.0}, drives.now),
-    ]
-    drives.run(2)
-    assert [zero.exception() for zero in zeros] == [None, None]
-    assert source() is Source.TRAJECTORY
-    drives.run(300)
-    assert command.execution is not None
-    assert command.execution.ending is not None
-    assert command.execution.ending.code is GoalCode.SUCCESSFUL
-    moved = move_by(drives.gateway, {JOINT: 0.3})
-    for _ in range(100):
-        twist(drives.gateway, [0.0] * 6, drives.now)
-        drives.run()
-    assert moved.future.exception() is None
-    assert source() is Source.NONE
-    jog(drives.gateway, {JOINT: 0.4}, drives.now, 10.0)
-    drives.run(50)
-    twist(drives.gateway, [0.0] * 6, drives.now)
-    drives.run(60)
-    assert source() is Source.NONE
-    assert all(before.tolist() == after.tolist() for before, after in pairwise(drives.path[-10:]))
-
-
 def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
     """It is not refused, so it neither shows in the status nor keeps the arm from recovering."""
     drives = ready()
@@ -314,23 +209,6 @@ def test_a_zero_is_no_command_to_an_arm_that_does_not_follow() -> None:
     drives.run()
     assert zero.exception() is None
     assert drives.gateway.refused == -np.inf
-
-
-def test_zeros_of_another_client_do_not_touch_a_jog() -> None:
-    """Standing still is a command only for whoever is jogging; another's stream is none."""
-    drives = ready()
-    velocities = {JOINT: 0.4}
-    still = JointCommand(*by_joint(drives.gateway.model, {JOINT: 0.0}, 'velocities'))
-    moving = JointCommand(*by_joint(drives.gateway.model, velocities, 'velocities'))
-    for _ in range(100):
-        drives.gateway.command(JogRequest(moving, drives.now + 0.1, client='keyboard'))
-        drives.gateway.command(JogRequest(still, drives.now + 0.1, client='gamepad'))
-        drives.run()
-    speeds = np.diff(np.array(drives.path)[-20:, 0]) / PERIOD
-    assert speeds == pytest.approx(0.4, abs=1e-3)
-    drives.gateway.command(JogRequest(still, drives.now + 0.1, client='keyboard'))
-    drives.run(40)
-    assert drives.path[-1].tolist() == drives.path[-2].tolist()
 
 
 def test_displacements_by_nothing_change_nothing() -> None:
@@ -353,27 +231,6 @@ def test_displacements_by_nothing_change_nothing() -> None:
     drives.run(20)
     move_by(drives.gateway, {JOINT: 0.0})
     drives.run(4)
-    assert drives.gateway.snapshot.source is Source.JOG
-
-
-@pytest.mark.parametrize('points', [20, 60])
-@given(st.integers(0, 8), st.integers(0, 8))
-@settings(max_examples=15, deadline=None)
-def test_a_trajectory_does_not_take_the_arm_from_a_newer_jog(
-    points: int, before: int, after: int
-) -> None:
-    """It was still being planned when the jog came: the newest command counts."""
-    worker = SteppedWorker()
-    drives = ready(worker)
-    command = drives.gateway.request(wave(drives, points))
-    drives.run(before)
-    jog(drives.gateway, {JOINT: 0.4}, drives.now, 30.0)
-    drives.run(after)
-    for _ in range(10):
-        worker.run()
-        drives.run()
-    assert isinstance(command.future.exception(0.0), NotReadyError)
-    assert 'jog' in command.ended.result(0.0).reason
     assert drives.gateway.snapshot.source is Source.JOG
 
 

@@ -14,7 +14,7 @@ from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
-from arm_servo.core.requests import PauseRequest, SpeedRequest, StopRequest
+from arm_servo.core.requests import ImmediateRequest, PauseRequest, SpeedRequest, StopRequest
 from arm_servo.core.set_point import MOTIONS
 from arm_trajectory import GoalPoint, TrajectoryGoal
 
@@ -27,6 +27,7 @@ STEPS = st.one_of(
     st.tuples(st.just('jog'), NUDGES),
     st.tuples(st.just('target'), NUDGES),
     st.tuples(st.just('trajectory'), NUDGES),
+    st.tuples(st.just('wave'), NUDGES),
     st.tuples(
         st.sampled_from(['stop', 'pause', 'resume', 'slow', 'fast', 'lose', 'find']), NUDGES
     ),
@@ -34,11 +35,30 @@ STEPS = st.one_of(
 PLANS = st.lists(st.tuples(STEPS, st.integers(1, 40)), min_size=2, max_size=8)
 
 
+def wave(drives: Drives, numbers: list[float]) -> list[GoalPoint]:
+    """Return so many points there and back that their preparation takes long."""
+    here, sizes = np.array([axis.setpoint for axis in drives.axes]), np.array(numbers)
+    shares = np.sin(np.arange(1, 61) / 19.0) ** 2
+    return [
+        GoalPoint(0.55 + 0.05 * number, (here + sizes * share).tolist())
+        for number, share in enumerate(shares)
+    ]
+
+
 def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
     """Command a step, or let a drive drop out or come back."""
     gateway = drives.gateway
     names = gateway.model.joints
-    if kind in {'lose', 'find'}:
+    immediate: dict[str, ImmediateRequest] = {
+        'slow': SpeedRequest(0.3),
+        'fast': SpeedRequest(1.0),
+        'stop': StopRequest('stopped', MOTIONS),
+        'pause': PauseRequest(),
+        'resume': PauseRequest(is_paused=False),
+    }
+    if kind in immediate:
+        gateway.command(immediate[kind])
+    elif kind in {'lose', 'find'}:
         drives.axes[3] = replace(drives.axes[3], followable=kind == 'find')
     elif kind == 'twist':
         twist(gateway, numbers, drives.now, 0.2)
@@ -49,21 +69,17 @@ def perform(drives: Drives, kind: str, numbers: list[float]) -> None:
     elif kind == 'trajectory':
         to = np.array([axis.setpoint for axis in drives.axes]) + numbers
         gateway.request(TrajectoryGoal(names, [GoalPoint(1.0, to.tolist())]))
-    elif kind in {'slow', 'fast'}:
-        gateway.command(SpeedRequest(0.3 if kind == 'slow' else 1.0))
-    elif kind == 'stop':
-        gateway.command(StopRequest('stopped', MOTIONS))
-    elif kind == 'pause':
-        gateway.command(PauseRequest())
-    elif kind == 'resume':
-        gateway.command(PauseRequest(is_paused=False))
+    elif kind == 'wave':
+        gateway.request(TrajectoryGoal(names, wave(drives, numbers)))
 
 
+OUT_OF_A_JOG = [(('jog', [0.3] * 7), 15), (('wave', [0.2] * 7), 40), (('wave', [-0.2] * 7), 40)]
 BRIEFLY_LOST = [(('trajectory', [0.3] * 7), 40), (('lose', []), 4), (('find', []), 20)]
 
 
 @given(PLANS)
 @example(BRIEFLY_LOST)
+@example(OUT_OF_A_JOG)
 @settings(max_examples=40)
 def test_no_hand_over_makes_the_set_points_jump(
     plan: list[tuple[tuple[str, list[float]], int]],
