@@ -10,16 +10,15 @@ import contextlib
 from dataclasses import dataclass, replace
 import os
 from pathlib import Path
-import tempfile
 
 from process_supervisor import (
     add_namespace,
     add_view,
+    bring_up_place,
     exclusive,
     Executable,
     find_executable,
     ProcessSpec,
-    ros_domain,
     RosOptions,
     StartError,
     write_parameters,
@@ -40,8 +39,6 @@ SIMULATED_BUS = 'auto'
 """Bus without --can in simulation: vcan0 when it exists, else multicast on the loopback."""
 BUS_REMEDY = 'another bus with --can'
 """What a second bring-up on a bus is advised to take."""
-NAMESPACE_REMEDY = 'another --namespace'
-"""What a second bring-up in a namespace is advised to take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,14 +229,12 @@ def session(
     robot = locate(arguments)
     config = read_bus(robot)
     ros = in_namespace_of_bus(ros, config)
-    domain = ros_domain(os.environ)
-    with contextlib.ExitStack() as stack:
-        place = f'namespace /{ros.namespace} of ROS domain {domain}'
-        stack.enter_context(exclusive(place, NAMESPACE_REMEDY))
-        bus = stack.enter_context(own_bus(arguments.can, simulate=simulate))
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='arm_bringup-'))
+    with (
+        bring_up_place('arm_bringup', ros) as folder,
+        own_bus(arguments.can, simulate=simulate) as bus,
+    ):
         urdf = read_description(robot)
-        parameters = Path(folder) / 'robot_description.yaml'
+        parameters = folder / 'robot_description.yaml'
         write_parameters(parameters, urdf)
         start = start_positions(robot, urdf, config.joints) if simulate else StartPositions()
         wanted = Stack(
@@ -250,7 +245,7 @@ def session(
             arguments.timeout,
             master,
             dict(master_parameters or {}),
-            master_files(robot, Path(folder), ros),
+            master_files(robot, folder, ros),
             ros,
             plan,
             arguments.view,

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from process_supervisor import (
     Executable,
     FindExecutable,
-    LOG_FORMAT,
-    node_argv,
+    node_process,
     ProcessSpec,
     RosOptions,
     state_publisher,
@@ -27,6 +27,8 @@ MOTION_NODE = Executable('arm_servo', 'motion_node')
 """Trajectories and jogging: with the master in it, or for drives that another process has."""
 PLANNER = Executable('arm_planning', 'move_group')
 """Motions among obstacles, for clients of MoveIt."""
+SLAVES = Executable('canopen_sim', 'fake_slaves')
+"""Simulated drives."""
 
 MASTER_FIRST, THEN_LISTENERS, SLAVES_LAST = range(3)
 """Order of stopping: the master disables the drives, so they must still be there."""
@@ -64,88 +66,43 @@ class Stack:
 
 
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Say which processes make an arm.
+    """Return the processes that make an arm; they start side by side.
 
     Args:
         stack: What is to be brought up.
         parameters: The file of :func:`process_supervisor.write_parameters`.
         find: Finds executables.
 
-    Returns:
-        The processes; they start side by side.
-
     Raises:
         StartError: An executable is missing.
     """
+    make = partial(node_process, find=find, ros=stack.ros, ready_timeout=stack.ready_timeout)
     bus = {'bus_config': str(stack.robot.bus_config), 'can_interface_name': stack.bus}
-    everything = [
-        _slaves(stack, bus, find),
-        _master(stack, bus, parameters, find),
+    own = {'backend': 'canopen'} if stack.master == MOTION_NODE else {'robot_joint_states': 'true'}
+    files = (parameters, *stack.master_files)
+    processes: list[ProcessSpec | None] = []
+    if stack.simulate:
+        places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
+        processes.append(make('slaves', SLAVES, values={**bus, **places}, stop_order=SLAVES_LAST))
+    processes += [
+        make(
+            'master',
+            stack.master,
+            values={**bus, **own, **stack.master_parameters},
+            parameters=files,
+            stop_order=MASTER_FIRST,
+        ),
         state_publisher(  # without it the arm moves without TF
             parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_LISTENERS
         ),
-        _planner(stack, parameters, find),
-        _viewer(stack, find),
     ]
-    return [spec for spec in everything if spec is not None]
-
-
-def _slaves(stack: Stack, bus: Mapping[str, str], find: FindExecutable) -> ProcessSpec | None:
-    if not stack.simulate:
-        return None
-    places = {f'positions.{name}': f'{at!r}' for name, at in stack.start_positions.items()}
-    executable = Executable('canopen_sim', 'fake_slaves')
-    return ProcessSpec(
-        name='slaves',
-        argv=node_argv(executable, find, {**bus, **places}, ros=stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=SLAVES_LAST,
-    )
-
-
-def _master(
-    stack: Stack, bus: Mapping[str, str], parameters: Path, find: FindExecutable
-) -> ProcessSpec:
-    own = {'robot_joint_states': 'true'}
-    if stack.master == MOTION_NODE:
-        own = {'backend': 'canopen'}
-    return ProcessSpec(
-        name='master',
-        argv=node_argv(
-            stack.master,
-            find,
-            {**bus, **own, **stack.master_parameters},
-            (parameters, *stack.master_files),
-            stack.ros,
-        ),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=MASTER_FIRST,
-    )
-
-
-def _planner(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec | None:
-    if not stack.plan:
-        return None
-    return ProcessSpec(
-        name='planner',
-        argv=node_argv(PLANNER, find, {}, (parameters, *stack.master_files), stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=THEN_LISTENERS,
-    )
-
-
-def _viewer(stack: Stack, find: FindExecutable) -> ProcessSpec | None:
-    if not stack.view:
-        return None
-    return view_process(
-        find, stack.ros, ready_timeout=stack.ready_timeout, stop_order=THEN_LISTENERS
-    )
+    if stack.plan:
+        processes.append(make('planner', PLANNER, parameters=files, stop_order=THEN_LISTENERS))
+    if stack.view:
+        timeout = stack.ready_timeout
+        view = view_process(find, stack.ros, ready_timeout=timeout, stop_order=THEN_LISTENERS)
+        processes.append(view)
+    return [spec for spec in processes if spec is not None]
 
 
 def controller_process(
@@ -155,7 +112,7 @@ def controller_process(
     find: FindExecutable,
     ros: RosOptions,
 ) -> ProcessSpec:
-    """Say which process moves drives that another process has; that one makes /tf, too.
+    """Return the process that moves drives of another process; that one makes /tf, too.
 
     Args:
         files: Parameter files of the nodes that move the arm.
@@ -167,11 +124,13 @@ def controller_process(
     Raises:
         StartError: An executable is missing.
     """
-    return ProcessSpec(
-        name='controller',
-        argv=node_argv(MOTION_NODE, find, {'backend': 'topics'}, (parameters, *files), ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
+    return node_process(
+        'controller',
+        MOTION_NODE,
+        find,
+        ros,
+        values={'backend': 'topics'},
+        parameters=(parameters, *files),
         ready_timeout=ready_timeout,
         stop_order=MASTER_FIRST,
     )

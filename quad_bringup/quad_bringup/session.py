@@ -10,16 +10,15 @@ import contextlib
 from dataclasses import dataclass
 import os
 from pathlib import Path
-import tempfile
 
 from process_supervisor import (
     add_namespace,
     add_view,
+    bring_up_place,
     exclusive,
     find_executable,
     namespaced_parameters,
     ProcessSpec,
-    ros_domain,
     RosOptions,
     write_parameters,
 )
@@ -37,8 +36,6 @@ PROTOCOLS = (AUTO, V2.name, V1.name, VENDOR)
 """Serial protocols of quad_hardware, and ways to choose one."""
 PORT_REMEDY = 'another --port'
 """What a second bring-up on a port has to choose."""
-NAMESPACE_REMEDY = 'another --namespace'
-"""What a second bring-up in a namespace has to choose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,15 +125,11 @@ def session(arguments: argparse.Namespace, ros: RosOptions, port: str | None) ->
         _existing(name, getattr(arguments, name, None)) for name in ('policy', 'calibration')
     )
     apply_network(arguments)
-    domain = ros_domain(os.environ)
     with contextlib.ExitStack() as stack:
         if port is not None:
             name = f'port {os.path.realpath(port)}'  # two names of one port are one port
             stack.enter_context(exclusive(name, PORT_REMEDY))
-        place = f'namespace /{ros.namespace} of ROS domain {domain}'
-        stack.enter_context(exclusive(place, NAMESPACE_REMEDY))
-        prefix = 'quad_bringup-'
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=prefix)))
+        folder = stack.enter_context(bring_up_place('quad_bringup', ros))
         urdf = robot_urdf(arguments.preset, arm=arguments.arm)
         parameters = folder / 'robot_description.yaml'
         write_parameters(parameters, urdf)

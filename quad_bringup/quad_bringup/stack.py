@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from process_supervisor import (
     Executable,
     FindExecutable,
-    LOG_FORMAT,
-    node_argv,
+    node_process,
     ProcessSpec,
     RosOptions,
     StartError,
@@ -21,6 +21,9 @@ from process_supervisor import (
 
 CONTROLLER_FIRST, THEN_BRIDGE, SIMULATOR_LAST = range(3)
 """Order of stopping: the controller, then the bridge, then the robot."""
+SIMULATOR = Executable('quad_sim', 'fake_xgo')
+BRIDGE = Executable('quad_hardware', 'hardware_node')
+CONTROLLER = Executable('quad_controller', 'controller_node')
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,97 +62,75 @@ class Stack:
 
 
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
-    """Return which processes make a quadruped.
+    """Return the processes that make a quadruped; they start side by side.
 
     Args:
         stack: What is to be brought up.
         parameters: A ROS parameter file with the robot description.
         find: Finds executables.
 
-    Returns:
-        The processes; they start side by side.
-
     Raises:
         StartError: An executable is missing.
     """
-    processes = [
-        _bridge(stack, parameters, find),
-        _controller(stack, parameters, find),
-        _state_publisher(stack, parameters, find),
+    ros, timeout = stack.ros, stack.ready_timeout
+    make = partial(node_process, find=find, ros=ros, ready_timeout=timeout)
+    calibration = () if stack.calibration is None else (stack.calibration,)
+    publisher = state_publisher(parameters, find, ros, ready_timeout=timeout, order=THEN_BRIDGE)
+    if publisher is None:
+        raise StartError(
+            'no robot_state_publisher; source env.sh in this shell again; '
+            'if that does not help, run make build before it'
+        )
+    processes: list[ProcessSpec | None] = [
+        make(
+            'hardware',
+            BRIDGE,
+            values=_bridge_parameters(stack),
+            parameters=(parameters, *calibration),
+            stop_order=THEN_BRIDGE,
+        ),
+        make(
+            'controller',
+            CONTROLLER,
+            values=_controller_parameters(stack),
+            parameters=(parameters,),
+            stop_order=CONTROLLER_FIRST,
+        ),
+        publisher,
     ]
     if stack.simulate:
-        processes.insert(0, _simulator(stack, find))
-    viewer = _viewer(stack, find)
-    return processes if viewer is None else [*processes, viewer]
+        options = _simulator_options(stack)
+        simulator = make('fake_xgo', SIMULATOR, options=options, stop_order=SIMULATOR_LAST)
+        processes.insert(0, simulator)
+    if stack.view:
+        view = view_process(find, ros, ready_timeout=timeout, stop_order=THEN_BRIDGE)
+        processes.append(view)
+    return [spec for spec in processes if spec is not None]
 
 
-def _viewer(stack: Stack, find: FindExecutable) -> ProcessSpec | None:
-    if not stack.view:
-        return None
-    return view_process(find, stack.ros, ready_timeout=stack.ready_timeout, stop_order=THEN_BRIDGE)
-
-
-def _simulator(stack: Stack, find: FindExecutable) -> ProcessSpec:
-    executable = Executable('quad_sim', 'fake_xgo')
-    program, *ros_arguments = node_argv(executable, find, ros=stack.ros)
+def _simulator_options(stack: Stack) -> list[str]:
     spoken = 'both' if stack.protocol == 'auto' else stack.protocol
     options = ['--link', stack.port, '--preset', stack.preset, '--protocol', spoken]
     if stack.arm:
         options.append('--arm')
     if stack.servo is not None:
         options += ['--servo', stack.servo]
-    return ProcessSpec(
-        name='fake_xgo',
-        argv=(program, *options, *ros_arguments),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=SIMULATOR_LAST,
-    )
+    return options
 
 
-def _bridge(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
+def _bridge_parameters(stack: Stack) -> dict[str, str]:
     values = {'port': stack.port, 'protocol': stack.protocol, **stack.ros.frame_parameters}
     if stack.simulate:  # its IMU is where the description has it
         values |= {'imu.mounting_checked': 'true', 'imu.rates_checked': 'true'}
-    executable = Executable('quad_hardware', 'hardware_node')
-    files = (parameters,) if stack.calibration is None else (parameters, stack.calibration)
-    return ProcessSpec(
-        name='hardware',
-        argv=node_argv(executable, find, values, files, stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=THEN_BRIDGE,
-    )
+    return values
 
 
-def _controller(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
+def _controller_parameters(stack: Stack) -> dict[str, str]:
     values = {'gait': stack.gait}
     if stack.policy is not None:
         values['policy'] = str(stack.policy)
     if stack.record is not None:
         values['record'] = str(stack.record)
-    if stack.simulate:  # nobody is hurt, and nothing breaks
+    if stack.simulate:  # no person is hurt, and nothing breaks
         values['get_up_swings'] = 'true'
-    executable = Executable('quad_controller', 'controller_node')
-    return ProcessSpec(
-        name='controller',
-        argv=node_argv(executable, find, values, (parameters,), stack.ros),
-        environment=LOG_FORMAT,
-        notifies_ready=True,
-        ready_timeout=stack.ready_timeout,
-        stop_order=CONTROLLER_FIRST,
-    )
-
-
-def _state_publisher(stack: Stack, parameters: Path, find: FindExecutable) -> ProcessSpec:
-    spec = state_publisher(
-        parameters, find, stack.ros, ready_timeout=stack.ready_timeout, order=THEN_BRIDGE
-    )
-    if spec is None:
-        raise StartError(
-            'no robot_state_publisher; source env.sh in this shell again; '
-            'if that does not help, run make build before it'
-        )
-    return spec
+    return values

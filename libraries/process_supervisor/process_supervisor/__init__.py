@@ -12,6 +12,7 @@ what the processes write.
 """
 
 from .beside import join_in_time
+from .bring_up import bring_up_place, node_process
 from .console import explain, Shutdown, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
@@ -64,6 +65,7 @@ __all__ = [
     'SupervisorError',
     'add_namespace',
     'add_view',
+    'bring_up_place',
     'exclusive',
     'explain',
     'find_executable',
@@ -71,6 +73,7 @@ __all__ = [
     'join_in_time',
     'namespaced_parameters',
     'node_argv',
+    'node_process',
     'parameters_by_node',
     'parse_with_ros',
     'ros_domain',

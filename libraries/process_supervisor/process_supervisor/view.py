@@ -27,11 +27,7 @@ STOP_STEPS = (
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--no-view``.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare ``--no-view``."""
     parser.add_argument(
         '--no-view',
         dest='view',
@@ -45,16 +41,9 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 def view_process(
     find: FindExecutable, ros: RosOptions, *, ready_timeout: float, stop_order: int
 ) -> ProcessSpec | None:
-    """Say which process serves the page.
+    """Return the process that serves the page, without which the bring-up goes on.
 
-    Args:
-        find: Finds executables.
-        ros: Options of all nodes.
-        ready_timeout: How long it may take to be ready in [s].
-        stop_order: As in :class:`.ProcessSpec`.
-
-    Returns:
-        The process, without which the bring-up goes on; None where it is not built.
+    None where it is not built.
     """
     if find(VIEWER.package, VIEWER.name) is None:
         return None
