@@ -45,9 +45,6 @@ from .stack import controller_process, MASTER
 def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
     """Parse the command line.
 
-    Args:
-        argv: Arguments without the program's name.
-
     Returns:
         What was asked for, and the options of all nodes.
     """
@@ -94,9 +91,6 @@ def parse(argv: Sequence[str]) -> tuple[argparse.Namespace, RosOptions]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Bring an arm up and stay until it is to go down.
-
-    Args:
-        argv: Arguments without the program's name; None takes those of the process.
 
     Returns:
         0 after Ctrl-C or SIGTERM, 1 when a process failed, 2 when nothing was started.

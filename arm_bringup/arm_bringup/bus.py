@@ -21,9 +21,6 @@ INTERPOLATED_POSITION = 7
 def read_bus(robot: Robot) -> BusConfig:
     """Read the bus.yml of a robot, and so find its mistakes before anything is started.
 
-    Args:
-        robot: The robot.
-
     Returns:
         Its bus, with one drive at least.
 
@@ -44,10 +41,6 @@ def read_bus(robot: Robot) -> BusConfig:
 def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
     """Take over the namespace of bus.yml, unless the command line has one: all nodes share it.
 
-    Args:
-        ros: Options of all nodes.
-        bus: The bus of the robot.
-
     Raises:
         RobotError: Its nodes are in several.
     """
@@ -62,11 +55,7 @@ def in_namespace_of_bus(ros: RosOptions, bus: BusConfig) -> RosOptions:
 
 
 def stream_mode_service(bus: BusConfig) -> str:
-    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position.
-
-    Args:
-        bus: The bus of the robot.
-    """
+    """Name the service for the mode of streams: what bus.yml asks for, else cyclic position."""
     drives: list[NodeConfig] = [node for node in bus.nodes if node.is_drive]
     if all(drive.drive.position_mode == INTERPOLATED_POSITION for drive in drives):
         return 'interpolated_position_mode'

@@ -35,9 +35,6 @@ EXAMPLE_ACCELERATIONS = (2.0, 0.5)
 def check_robot(robot: Robot) -> list[Finding]:
     """Look at everything in a robot folder.
 
-    Args:
-        robot: The robot; its bus.yml and its description exist.
-
     Returns:
         What is wrong; empty when all is well.
     """
@@ -153,9 +150,6 @@ def _meant(name: str, free: Collection[str]) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Check a robot folder and say what is wrong.
-
-    Args:
-        argv: Arguments without the program's name; None takes those of the process.
 
     Returns:
         0 when nothing is wrong or warned of only, 1 when there is an error, 2 when there is no

@@ -25,9 +25,6 @@ RELATIVE_MESH = re.compile(r'(<mesh\b[^>]*\bfilename\s*=\s*["\'])(?![a-z]+://|/)
 def read_description(robot: Robot) -> str:
     """Return the URDF of a robot as XML text.
 
-    Args:
-        robot: The robot.
-
     Raises:
         DescriptionError: The file cannot be read or expanded.
     """
@@ -39,9 +36,6 @@ def read_description(robot: Robot) -> str:
 
 def read_semantic(robot: Robot) -> str:
     """Return the SRDF of a robot as XML text.
-
-    Args:
-        robot: The robot.
 
     Raises:
         DescriptionError: The file cannot be read or expanded.
@@ -97,9 +91,6 @@ def expand_xacro(
 
 def joint_limits(urdf: str) -> dict[str, JointRange]:
     """Read the limits of all joints that move by themselves, in the order of the URDF.
-
-    Args:
-        urdf: A URDF as XML text.
 
     Raises:
         DescriptionError: The text is no URDF, or a joint lacks its limits.

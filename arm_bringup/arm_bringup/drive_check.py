@@ -19,13 +19,7 @@ LONGER = 5.0  # times the way of a stop within the limits, from which on one sur
 def check_drives(
     place: str, drives: Mapping[str, AxisUnits | None], limits: JointLimits
 ) -> Iterable[Finding]:
-    """Look at the speed limit and at the decelerations of each drive.
-
-    Args:
-        place: Name of the file with the limits.
-        drives: What they are set to by bus.yml and EDS, by joint; None where that is unknown.
-        limits: Limits of the joints of a group.
-    """
+    """Look at speed limit and decelerations of each drive; None where these are unknown."""
     from arm_canopen.standard.objects import Index
 
     rows = zip(limits.names, limits.velocity, limits.acceleration, strict=True)

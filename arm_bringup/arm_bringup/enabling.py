@@ -23,12 +23,7 @@ AGAIN = 1.0
 
 
 def enabling_services(drives: Sequence[str], mode_service: str) -> list[list[str]]:
-    """Return the services that enable drives; each group is called side by side, one by one.
-
-    Args:
-        drives: Their names.
-        mode_service: Service of each that selects the mode of streams.
-    """
+    """Return the services that enable drives; each group is called side by side, one by one."""
     return [[f'{drive}/{name}' for drive in drives] for name in ('init', mode_service)]
 
 

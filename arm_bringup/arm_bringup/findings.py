@@ -42,22 +42,10 @@ class Finding:
 
 
 def error(place: str, problem: str, remedy: str) -> Finding:
-    """Return an error.
-
-    Args:
-        place: File, and what in it.
-        problem: What is wrong.
-        remedy: What to do.
-    """
+    """Return an error."""
     return Finding(Severity.ERROR, place, problem, remedy)
 
 
 def warning(place: str, problem: str, remedy: str) -> Finding:
-    """Return a warning.
-
-    Args:
-        place: File, and what in it.
-        problem: What is wrong.
-        remedy: What to do.
-    """
+    """Return a warning."""
     return Finding(Severity.WARNING, place, problem, remedy)

@@ -37,9 +37,6 @@ class MovedGroups:
 def moved_groups(robot: Robot) -> MovedGroups:
     """Choose the groups of a robot folder that are moved; as :func:`choose_groups`.
 
-    Args:
-        robot: A robot with an SRDF.
-
     Raises:
         RobotError: A file cannot be read, or there is no such group.
     """
@@ -53,10 +50,6 @@ def moved_groups(robot: Robot) -> MovedGroups:
 
 def joints_of_groups(robot: Robot, groups: MovedGroups) -> dict[str, Sequence[str]]:
     """Return the joints of each group that is moved.
-
-    Args:
-        robot: The robot.
-        groups: Its groups that are moved.
 
     Raises:
         RobotError: A group is not in the description, or a file cannot be read.
@@ -76,12 +69,6 @@ def choose_groups(
     Arms are what the robot folder names; else all groups of the SRDF that have drives, are
     neither end effectors nor made of groups, and share no joint with a group before them. Tools
     are the end effectors that have drives.
-
-    Args:
-        robot: The robot.
-        semantic: Its SRDF.
-        tree: Its description.
-        drives: Joints with a drive.
 
     Raises:
         RobotError: The SRDF has no such group, none with drives, or two share a joint.

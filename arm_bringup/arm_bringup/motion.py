@@ -36,12 +36,6 @@ def motion_files(
 ) -> Sequence[Path]:
     """Write the parameter file for the nodes of arm_servo.
 
-    Args:
-        robot: A robot with an SRDF and limits.
-        folder: Where to.
-        ros: Options of all nodes.
-        groups: Its groups that are moved.
-
     Returns:
         The files to hand over.
     """
@@ -80,12 +74,6 @@ def planning_files(
 ) -> Sequence[Path]:
     """Write the parameter files of :func:`motion_files`, and that of move_group's controllers.
 
-    Args:
-        robot: A robot with an SRDF and limits.
-        folder: Where to.
-        ros: Options of all nodes.
-        groups: Its groups that are moved.
-
     Raises:
         RobotError: A group is not in the description, or a file cannot be read.
     """
@@ -112,10 +100,6 @@ def gripper_action(joints: Sequence[str]) -> str:
 def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
     """Return the name of each group's controller; controllers.yaml may name that of the first.
 
-    Args:
-        robot: A robot with an SRDF.
-        groups: Its groups that are moved.
-
     Raises:
         RobotError: A file cannot be read as what it should be.
     """
@@ -131,10 +115,6 @@ def controller_names(robot: Robot, groups: MovedGroups) -> dict[str, str]:
 
 def choose_master(robot: Robot, find: FindExecutable) -> tuple[Executable, str]:
     """Choose what runs the bus.
-
-    Args:
-        robot: The robot.
-        find: Finds executables.
 
     Returns:
         The executable, and in words why it offers no motion; empty when it does.

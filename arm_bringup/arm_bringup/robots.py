@@ -112,20 +112,12 @@ def installed_robots_folder() -> Path:
 
 
 def robot_names(folder: Path) -> list[str]:
-    """List the robots of a folder.
-
-    Args:
-        folder: A folder with one folder per robot.
-    """
+    """List the robots of a folder."""
     return sorted(config.parent.name for config in folder.glob(f'*/{BUS_CONFIG}'))
 
 
 def find_robot(wanted: str, folder: Path) -> Robot:
-    """Find a robot by name or path.
-
-    Args:
-        wanted: Name of a robot in ``folder``, or path of a robot folder (it has a slash).
-        folder: A folder with one folder per robot.
+    """Find a robot by its name in a folder of robots, or by a path, which has a slash.
 
     Returns:
         The robot, its files checked to be there.

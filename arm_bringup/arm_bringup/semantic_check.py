@@ -16,11 +16,7 @@ from .robots import Robot
 
 
 def srdf_command(robot: Robot) -> str:
-    """Return the command that makes or completes the SRDF of a robot.
-
-    Args:
-        robot: The robot.
-    """
+    """Return the command that makes or completes the SRDF of a robot."""
     return f'ros2 run arm_planning srdf {robot.folder}/ --output {robot.semantic}'
 
 
@@ -28,10 +24,6 @@ def check_semantic(
     robot: Robot, tree: KinematicTree
 ) -> tuple[list[Finding], SemanticDescription | None]:
     """Compare the SRDF of a robot with its description.
-
-    Args:
-        robot: The robot; its SRDF exists.
-        tree: Its description.
 
     Returns:
         What is wrong, and the SRDF where all names in its groups are those of the description.

@@ -18,22 +18,12 @@ class ServiceClient(GraphClient):
     """A node of its own; use it in one thread."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
-        """Join the ROS graph.
-
-        Args:
-            name: Name of the node.
-            given_up: True when nothing shall be waited for any more.
-            namespace: That of the arm.
-        """
+        """Join the ROS graph."""
         super().__init__(name, given_up, namespace)
         self._clients: dict[str, Any] = {}
 
     def prepare(self, services: Iterable[str]) -> None:
-        """Look for services that will be called, so that they are known when they are needed.
-
-        Args:
-            services: Their names, all of type std_srvs/Trigger.
-        """
+        """Look for services that will be called, so that they are known when they are needed."""
         for name in services:
             self._clients[name] = self.node.create_client(Trigger, name)
 

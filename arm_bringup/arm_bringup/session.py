@@ -67,12 +67,7 @@ class Session:
 
 
 def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
-    """Declare the arguments that bring-up and demo share.
-
-    Args:
-        parser: Where to.
-        default_bus: What the help says of the bus without --can.
-    """
+    """Declare the arguments that bring-up and demo share."""
     add_robot(parser)
     parser.add_argument(
         '--can',
@@ -87,11 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser, *, default_bus: str) -> None:
 
 
 def add_robot(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments that say which robot; for :func:`locate`.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare the arguments that say which robot; for :func:`locate`."""
     parser.add_argument(
         'robot',
         help='name of a robot, or path of a robot folder (with a slash, e.g. ./my_arm)',
@@ -154,13 +145,7 @@ def locate(arguments: argparse.Namespace) -> Robot:
 
 
 def no_files(robot: Robot, folder: Path, ros: RosOptions) -> Sequence[Path]:
-    """Make no parameter files; for :func:`session`.
-
-    Args:
-        robot: The robot.
-        folder: Where files would go.
-        ros: Options of all nodes.
-    """
+    """Make no parameter files; for :func:`session`."""
     del robot, folder, ros
     return ()
 

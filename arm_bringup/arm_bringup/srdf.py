@@ -20,11 +20,7 @@ MIN_SAMPLES = 1000
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Parse the command line.
-
-    Args:
-        argv: Arguments without the program's name.
-    """
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         prog='ros2 run arm_planning srdf',
         description='Make the SRDF of a robot folder, a URDF or a xacro file: groups from chains, '
@@ -49,9 +45,6 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the SRDF.
-
-    Args:
-        argv: Arguments without the program's name; None takes those of the process.
 
     Returns:
         0, or 2 when there is no such robot or it cannot be used.

@@ -68,11 +68,6 @@ class Stack:
 def arm_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
     """Return the processes that make an arm; they start side by side.
 
-    Args:
-        stack: What is to be brought up.
-        parameters: The file of :func:`process_supervisor.write_parameters`.
-        find: Finds executables.
-
     Raises:
         StartError: An executable is missing.
     """
@@ -113,13 +108,6 @@ def controller_process(
     ros: RosOptions,
 ) -> ProcessSpec:
     """Return the process that moves drives of another process; that one makes /tf, too.
-
-    Args:
-        files: Parameter files of the nodes that move the arm.
-        parameters: The file of :func:`process_supervisor.write_parameters`.
-        ready_timeout: How long it may take to be ready in [s].
-        find: Finds executables.
-        ros: Options of all nodes.
 
     Raises:
         StartError: An executable is missing.

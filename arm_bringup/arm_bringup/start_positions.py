@@ -48,11 +48,6 @@ def start_positions(robot: Robot, urdf: str, drives: Sequence[str]) -> StartPosi
     What robot.yaml says counts. Otherwise a group that cannot stand at 0 starts from its start
     pose, and another drive that cannot from the middle of its range.
 
-    Args:
-        robot: The robot.
-        urdf: Its description.
-        drives: Names of its drives.
-
     Raises:
         RobotError: robot.yaml names something that is no drive, or no pose is found.
     """

@@ -26,13 +26,7 @@ class ModeClient(GraphClient):
     """A node of its own; use it in one thread."""
 
     def __init__(self, name: str, given_up: Callable[[], bool], namespace: str = '') -> None:
-        """Join the ROS graph.
-
-        Args:
-            name: Name of the node.
-            given_up: True when nothing shall be waited for any more.
-            namespace: That of the robot.
-        """
+        """Join the ROS graph."""
         super().__init__(name, given_up, namespace)
         self._state = ''
         self._modes = self.node.create_client(SetMode, 'set_mode')

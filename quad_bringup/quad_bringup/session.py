@@ -56,11 +56,7 @@ class Session:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments that bring-up and demo share.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare the arguments that bring-up and demo share."""
     parser.add_argument(
         '--preset',
         choices=PRESETS,

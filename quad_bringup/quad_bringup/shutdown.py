@@ -49,12 +49,7 @@ MakeClient = Callable[[Callable[[], bool]], Client]
 
 
 def join_ros(given_up: Callable[[], bool], namespace: str = '') -> Client:
-    """Make the client; rclpy is loaded only now, a bring-up does not need it.
-
-    Args:
-        given_up: True when nothing shall be waited for any more.
-        namespace: That of the robot.
-    """
+    """Make the client; rclpy is loaded only now, a bring-up does not need it."""
     from .mode_client import ModeClient
 
     return ModeClient('quad_bringup', given_up, namespace)
@@ -63,26 +58,14 @@ def join_ros(given_up: Callable[[], bool], namespace: str = '') -> Client:
 def lie_down(
     report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
 ) -> None:
-    """Let the robot lie down, if it is on its feet; a controller that does not help is left.
-
-    Args:
-        report: Takes what the user shall read.
-        given_up: True when it is no longer wanted.
-        make_client: Joins the ROS graph.
-    """
+    """Let the robot lie down, if it is on its feet; a controller that does not help is left."""
     _leave(_lie_down, 'lying down', report, make_client(given_up))
 
 
 def stand_still(
     report: Callable[[str], None], given_up: Callable[[], bool], make_client: MakeClient = join_ros
 ) -> None:
-    """Let the robot end its gait, if it walks, so that it is left standing on all its feet.
-
-    Args:
-        report: Takes what the user shall read.
-        given_up: True when it is no longer wanted.
-        make_client: Joins the ROS graph.
-    """
+    """Let the robot end its gait, if it walks, so that it is left standing on all its feet."""
     _leave(_stand_still, 'standing still', report, make_client(given_up))
 
 

@@ -64,11 +64,6 @@ class Stack:
 def quad_processes(stack: Stack, parameters: Path, find: FindExecutable) -> list[ProcessSpec]:
     """Return the processes that make a quadruped; they start side by side.
 
-    Args:
-        stack: What is to be brought up.
-        parameters: A ROS parameter file with the robot description.
-        find: Finds executables.
-
     Raises:
         StartError: An executable is missing.
     """

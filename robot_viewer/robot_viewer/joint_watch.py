@@ -19,12 +19,7 @@ class JointWatch:
     """Compares the joints of a description with those of the messages; reports each once."""
 
     def __init__(self, model: KinematicTree, now: float) -> None:
-        """Begin to watch.
-
-        Args:
-            model: The robot.
-            now: Steady time in [s].
-        """
+        """Begin to watch."""
         self._silent = {joint.name for joint in model.movable() if joint.mimic is None}
         self._known = {joint.name for joint in model.joints}
         self._unknown: set[str] = set()
@@ -35,23 +30,13 @@ class JointWatch:
         self._publisher_due = math.inf
 
     def take(self, names: Iterable[str]) -> None:
-        """Take in the names of a message.
-
-        Args:
-            names: Names of joints.
-        """
+        """Take in the names of a message."""
         self._received = True
         self._silent.difference_update(names)
         self._unknown.update(name for name in names if name not in self._known)
 
     def notes(self, now: float, topic: str, publishers: int) -> list[str]:
-        """Return what is not wrong yet and was not reported yet: nobody publishes so far.
-
-        Args:
-            now: Steady time in [s].
-            topic: Name of the topic, for the message.
-            publishers: How many it has.
-        """
+        """Return what is not wrong yet and was not reported yet: nobody publishes so far."""
         waits = self._silent and not self._received and not publishers
         return self._once(
             f'no message on {topic} yet, as nobody publishes it: fine while the robot starts; '
@@ -61,13 +46,7 @@ class JointWatch:
         )
 
     def warnings(self, now: float, topic: str, publishers: int) -> list[str]:
-        """Return what is wrong and was not reported yet.
-
-        Args:
-            now: Steady time in [s].
-            topic: Name of the topic, for the message.
-            publishers: How many it has.
-        """
+        """Return what is wrong and was not reported yet."""
         if not self._received:
             return self._silence(now, topic, publishers)
         if now < self._due:

@@ -19,12 +19,7 @@ from urdf_reader import (
 
 
 def compose(parent: Transform, child: Transform) -> Transform:
-    """Return the pose of what is in a frame that is in another one.
-
-    Args:
-        parent: Pose of the frame.
-        child: Pose in that frame.
-    """
+    """Return the pose of what is in a frame that is in another one."""
     x, y, z = rotate(parent.rotation, child.translation)
     a, b, c = parent.translation
     return Transform((a + x, b + y, c + z), multiply(parent.rotation, child.rotation))
@@ -118,12 +113,7 @@ def link_poses(tree: KinematicTree, positions: Mapping[str, float]) -> dict[str,
 
 
 def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
-    """Return a path of each link, below that of the link it hangs on; parents come first.
-
-    Args:
-        tree: The robot.
-        base: Path above the root link.
-    """
+    """Return a path of each link, below that of the link it hangs on; parents come first."""
     paths = {tree.root: f'{base}/{tree.root}'}
     waiting = list(tree.joints)
     while waiting:  # a joint may stand before the one that its parent hangs on
@@ -138,12 +128,7 @@ def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
 
 
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
-    """Return the links that joints move.
-
-    Args:
-        tree: The robot.
-        joints: Their names; those that follow one of them move along.
-    """
+    """Return the links that joints move."""
     moved: set[str] = set()
     found = True
     while found:

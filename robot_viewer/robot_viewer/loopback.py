@@ -13,11 +13,7 @@ ELSEWHERE = {socket.AF_INET: '192.0.2.1', socket.AF_INET6: '2001:db8::1'}
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host is reached from this computer only.
-
-    Args:
-        host: A name or an address, as a server is to be bound to.
-    """
+    """Whether a host is reached from this computer only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -25,11 +21,7 @@ def is_loopback(host: str) -> bool:
 
 
 def binding_problem(host: str) -> str:
-    """Return why nothing can be served at a host; empty where it can be.
-
-    Args:
-        host: A name or an address, as a server is to be bound to.
-    """
+    """Return why nothing can be served at a host; empty where it can be."""
     try:
         family, kind, _, _, address = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, kind) as server:

@@ -24,11 +24,7 @@ class Meshes:
     """Files of triangles, each of which is read once."""
 
     def __init__(self, folder: Path | None = None) -> None:
-        """Have none yet.
-
-        Args:
-            folder: That of the description, where names of files are relative.
-        """
+        """Have none yet."""
         self._folder = folder
         self._read: dict[Path, trimesh.Trimesh] = {}
 

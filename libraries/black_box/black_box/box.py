@@ -42,10 +42,6 @@ class Contents(Protocol):
     def save(self, folder: Path, pause: Pause) -> Path:
         """Write it; called in the thread of the black box.
 
-        Args:
-            folder: An empty folder.
-            pause: To be called after each small piece of work.
-
         Returns:
             The file that people want to open first.
 
@@ -111,21 +107,11 @@ class BlackBox:
             self._thread.join(CLOSE_TIMEOUT)
 
     def note(self, subject: str, text: str) -> None:
-        """Keep what was reported, for the report of a fault that comes later.
-
-        Args:
-            subject: Name of the device concerned; empty for none.
-            text: What was reported.
-        """
+        """Keep what was reported, for the report of a fault that comes later."""
         self._notes.append(_Note(time.monotonic(), subject, text))
 
     def fault(self, subject: str, text: str) -> None:
-        """Have a recording written for a fault; returns at once.
-
-        Args:
-            subject: Name of the device that has it; empty for none.
-            text: The fault in words.
-        """
+        """Have a recording written for a fault; returns at once."""
         note = _Note(time.monotonic(), subject, text)
         self._notes.append(note)
         self._faults.put(note)

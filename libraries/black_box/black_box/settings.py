@@ -44,9 +44,6 @@ def default_folder(environ: Mapping[str, str] = os.environ) -> Path:
     """Return the folder ``black_box`` beside the logs of ROS, wherever these go.
 
     That is ROS_LOG_DIR, or ``log`` in ROS_HOME, or ``~/.ros/log``, as rcl_logging has it.
-
-    Args:
-        environ: The environment.
     """
     if logs := environ.get('ROS_LOG_DIR'):
         return Path(logs).expanduser() / FOLDER

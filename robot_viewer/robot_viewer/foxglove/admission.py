@@ -37,21 +37,12 @@ class Admission:
 
     @classmethod
     def to(cls, address: str, origins: Iterable[str]) -> Admission:
-        """Make a token where one is needed.
-
-        Args:
-            address: What the server is bound to.
-            origins: Sites whose pages may connect, besides those of this host.
-        """
+        """Make a token where one is needed."""
         token = '' if is_loopback(address) else secrets.token_urlsafe(24)
         return cls(frozenset(origins), token)
 
     def refusal(self, head: bytes) -> str | None:
-        """Return why a request is refused; None when it is not.
-
-        Args:
-            head: Request line and headers, up to the empty line.
-        """
+        """Return why a request is refused; None when it is not."""
         line, _, rest = head.partition(b'\r\n')
         words = line.decode('latin-1').split(' ')
         try:

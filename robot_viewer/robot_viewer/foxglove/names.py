@@ -16,9 +16,6 @@ class NameFilter:
     def __init__(self, patterns: Iterable[str]) -> None:
         """Compile them.
 
-        Args:
-            patterns: Regular expressions.
-
         Raises:
             ValueError: One of them is none; the message has it and the reason.
         """

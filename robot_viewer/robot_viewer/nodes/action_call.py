@@ -18,13 +18,7 @@ class ActionCall:
     """A goal that may be canceled at any time, also before the server has answered."""
 
     def __init__(self, client: ActionClient, goal: Any, done: Done) -> None:  # noqa: ANN401
-        """Send it.
-
-        Args:
-            client: Of the action.
-            goal: What is asked for.
-            done: Called once in the executor of the node, canceled or not.
-        """
+        """Send it."""
         self._done, self._handle = done, None
         self._is_canceled = False
         client.send_goal_async(goal).add_done_callback(self._answered)

@@ -53,14 +53,6 @@ class Body:
     def __init__(
         self, node: Node, page: Page, listening: Listening, positions: Mapping[str, float]
     ) -> None:
-        """Find nothing yet.
-
-        Args:
-            node: The node of the page.
-            page: The page.
-            listening: Subscribes while somebody looks.
-            positions: Where the joints are in [rad], always the last ones.
-        """
         self._node, self._page = node, page
         self._listening, self._positions = listening, positions
         self._tree: KinematicTree | None = None

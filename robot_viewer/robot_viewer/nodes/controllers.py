@@ -102,13 +102,6 @@ class Controllers:
     """
 
     def __init__(self, node: Node, listening: Listening, report: Report) -> None:
-        """Find none yet.
-
-        Args:
-            node: The node of the page.
-            listening: Subscribes to their states while somebody looks.
-            report: Reports to people what became of a motion.
-        """
         self._node, self._listening, self._report = node, listening, report
         self.found: dict[str, Controller] = {}
         self.history = History()
@@ -119,11 +112,7 @@ class Controllers:
         return any(each.busy or each.wanted for each in self.found.values())
 
     def look(self, description: str) -> None:
-        """Find the controllers that there are.
-
-        Args:
-            description: Full name of the topic with the description of the robot.
-        """
+        """Find the controllers that there are."""
         topics = dict(self._node.get_topic_names_and_types())
         named = [
             name.removesuffix(STATE)
@@ -168,11 +157,7 @@ class Controllers:
             controller.wanted, controller.targets, controller.lets_go = None, {}, True
 
     def advance(self, velocities: Mapping[str, float]) -> None:
-        """Send what is wanted, and report what was reached.
-
-        Args:
-            velocities: Greatest velocity of each joint in [rad/s] or [m/s].
-        """
+        """Send what is wanted, and report what was reached."""
         now = time.monotonic()
         for controller in self.found.values():
             if controller.wanted is not None and controller.lets_go:

@@ -103,15 +103,6 @@ class FirstMotion:
         statuses: Mapping[str, Status],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        """Find no drive yet.
-
-        Args:
-            node: The node of the page.
-            page: The page.
-            positions: Where the joints are in [rad] or [m], always the last ones.
-            statuses: What came on /diagnostics, by name, always the last ones.
-            order: Has something done in the thread of the node.
-        """
         self._node, self._page, self._order = node, page, order
         self._positions, self._statuses = positions, statuses
         self._kinds: Mapping[str, JointKind] = {}
@@ -150,12 +141,7 @@ class FirstMotion:
         }
 
     def look(self, services: Mapping[str, Sequence[str]], drives: Collection[str]) -> None:
-        """Find the drives that say how they count.
-
-        Args:
-            services: All services of the graph, with their types.
-            drives: Names below which the drives of the robot have theirs.
-        """
+        """Find the drives that say how they count."""
         found = {
             drive.rpartition('/')[2]: drive
             for drive in sorted(drives)
@@ -275,13 +261,7 @@ class FirstMotion:
         self._call(kind, name, answered)
 
     def _call(self, kind: Any, name: str, answered: Callable[[Any, str], None]) -> None:  # noqa: ANN401
-        """Call a service of the drive.
-
-        Args:
-            kind: Its type.
-            name: Its name below the drive.
-            answered: Takes the response and, unless it is a success, why not.
-        """
+        """Call a service of the drive."""
         client = self._node.create_client(kind, f'{self._drives[self._request.joint]}/{name}')
 
         def done(future: Future) -> None:

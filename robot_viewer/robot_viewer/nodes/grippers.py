@@ -33,12 +33,6 @@ class Grippers:
     """Those of the robot of a node; everything in the thread of the node."""
 
     def __init__(self, node: Node, report: Report) -> None:
-        """Find none yet.
-
-        Args:
-            node: The node of the page.
-            report: Reports to people what became of a motion.
-        """
         self._node, self._report = node, report
         self._found: dict[str, _Gripper] = {}
         self._calls: dict[str, ActionCall] = {}
@@ -63,12 +57,7 @@ class Grippers:
     def look(
         self, services: Mapping[str, Sequence[str]], controllers: Mapping[str, Controller]
     ) -> None:
-        """Find those of one joint.
-
-        Args:
-            services: All services with their types.
-            controllers: Controllers of the robot, by the full name.
-        """
+        """Find those of one joint."""
         for service, kinds in services.items():
             action = service.removesuffix(SEND_GOAL)
             name = action.rpartition('/')[0]
@@ -85,12 +74,7 @@ class Grippers:
                 self._found[name] = _Gripper(client, controller.joints[0])
 
     def grip(self, name: str, *, opens: bool) -> None:
-        """Open or close one: to the greatest or the least position of its joint.
-
-        Args:
-            name: Full name of its controller.
-            opens: Open it.
-        """
+        """Open or close one: to the greatest or the least position of its joint."""
         gripper = self._found.get(name)
         what = f'{name}: {"open" if opens else "close"}'
         if gripper is None or not gripper.client.server_is_ready():

@@ -20,11 +20,6 @@ class Listening:
     """Subscribes to topics as long as somebody looks."""
 
     def __init__(self, node: Node) -> None:
-        """Listen to nothing.
-
-        Args:
-            node: The node whose subscriptions they are.
-        """
         self._node = node
         self._makers: list[Callable[[], Subscription]] = []
         self._made: list[Subscription] = []
@@ -37,26 +32,14 @@ class Listening:
         take: Callable[[Any], None],
         qos: QoSProfile | int,
     ) -> None:
-        """Have messages of a topic taken while somebody looks.
-
-        Args:
-            kind: Type of the messages.
-            topic: Its name.
-            take: Takes each of them.
-            qos: Of the subscription.
-        """
+        """Have messages of a topic taken while somebody looks."""
         maker = partial(self._node.create_subscription, kind, topic, take, qos)
         self._makers.append(maker)
         if self._made:
             self._made.append(maker())
 
     def update(self, now: float, *, looked_at: bool) -> bool:
-        """Begin or end; return whether it has just begun.
-
-        Args:
-            now: Steady time in [s].
-            looked_at: Somebody looks, or waits for something.
-        """
+        """Begin or end; return whether it has just begun."""
         if looked_at:
             self._last_look = now
             begins = not self._made

@@ -89,14 +89,7 @@ class MotionPlanning:
         positions: Mapping[str, float],
         order: Callable[[Callable[[], None]], None],
     ) -> None:
-        """Find no move_group yet.
-
-        Args:
-            node: The node of the page.
-            page: The page.
-            positions: Where the joints are in [rad] or [m], always the last ones.
-            order: Has something done in the thread of the node.
-        """
+        """Find no move_group yet."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
         self._links: _Links | None = None
         self._tree: KinematicTree | None = None
@@ -124,11 +117,7 @@ class MotionPlanning:
         self._drop()
 
     def look(self, services: Mapping[str, Sequence[str]]) -> None:
-        """Find a move_group in the namespace of the node.
-
-        Args:
-            services: All services with their types.
-        """
+        """Find a move_group in the namespace of the node."""
         there = all(
             kind in services.get(self._node.resolve_service_name(name), ())
             for name, kind in OFFERED.items()
@@ -173,11 +162,7 @@ class MotionPlanning:
     # -- what people do
 
     def take(self, request: PlanRequest) -> None:
-        """Do what people ask for.
-
-        Args:
-            request: What.
-        """
+        """Do what people ask for."""
         if self._panel is None:
             return
         match request:

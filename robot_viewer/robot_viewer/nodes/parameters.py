@@ -22,10 +22,6 @@ DEFAULTS = Settings()
 def declare(node: Node, description: str = '') -> None:
     """Declare all parameters.
 
-    Args:
-        node: The node.
-        description: Default of robot_description.
-
     Raises:
         ParameterError: A value is not usable, or a name is misspelt.
     """
@@ -47,11 +43,7 @@ def declare(node: Node, description: str = '') -> None:
 
 
 def read_settings(node: Node) -> Settings:
-    """Read all but the description.
-
-    Args:
-        node: A node that has declared them.
-    """
+    """Read all but the description."""
     return Settings(
         node.get_parameter('publish_frequency').value,
         node.get_parameter('frame_prefix').value,
@@ -60,11 +52,7 @@ def read_settings(node: Node) -> Settings:
 
 
 def check(parameters: Iterable[Parameter]) -> SetParametersResult:
-    """Refuse a description that cannot be used; ranges are rclpy's to check.
-
-    Args:
-        parameters: About to be set.
-    """
+    """Refuse a description that cannot be used; ranges are rclpy's to check."""
     for parameter in parameters:
         if parameter.name == DESCRIPTION:
             try:

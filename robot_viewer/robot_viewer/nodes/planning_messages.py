@@ -108,22 +108,13 @@ def ik_request(
 
 
 def positions_of(state: Message, group: PlanGroup) -> dict[str, float]:
-    """Return the positions of a group in a moveit_msgs/RobotState.
-
-    Args:
-        state: The state.
-        group: The group.
-    """
+    """Return the positions of a group in a moveit_msgs/RobotState."""
     positions = dict(zip(state.joint_state.name, state.joint_state.position, strict=False))
     return {name: positions[name] for name in group.joints if name in positions}
 
 
 def planned_motion(trajectory: Message) -> PlannedMotion:
-    """Return the motion of a moveit_msgs/RobotTrajectory.
-
-    Args:
-        trajectory: The trajectory.
-    """
+    """Return the motion of a moveit_msgs/RobotTrajectory."""
     joints = trajectory.joint_trajectory
     times = (p.time_from_start.sec + 1e-9 * p.time_from_start.nanosec for p in joints.points)
     points = (tuple(map(float, point.positions)) for point in joints.points)
@@ -131,11 +122,7 @@ def planned_motion(trajectory: Message) -> PlannedMotion:
 
 
 def refusal(error_code: Message) -> str:
-    """Return why something was refused, in words; empty where it was not.
-
-    Args:
-        error_code: A moveit_msgs/MoveItErrorCodes.
-    """
+    """Return why something was refused, in words; empty where it was not."""
     kind = type(error_code)
     if error_code.val == kind.SUCCESS:
         return ''
@@ -167,23 +154,14 @@ def box_message(
 
 
 def moved_message(thing: SceneObject, pose: Transform) -> Message:
-    """Return a scene in which an object is elsewhere.
-
-    Args:
-        thing: The object.
-        pose: Where, in its frame.
-    """
+    """Return a scene in which an object is elsewhere."""
     kind = import_module('moveit_msgs.msg').CollisionObject
     header = Header(frame_id=thing.frame)
     return _change(kind(header=header, id=thing.name, pose=pose_message(pose)), kind.MOVE)
 
 
 def removed_message(thing: SceneObject) -> Message:
-    """Return a scene without an object.
-
-    Args:
-        thing: The object.
-    """
+    """Return a scene without an object."""
     kind = import_module('moveit_msgs.msg').CollisionObject
     return _change(kind(header=Header(frame_id=thing.frame), id=thing.name), kind.REMOVE)
 
@@ -197,12 +175,7 @@ def _change(thing: Message, operation: bytes) -> Message:
 
 
 def changed(objects: Mapping[str, SceneObject], scene: Message) -> dict[str, SceneObject]:
-    """Return the objects after a moveit_msgs/PlanningScene, which is whole or a change.
-
-    Args:
-        objects: Those before, by name.
-        scene: The message.
-    """
+    """Return the objects after a moveit_msgs/PlanningScene, which is whole or a change."""
     kind = import_module('moveit_msgs.msg').CollisionObject
     kept = dict(objects) if scene.is_diff else {}
     for message in scene.world.collision_objects:
@@ -268,10 +241,6 @@ def _transform(pose: Pose) -> Transform:
 
 
 def pose_message(pose: Transform) -> Pose:
-    """Return a geometry_msgs/Pose.
-
-    Args:
-        pose: The pose.
-    """
+    """Return a geometry_msgs/Pose."""
     (x, y, z), (a, b, c, d) = pose.translation, pose.rotation
     return Pose(position=Point(x=x, y=y, z=z), orientation=Quaternion(x=a, y=b, z=c, w=d))

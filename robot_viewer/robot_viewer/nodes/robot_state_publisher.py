@@ -41,9 +41,6 @@ class RobotStatePublisher(Node):
     def __init__(self, description: str = '') -> None:
         """Publish what does not move, and subscribe.
 
-        Args:
-            description: URDF to be used when the parameter robot_description is not given.
-
         Raises:
             ParameterError: A parameter is wrong, or there is no description.
             DescriptionError: The description cannot be used.

@@ -37,11 +37,6 @@ class SceneEditor:
     """What move_group has in its scene; everything in the thread of the node."""
 
     def __init__(self, node: Node) -> None:
-        """Show nothing yet.
-
-        Args:
-            node: The node of the page.
-        """
         self._node = node
         self._apply: Client | None = None
         self._whole: Client | None = None
@@ -62,22 +57,13 @@ class SceneEditor:
         node.create_subscription(scene, 'monitored_planning_scene', self._take, LATCHED)
 
     def show_on(self, panel: PlanPanel, root: str) -> None:
-        """Show the scene on a panel.
-
-        Args:
-            panel: Where to.
-            root: The root link, in whose frame boxes are added.
-        """
+        """Show the scene on a panel."""
         self._panel, self._root = panel, root
         self._show()
         self._ask()
 
     def take(self, request: PlanRequest) -> None:
-        """Do what people ask for; what is not of the scene is left.
-
-        Args:
-            request: What.
-        """
+        """Do what people ask for; what is not of the scene is left."""
         match request:
             case ChooseObject(name):
                 self._chosen, self._grips = name, False

@@ -19,34 +19,19 @@ class Border:
     """Where errors of what comes from ROS end: said once in a sentence, and all else goes on."""
 
     def __init__(self, node: Node, say: Callable[[str], None] = lambda _: None) -> None:
-        """Report nothing yet.
-
-        Args:
-            node: Whose log has the sentences.
-            say: Shows each of them elsewhere, too.
-        """
         self._node, self._say = node, say
         self._said: set[str] = set()
 
     @contextmanager
     def around(self, what: str) -> Iterator[None]:
-        """Report what the block raises, and go on behind it.
-
-        Args:
-            what: What is not shown or offered then.
-        """
+        """Report what the block raises, and go on behind it."""
         try:
             yield
         except Exception as error:  # noqa: BLE001  # whatever comes from ROS
             self.report(what, error)
 
     def report(self, what: str, error: Exception) -> None:
-        """Say an error, once.
-
-        Args:
-            what: What is not shown or offered.
-            error: Why.
-        """
+        """Say an error, once."""
         text = f'{what}: {_reason(error)}'
         if text in self._said:
             return
@@ -70,15 +55,7 @@ def serve(
     stop: threading.Event,
     border: Border | None = None,
 ) -> None:
-    """Serve a viewer until it is to end, and let its viewers go.
-
-    Args:
-        node: The viewer.
-        seen_at: Where the robot is seen, in words.
-        close: Lets them go.
-        stop: Ends it.
-        border: Where errors of its callbacks end; None for the log.
-    """
+    """Serve a viewer until it is to end, and let its viewers go."""
     border = border or Border(node)
     log_as(node)
     sys.stdout.write(f'{seen_at}\n')  # not into /rosout and bags: it may have a token

@@ -422,11 +422,7 @@ class WebViewer(Node):
         _StopCalls(counted, answer)
 
     def _doubtful_stops(self, services: Collection[str]) -> dict[str, list[str]]:
-        """Return those that are not a robot's own alone, with the other nodes that offer them.
-
-        Args:
-            services: Names of services that were called to stop a robot.
-        """
+        """Return those that are not a robot's own alone, with the other nodes that offer them."""
         own, others = set[str](), {service: list[str]() for service in services}
         for name, namespace in self.get_node_names_and_namespaces():
             node = f'{namespace.rstrip("/")}/{name}'
@@ -495,12 +491,7 @@ class _StopCalls:
         calls: Mapping[str, Future | None],
         answer: concurrent.futures.Future[StopAnswer],
     ) -> None:
-        """Wait for them; the first that fails is the answer.
-
-        Args:
-            calls: By service; None where it is not there.
-            answer: What is to be answered.
-        """
+        """Wait for them; the first that fails is the answer."""
         self._answer = answer
         self._open = {service for service, call in calls.items() if call is not None}
         self._texts: list[str] = []

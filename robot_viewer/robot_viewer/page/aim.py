@@ -81,13 +81,7 @@ class History:
     def add(
         self, targets: Mapping[str, float], positions: Mapping[str, float], now: float
     ) -> None:
-        """Take in where joints are; what comes too soon after the last is left out.
-
-        Args:
-            targets: Where they are to be.
-            positions: Where they are.
-            now: Steady time.
-        """
+        """Take in where joints are; what comes too soon after the last is left out."""
         for name in (each for each in targets if each in positions):
             samples = self._samples.setdefault(name, deque())
             if samples and now - samples[-1].time < STEP:

@@ -43,12 +43,6 @@ class BodyPanel:
     """Sliders of the body's pose, a horizon, and marks at the feet."""
 
     def __init__(self, server: ViserServer, path: str) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            path: Node of the root link.
-        """
         self._server, self._path = server, path
         gui = server.gui
         self._folder = gui.add_folder(None)
@@ -62,11 +56,7 @@ class BodyPanel:
         self._line: LineSegmentsHandle | None = None
 
     def offer_pose(self, send: Callable[[Pose], None]) -> None:
-        """Let people move the body.
-
-        Args:
-            send: Takes the pose, in any thread.
-        """
+        """Let people move the body."""
         if self._sliders:
             return
 
@@ -103,21 +93,12 @@ class BodyPanel:
             self._set_locked(locked=True)
 
     def show(self, html: str) -> None:
-        """Show attitude and battery.
-
-        Args:
-            html: Of them.
-        """
+        """Show attitude and battery."""
         if self._html.content != html:
             self._html.content = html
 
     def show_feet(self, places: Mapping[str, Vector], contacts: Contacts | None) -> None:
-        """Mark the feet.
-
-        Args:
-            places: Of all feet in the root link in [m].
-            contacts: Those on the ground; None where nobody says it.
-        """
+        """Mark the feet."""
         down = frozenset() if contacts is None else contacts.feet
         for foot, place in places.items():
             mark = self._feet.get(foot)
@@ -127,11 +108,7 @@ class BodyPanel:
             _paint(mark, DOWN_COLOR if foot in down else UP_COLOR)
 
     def show_support(self, support: Support) -> None:
-        """Draw on the ground what the feet span, and the place below the centre of mass.
-
-        Args:
-            support: What they span.
-        """
+        """Draw on the ground what the feet span, and the place below the centre of mass."""
         corners = np.array(support.corners, float).reshape(-1, 3)
         ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
         below, centre = support.below, support.centre

@@ -40,13 +40,7 @@ class Deadman:
         self._barred |= self._pressed
 
     def release(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Take note that a page has let go; return whether it was the one that holds.
-
-        Args:
-            page: Which page.
-            button: Which of its buttons.
-            now: Steady time in [s].
-        """
+        """Take note that a page has let go; return whether it was the one that holds."""
         press = page, button
         self._pressed.discard(press)
         self._barred.discard(press)
@@ -54,13 +48,7 @@ class Deadman:
         return page == self._holder
 
     def beat(self, page: Hashable, button: Hashable, now: float) -> bool:
-        """Take a heartbeat; return whether it counts.
-
-        Args:
-            page: Which page it is of.
-            button: Which of its buttons.
-            now: Steady time of its arrival in [s].
-        """
+        """Take a heartbeat; return whether it counts."""
         press = page, button
         if now - self._released.get(press, -math.inf) < LEAST_GAP:
             return False  # of the button that was let go; threads may have changed their order

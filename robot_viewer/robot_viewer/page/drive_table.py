@@ -27,13 +27,7 @@ BUS_ROWS = {'bus_load': 'bus load [%]', 'frames_lost': 'frames lost', 'jitter_p9
 
 
 def drive_html(message: str, values: Mapping[str, str], bus: Mapping[str, str]) -> str:
-    """Return the table of a drive; what is not reported, or empty, has no row.
-
-    Args:
-        message: Its state in words.
-        values: What its diagnostics have.
-        bus: What those of its bus have.
-    """
+    """Return the table of a drive; what is not reported, or empty, has no row."""
     shown = [(title, values.get(key, '')) for key, title in DRIVE_ROWS.items()]
     shown += [(title, bus.get(key, '')) for key, title in BUS_ROWS.items()]
     rows = ''.join(

@@ -60,12 +60,7 @@ class Saw(Enum):
     OTHER_JOINT = 'another joint moved'
 
     def seen(self, reported: float, distance: float) -> Seen:
-        """Return what that is for the judgement.
-
-        Args:
-            reported: What the drive reports, which is what the picture shows.
-            distance: How far about it was.
-        """
+        """Return what that is for the judgement."""
         if self in {Saw.NOTHING, Saw.OTHER_JOINT}:
             return Seen(0, other_joint=self is Saw.OTHER_JOINT)
         shown = 1 if reported >= 0.0 else -1
@@ -167,12 +162,6 @@ def motion_plan(
 ) -> MotionPlan:
     """Return the motion that was requested.
 
-    Args:
-        request: The request.
-        axis: How the joint counts.
-        start: Where it stands.
-        others: Where the other joints stand, as far as it is known.
-
     Raises:
         ValueError: A number of it is not finite, or nothing would move.
     """
@@ -201,12 +190,7 @@ class GuardedTargets:
     """
 
     def __init__(self, plan: MotionPlan, now: float) -> None:
-        """Begin at rest.
-
-        Args:
-            plan: The motion.
-            now: Time.
-        """
+        """Begin at rest."""
         self.guard = MotionGuard(plan, now)
         self._target = plan.start
         # a button counts as held until it has been silent for a while: heartbeats of one that was
@@ -233,12 +217,7 @@ class GuardedTargets:
         self._beat = -math.inf
 
     def step(self, now: float, sample: Sample) -> float | None:
-        """Return the next target; None to command nothing.
-
-        Args:
-            now: Time.
-            sample: What the drives report.
-        """
+        """Return the next target; None to command nothing."""
         held = now - self._beat < RELEASED_AFTER
         if self.guard.moving:
             sample = replace(sample, following_error=self._target - sample.position)
@@ -261,12 +240,7 @@ class GuardedTargets:
 
 
 def problem_of(drive: Mapping[str, str], age: float) -> str:
-    """Return why a drive cannot be moved, with the remedy; empty when it can.
-
-    Args:
-        drive: Values of its status in /diagnostics.
-        age: Of its position.
-    """
+    """Return why a drive cannot be moved, with the remedy; empty when it can."""
     if age > FRESHNESS:
         return NO_POSITION
     state, mode = drive.get('state', ''), drive.get('mode', '')

@@ -67,14 +67,6 @@ class FirstMotionPanel:
         actions: FirstMotionActions,
         hold: Hold,
     ) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            joints: What the joints do that can be moved.
-            actions: What people do.
-            hold: Adds a button to hold.
-        """
         self._joints, self._actions = joints, actions
         self._add_hold = partial(hold, HOLD, actions.beat, actions.release)
         self._hold: GuiButtonHandle | None = None  # while a motion is prepared
@@ -148,12 +140,7 @@ class FirstMotionPanel:
         self._note.content = _line(f'{state}: {way}', color)
 
     def ask(self, ended: str, reported: float) -> None:
-        """Ask what was seen of a motion that has ended.
-
-        Args:
-            ended: How it ended.
-            reported: How far the drive reports, in [rad] or [m].
-        """
+        """Ask what was seen of a motion that has ended."""
         kind = self._kind
         self._state.content = _line(
             f'{ended}; the drive reported {kind.shown(reported)}', PLAIN
@@ -176,13 +163,7 @@ class FirstMotionPanel:
         self._cause.visible = len(causes) > 1
 
     def show_correction(self, lines: str, notes: Sequence[str], *, writable: bool) -> None:
-        """Show what to write.
-
-        Args:
-            lines: Of bus.yml.
-            notes: What else to look at.
-            writable: The file can be changed from here.
-        """
+        """Show what to write."""
         self._lines.content = f'```yaml\n{lines}\n```'
         self._lines.visible = True
         self._write.visible = writable

@@ -49,23 +49,13 @@ class Gate:
     """
 
     def __init__(self, host: str, overlay: Overlay) -> None:
-        """Make a token where one is needed.
-
-        Args:
-            host: What the page is bound to.
-            overlay: What lies over the page for those who may open it.
-        """
+        """Make a token where one is needed."""
         self._overlay = overlay
         self.token = '' if is_loopback(host) else _lasting_token()
         self._serving = False
 
     def answer(self, path: str, headers: Headers) -> Response | None:
-        """Return why a request is refused, or what it needs first; None lets it through.
-
-        Args:
-            path: Path and query of the request.
-            headers: Its headers.
-        """
+        """Return why a request is refused, or what it needs first; None lets it through."""
         hosts = headers.get_all('Host')
         place = urlsplit(f'//{hosts[0]}') if len(hosts) == 1 else None
         if (

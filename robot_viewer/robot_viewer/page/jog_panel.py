@@ -77,14 +77,6 @@ class JogPanel:
     def __init__(
         self, server: ViserServer, tree: KinematicTree, jogged: Jogged, held: Held
     ) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            tree: The robot.
-            jogged: What is jogged.
-            held: Adds buttons that are held.
-        """
         self._gui, self._held, self._actions = server.gui, held, jogged.actions
         self._cells: dict[str, tuple[Joint, GuiHtmlHandle]] = {}
         movable = {joint.name: joint for joint in tree.movable()}
@@ -109,11 +101,7 @@ class JogPanel:
         self._folder.remove()
 
     def show(self, positions: Mapping[str, float]) -> None:
-        """Show where the joints are.
-
-        Args:
-            positions: In [rad] or [m] by name.
-        """
+        """Show where the joints are."""
         for name, (joint, html) in self._cells.items():
             content = _cell(joint, positions.get(name))
             if html.content != content:
@@ -152,12 +140,7 @@ class JogPanel:
 
 
 def tool_frames(tree: KinematicTree, joints: Sequence[str]) -> list[str]:
-    """Return the links that all of some joints in a row move, the nearest to them first.
-
-    Args:
-        tree: The robot.
-        joints: Those of an arm, from its base on; none gives none.
-    """
+    """Return the links that all of some joints in a row move, the nearest to them first."""
     moving = [joint for joint in tree.joints if joint.name in joints]
     if not moving:
         return []

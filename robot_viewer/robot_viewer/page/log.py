@@ -35,14 +35,7 @@ class Log:
         self._html: str | None = ''
 
     def add(self, at: float, who: str, text: str, color: str) -> None:
-        """Keep an entry.
-
-        Args:
-            at: Its time in [s] since the epoch.
-            who: Said it.
-            text: What.
-            color: Of the dot before it.
-        """
+        """Keep an entry."""
         self._html = None
         last = self._entries[-1] if self._entries else None
         if last is not None and (last.who, last.text) == (who, text):

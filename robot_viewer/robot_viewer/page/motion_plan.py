@@ -51,10 +51,6 @@ class PlanGroup:
 def plan_groups(tree: KinematicTree, semantic: str) -> dict[str, PlanGroup]:
     """Return the groups of an SRDF that can move, arms first.
 
-    Args:
-        tree: The robot.
-        semantic: The SRDF.
-
     Raises:
         DescriptionError: It is no SRDF, or none of its groups can move.
     """
@@ -124,14 +120,7 @@ class PlannedMotion:
 def tip_line(
     tree: KinematicTree, tip: str, beside: Mapping[str, float], motion: PlannedMotion
 ) -> list[Vector]:
-    """Return the places in the root link where a link passes, in [m].
-
-    Args:
-        tree: The robot.
-        tip: The link.
-        beside: Positions of the joints that do not move along.
-        motion: The motion.
-    """
+    """Return the places in the root link where a link passes, in [m]."""
     step = motion.duration / (LINE_POINTS - 1)
     return [
         link_pose(tree, tip, {**beside, **motion.at(number * step)}).translation
@@ -257,11 +246,7 @@ PlanRequest: TypeAlias = (
 
 
 def free_name(names: Sequence[str]) -> str:
-    """Return a name for one more box.
-
-    Args:
-        names: Those that are taken.
-    """
+    """Return a name for one more box."""
     number = 1
     while f'box{number}' in names:
         number += 1

@@ -46,21 +46,13 @@ class Overlay:
     """Answers requests for STOP, and adds itself to the page that viser serves."""
 
     def __init__(self, stop: Callable[[], Future[StopAnswer]]) -> None:
-        """Take what STOP does.
-
-        Args:
-            stop: Called in the thread of the server; it does not wait for the robot.
-        """
+        """Take what STOP does: in the thread of the server, without waiting for the robot."""
         self._stop = stop
         self._html = Path(__file__).with_name('overlay.html').read_bytes()
         self._page = b''
 
     async def answer(self, request: Request) -> Response | None:
-        """Return what the robot answers to a request for STOP; None for other requests.
-
-        Args:
-            request: One that may come in.
-        """
+        """Return what the robot answers to a request for STOP; None for other requests."""
         if request.path.partition('?')[0] != STOP_PATH:
             return None
         if STOP_HEADER not in request.headers:
@@ -75,9 +67,6 @@ class Overlay:
 
     def over(self, response: Response) -> Response:
         """Return a response with the overlay in it, if it is the page.
-
-        Args:
-            response: Of viser.
 
         Raises:
             RuntimeError: The page has no end; it would be without STOP.
@@ -102,13 +91,7 @@ class Overlay:
 def text_response(
     status: HTTPStatus, text: str, headers: Mapping[str, str] | None = None
 ) -> Response:
-    """Make a response of one line.
-
-    Args:
-        status: Its status.
-        text: The line.
-        headers: Others than those of the text.
-    """
+    """Make a response of one line."""
     body = f'{text}\n'.encode()
     own = {'Content-Type': 'text/plain; charset=utf-8', 'Content-Length': str(len(body))}
     return Response(status, status.phrase, Headers({**(headers or {}), **own}), body)

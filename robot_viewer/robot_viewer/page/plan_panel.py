@@ -70,15 +70,6 @@ class PlanPanel:
         groups: Sequence[str],
         ask: Callable[[PlanRequest], None],
     ) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            robot: In the scene.
-            tree: The same, as it is described.
-            groups: Names of the groups that can be planned for.
-            ask: Takes what people ask for, in any thread.
-        """
         self._server, self._robot, self._tree, self._ask = server, robot, tree, ask
         self._path = robot.path_of(tree.root)
         self._ghost: RobotScene | None = None
@@ -117,11 +108,7 @@ class PlanPanel:
     # -- what is shown
 
     def show_group(self, group: PlanGroup) -> None:
-        """Show which group is planned for, and its states.
-
-        Args:
-            group: The group.
-        """
+        """Show which group is planned for, and its states."""
         _choose(self._group, group.name)
         self._goal.options = (NO_GOAL, DRAGGED, *group.states)
         links = links_beyond(self._tree, frozenset(group.joints))
@@ -135,11 +122,7 @@ class PlanPanel:
         _choose(self._goal, name)
 
     def place_goal(self, pose: Transform | None) -> None:
-        """Let the goal be dragged from a pose.
-
-        Args:
-            pose: In the root link; None where there is no goal.
-        """
+        """Let the goal be dragged from a pose."""
         if pose is None:
             if self._goal_gizmo is not None:
                 self._goal_gizmo.visible = False
@@ -150,11 +133,7 @@ class PlanPanel:
         self._goal_gizmo.visible = True
 
     def show_ghost(self, positions: Mapping[str, float] | None) -> None:
-        """Show the robot where it is not.
-
-        Args:
-            positions: Of all joints in [rad] or [m]; None hides it.
-        """
+        """Show the robot where it is not."""
         if positions is None:
             if self._ghost is not None:
                 self._ghost.show(seen=False)
@@ -165,11 +144,7 @@ class PlanPanel:
         self._ghost.show(seen=True)
 
     def show_line(self, points: Sequence[Vector]) -> None:
-        """Draw where the tip passes.
-
-        Args:
-            points: In the root link in [m]; none for no line.
-        """
+        """Draw where the tip passes."""
         if self._line is not None:
             self._line.remove()
             self._line = None
@@ -184,12 +159,7 @@ class PlanPanel:
             )
 
     def say(self, text: str, *, failed: bool | None = None) -> None:
-        """Show what became of the last request.
-
-        Args:
-            text: In words.
-            failed: Whether it failed; None for something that goes on.
-        """
+        """Show what became of the last request."""
         if not text:
             self._outcome.content = ''
             return
@@ -205,23 +175,14 @@ class PlanPanel:
             button.disabled = not execute
 
     def show_objects(self, objects: Sequence[SceneObject]) -> None:
-        """Show what is in the planning scene.
-
-        Args:
-            objects: All of it.
-        """
+        """Show what is in the planning scene."""
         self._objects.show(objects)
         free = (NO_OBJECT, *(each.name for each in objects if not each.attached))
         if self._object.options != free:
             self._object.options = free
 
     def choose_object(self, name: str, thing: SceneObject | None) -> None:
-        """Show which object is chosen, and let it be dragged.
-
-        Args:
-            name: Of it.
-            thing: It, once it is in the planning scene.
-        """
+        """Show which object is chosen, and let it be dragged."""
         if name in self._object.options:
             _choose(self._object, name)
         self._remove.disabled = thing is None
@@ -236,12 +197,7 @@ class PlanPanel:
         put(self._object_gizmo, thing.pose)
 
     def move_object(self, name: str, pose: Transform) -> None:
-        """Show an object where it is dragged to.
-
-        Args:
-            name: Which.
-            pose: In its frame.
-        """
+        """Show an object where it is dragged to."""
         self._objects.move(name, pose)
 
     # -- what people do, in threads of the page

@@ -136,13 +136,6 @@ class RobotPage:
     """
 
     def __init__(self, host: str, port: int, actions: Actions) -> None:
-        """Serve it.
-
-        Args:
-            host: Name or address that it is bound to.
-            port: Port; the next free one is taken where it is in use.
-            actions: What people do on it.
-        """
         self._actions = actions
         self._deadman = Deadman()
         gate = Gate(host, Overlay(self._stop))
@@ -236,11 +229,7 @@ class RobotPage:
             self._jog.show(positions if age is not None and age < SILENCE else {})
 
     def show_silence(self, age: float | None) -> None:
-        """Say it in front of everything when nothing is received from the robot any more.
-
-        Args:
-            age: Of its joint states in [s]; None where none were expected.
-        """
+        """Say it in front of everything when nothing is received from the robot any more."""
         text = '' if age is None or age <= SILENCE else _line(SILENT.format(age), COLORS[2])
         if self._silence.content != text:
             self._silence.content = text
@@ -360,10 +349,6 @@ class RobotPage:
     ) -> PlanPanel | None:
         """Offer to plan motions, for the robot that is shown now.
 
-        Args:
-            groups: Names of the groups that can be planned for.
-            ask: Takes what people ask for, in any thread.
-
         Returns:
             Where to show what is planned; None as long as there is no robot.
         """
@@ -384,12 +369,7 @@ class RobotPage:
     def offer_first_motion(
         self, joints: Mapping[str, MotionKind], actions: FirstMotionActions
     ) -> FirstMotionPanel:
-        """Offer the first motion of joints, in the place of those before.
-
-        Args:
-            joints: What they do.
-            actions: What people do, in any thread.
-        """
+        """Offer the first motion of joints, in the place of those before."""
         if self._first_motion is not None:
             self._first_motion.remove()
         with self._tab('First motion'):
@@ -397,12 +377,7 @@ class RobotPage:
         return self._first_motion
 
     def offer_jog(self, joints: Sequence[str], grippers: Sequence[str]) -> None:
-        """Offer to jog the tool and joints as long as a button is held, and to move grippers.
-
-        Args:
-            joints: Those that are jogged, from the base on.
-            grippers: Names of their controllers.
-        """
+        """Offer to jog the tool and joints as long as a button is held, and to move grippers."""
         jogged = Jogged(tuple(joints), tuple(grippers), self._actions)
         if self._tree is None or (self._tree, jogged) == self._jogged:
             return
@@ -445,14 +420,7 @@ class RobotPage:
         self._log.add(time.time(), 'page', text, color)
 
     def log(self, at: float, who: str, text: str, *, failed: bool) -> None:
-        """Keep what a node of the robot said.
-
-        Args:
-            at: Its time in [s] since the epoch.
-            who: The node.
-            text: What it said.
-            failed: It is an error, else a warning.
-        """
+        """Keep what a node of the robot said."""
         self._log.add(at, who, text, COLORS[2 if failed else 1])
 
     def list_log(self) -> None:

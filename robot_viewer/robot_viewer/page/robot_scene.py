@@ -35,21 +35,12 @@ class Ground:
     """A grid that passes below a robot that goes somewhere, so that it stays in view."""
 
     def __init__(self, scene: SceneApi) -> None:
-        """Show it.
-
-        Args:
-            scene: Where to.
-        """
         self._grid = scene.add_grid(
             '/ground', cell_size=0.1, section_size=SECTION, width=4, height=4
         )
 
     def pass_below(self, pose: Transform) -> Transform:
-        """Move the ground; return where the root link is shown.
-
-        Args:
-            pose: Of the root link in the world.
-        """
+        """Move the ground; return where the root link is shown."""
         x, y, z = pose.translation
         self._grid.position = (-(x % SECTION), -(y % SECTION), 0.0)
         return Transform((0.0, 0.0, z), pose.rotation)
@@ -86,15 +77,7 @@ class RobotScene:
         look: Look | None = None,
         meshes: Meshes | None = None,
     ) -> None:
-        """Show the robot, each joint at zero or the limit next to it.
-
-        Args:
-            scene: Where to.
-            tree: The robot.
-            folder: That of the description, where names of mesh files are relative.
-            look: How; by default as it is described.
-            meshes: Those that were read before.
-        """
+        """Show the robot, each joint at zero or the limit next to it."""
         look = look or Look()
         self.notes: list[str] = []
         self._scene, self._tree = scene, tree
@@ -221,11 +204,7 @@ class RobotScene:
 
 
 def travel(joint: Joint) -> tuple[float, float]:
-    """Return how far a joint goes in [rad] or [m]; a turn where nothing ends it.
-
-    Args:
-        joint: A movable joint.
-    """
+    """Return how far a joint goes in [rad] or [m]; a turn where nothing ends it."""
     try:
         lower, upper = joint.range.lower, joint.range.upper
     except DescriptionError:
@@ -235,11 +214,7 @@ def travel(joint: Joint) -> tuple[float, float]:
 
 
 def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
-    """Return how fast joints may move in [rad/s] or [m/s], of those whose description says it.
-
-    Args:
-        tree: The robot.
-    """
+    """Return how fast joints may move in [rad/s] or [m/s], of those whose description says it."""
     found = {}
     for joint in tree.movable():
         try:
@@ -252,21 +227,12 @@ def greatest_velocities(tree: KinematicTree) -> dict[str, float]:
 
 
 def start_position(joint: Joint) -> float:
-    """Return the position of a joint in [rad] or [m] before anybody says it.
-
-    Args:
-        joint: A movable joint.
-    """
+    """Return the position of a joint in [rad] or [m] before anybody says it."""
     lower, upper = travel(joint)
     return min(max(0.0, lower), upper)
 
 
 def put(node: SceneNodeHandle, pose: Transform) -> None:
-    """Move a node of a scene.
-
-    Args:
-        node: Which.
-        pose: In its parent.
-    """
+    """Move a node of a scene."""
     x, y, z, w = pose.rotation
     node.position, node.wxyz = pose.translation, (w, x, y, z)

@@ -22,22 +22,13 @@ class SceneObjects:
     """Draws what has changed, and leaves the rest as it is."""
 
     def __init__(self, scene: SceneApi, path_of: Callable[[str], str]) -> None:
-        """Draw nothing yet.
-
-        Args:
-            scene: Where to.
-            path_of: Gives the node of a frame.
-        """
+        """Draw nothing yet."""
         self._scene, self._path_of = scene, path_of
         self._drawn: dict[str, tuple[SceneObject, FrameHandle]] = {}
         self._count = 0
 
     def show(self, objects: Iterable[SceneObject]) -> None:
-        """Draw these objects, and no others.
-
-        Args:
-            objects: All that there are.
-        """
+        """Draw these objects, and no others."""
         wanted = {each.name: each for each in objects}
         for name in set(self._drawn) - set(wanted):
             self._drawn.pop(name)[1].remove()

@@ -43,13 +43,6 @@ class TargetPanel:
     """
 
     def __init__(self, server: ViserServer, joints: Sequence[Joint], aim: Aim) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            joints: The joints that move together.
-            aim: Sends them somewhere.
-        """
         self._aim = aim
         self._touched = 0.0
         gui = server.gui
@@ -98,12 +91,6 @@ class PlotPanel:
     """Target, position and following error of one joint in the last half minute."""
 
     def __init__(self, server: ViserServer, joints: Sequence[str]) -> None:
-        """Add it to the tab that is open.
-
-        Args:
-            server: Of the page.
-            joints: Those that can be chosen.
-        """
         gui = server.gui
         self._joint: GuiDropdownHandle[str] = gui.add_dropdown('Joint', tuple(joints))
         times = {'x': uplot.Scale(time=False, auto=False, range=(-KEPT, 0.0))}
@@ -130,12 +117,7 @@ class PlotPanel:
         )
 
     def show(self, history: History, now: float) -> None:
-        """Draw the joint that is chosen.
-
-        Args:
-            history: What the joints did.
-            now: Steady time in [s].
-        """
+        """Draw the joint that is chosen."""
         samples = history.of(self._joint.value)
         if not samples:
             return

@@ -27,13 +27,6 @@ class ClientPublishers:
     """
 
     def __init__(self, node: Node, allowed: NameFilter, warn: Callable[[str], None]) -> None:
-        """Publish nothing yet.
-
-        Args:
-            node: Whose publishers they are.
-            allowed: Topics to which clients may publish.
-            warn: Takes what is refused, in words.
-        """
         self._node, self._allowed, self._warn = node, allowed, warn
         self._publishers: dict[tuple[int, int], Publisher] = {}
 

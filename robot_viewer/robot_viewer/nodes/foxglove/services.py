@@ -61,14 +61,6 @@ class Services:
         order: Callable[[Callable[[], None]], None],
         warn: Callable[[str], None],
     ) -> None:
-        """Offer nothing yet.
-
-        Args:
-            node: Whose clients they are.
-            shown: Names of services.
-            order: Has something done in the thread of the node.
-            warn: Takes what cannot be offered, in words.
-        """
         self._node, self._shown, self._order, self._warn = node, shown, order, warn
         self._types: dict[str, str] = {}
         self._refused: set[tuple[str, str]] = set()

@@ -51,14 +51,6 @@ class Topics:
     def __init__(
         self, node: Node, context: Context, shown: NameFilter, warn: Callable[[str], None]
     ) -> None:
-        """Offer nothing yet.
-
-        Args:
-            node: Whose subscriptions they are.
-            context: What the server publishes.
-            shown: Names of topics.
-            warn: Takes what cannot be shown, in words.
-        """
         self._node, self._context, self._shown, self._warn = node, context, shown, warn
         self._offered: dict[str, _Offered] = {}
         self._refused: set[tuple[str, str]] = set()
