@@ -240,7 +240,7 @@ def test_a_position_within_the_tolerance_is_taken(
     """Also by a coarse scale, and a part of an increment of a fine one; offsets count."""
     units = Units(DriveConfig(scale_pos_to_dev=scale, offset_pos_to_dev=offset))
     check_target(JOINT, POSITION, DriveParameters(), units, target - offset / scale)
-    assert units.position_to_device(target - offset / scale) == increments
+    assert units.position.to_device(target - offset / scale) == increments
 
 
 @pytest.mark.parametrize('mode', [VELOCITY, TORQUE])

@@ -46,7 +46,7 @@ class CyclicPosition(Mode):
     def preload(self, actual: Actual) -> Promise[None]:
         """Hold the actual position."""
         self._streamed = None
-        position = self._units.position_commanded(actual.position_inc)
+        position = self._units.position.commanded(actual.position_inc)
         self._profile = SetpointProfile(position, actual.velocity)
         return self._target.deliver(actual.position_inc)
 
@@ -88,7 +88,7 @@ class CyclicPosition(Mode):
 
     def _require_fitting(self, position: float) -> None:
         """Refuse now what could not be sent on arrival."""
-        fitting(self._target, self._units.position_to_device(position))
+        fitting(self._target, self._units.position.to_device(position))
 
     def step(self, now: float, period: float, statusword: int) -> int:
         """Write the streamed set-point, or the profile's; a stream that ends is braked."""
@@ -97,7 +97,7 @@ class CyclicPosition(Mode):
             self._streamed = None
         else:
             self._profile.step(period, self._limits())
-        self._target.write(self._units.position_to_device(self._profile.position))
+        self._target.write(self._units.position.to_device(self._profile.position))
         return self.bits
 
 

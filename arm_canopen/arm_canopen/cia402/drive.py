@@ -334,7 +334,7 @@ class Drive:
 
     def _watch_position(self, mode: CyclicPosition) -> None:
         view, setpoint = self.view, mode.setpoint
-        position = view.units.position_commanded(view.observed_inc)
+        position = view.units.position.commanded(view.observed_inc)
         shown = mode.number is OperationMode.CYCLIC_POSITION and bool(
             view.statusword & FOLLOWING_ERROR
         )

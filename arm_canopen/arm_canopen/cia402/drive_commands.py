@@ -164,11 +164,7 @@ class DriveCommands:
         return self._task if self._busy and self._running in self._stopping else None
 
     def set_target(self, target: float) -> str:
-        """Move to a position, at a velocity or with a torque, in the mode that is selected.
-
-        Raises:
-            DriveError: The drive cannot take it; the message has the reason.
-        """
+        """Move to a position, at a velocity or with a torque, in the mode that is selected."""
         mode = self.drive.control.mode
         self._set(mode.set_target, target)
         self._stream.interrupt('a single target')
@@ -255,11 +251,7 @@ class DriveCommands:
         return drive.describe()
 
     def stream_target(self, target: float) -> None:
-        """Take one of a stream of targets; when the stream pauses for too long, the drive stops.
-
-        Raises:
-            DriveError: The drive cannot take it; the message has the reason.
-        """
+        """Take one of a stream of targets; when the stream pauses for too long, the drive stops."""
         self._stream.admit()
         self._set(self.drive.control.mode.follow_target, target)
         self._stream.follow(self._delivery)

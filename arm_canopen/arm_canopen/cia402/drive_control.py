@@ -185,7 +185,7 @@ class DriveControl:
         held, actual = self.holding_mode, self._view.actual()
         if isinstance(held, CyclicPosition):
             # under load the drive is not quite where it is held, and would sag to where it is
-            position_inc = self._view.units.position_to_device(held.setpoint)
+            position_inc = self._view.units.position.to_device(held.setpoint)
             actual = actual._replace(position_inc=position_inc, velocity=held.velocity)
         return mode.preload(actual)
 
@@ -203,11 +203,7 @@ class DriveControl:
         self.halt.hold()
 
     def check_target(self, target: float) -> None:
-        """Refuse a target beyond the limits that the drive has in the selected mode.
-
-        Raises:
-            DriveError: It is beyond; the message names the limits.
-        """
+        """Refuse a target beyond the limits that the drive has in the selected mode."""
         view = self._view
         check_target(
             view.name, self.mode, view.parameters, view.units, target, position=view.position

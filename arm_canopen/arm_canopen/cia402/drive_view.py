@@ -158,18 +158,18 @@ class DriveView:
         position_inc = None if self._looks else self.objects.position
         if position_inc is None:
             return self.observed
-        return self.units.position_from_device(position_inc)
+        return self.units.position.from_device(position_inc)
 
     @property
     def velocity(self) -> float:
         """Actual velocity in user units per second; from the positions where no PDO has it."""
         reported = None if self._looks else self.objects.velocity
-        return self.rate if reported is None else self.units.velocity_from_device(reported)
+        return self.rate if reported is None else self.units.velocity.from_device(reported)
 
     @property
     def rate(self) -> float:
         """Rate of the actual position in user units per second, a few cycles late."""
-        return self.units.rate_from_device(self._estimate.rate)
+        return self.units.distance.from_device(self._estimate.rate)
 
     @property
     def speed(self) -> float:
@@ -201,14 +201,14 @@ class DriveView:
         By its own limits, and not below what its encoder resolves.
         """
         profile, units = self.parameters.profile, self.units
-        noise = abs(units.rate_from_device(NOISE_DEV / self._estimate.window))
+        noise = abs(units.distance.from_device(NOISE_DEV / self._estimate.window))
         slow = min(REST_SHARE * profile.velocity, REST_TIME * profile.deceleration)
         return max(slow, noise)
 
     @property
     def effort(self) -> float:
         """Actual torque in user units."""
-        return self.units.effort_from_device(self.objects.torque)
+        return self.units.effort.from_device(self.objects.torque)
 
     @property
     def ready(self) -> bool:
@@ -273,7 +273,7 @@ class DriveView:
             self.state, self.statusword = DriveState.UNKNOWN, 0
             return
         word, self.observed_inc = shown
-        self.observed = self.units.position_from_device(self.observed_inc)
+        self.observed = self.units.position.from_device(self.observed_inc)
         if word != self.statusword or self.state is DriveState.UNKNOWN:
             self.state, self.statusword = drive_state(word), word
 
@@ -327,9 +327,9 @@ class DriveView:
         """
         objects = self.objects
         velocity, reported = self.rate, objects.velocity
-        velocity_dev = self.units.velocity_raw(velocity)
+        velocity_dev = self.units.velocity.raw(velocity)
         if reported is not None:
-            shown = self.units.velocity_from_device(reported)
+            shown = self.units.velocity.from_device(reported)
             share = 0.0 if shown * velocity <= 0.0 else min(1.0, velocity / shown)
             velocity, velocity_dev = share * shown, share * reported
         return Actual(

@@ -33,8 +33,8 @@ class FeedForward:
         Raises:
             DriveError: A value is not finite or does not fit its object; nothing is written.
         """
-        velocity_dev = self._units.velocity_to_device(setpoint.velocity)
-        torque_dev = self._units.effort_to_device(setpoint.effort)
+        velocity_dev = self._units.velocity.to_device(setpoint.velocity)
+        torque_dev = self._units.effort.to_device(setpoint.effort)
         for writer, value in ((self._velocity, velocity_dev), (self._torque, torque_dev)):
             if writer is not None:
                 fitting(writer, value)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from ..standard.drive import OperationMode
 from ..standard.objects import Index
@@ -16,7 +17,7 @@ from .parameters import DriveParameters
 from .position_modes import ProfilePosition
 from .rate_modes import CyclicTorque, CyclicVelocity, ProfileTorque, ProfileVelocity, Velocity
 from .target_offset import OFFSET_OBJECTS, OffsetTarget
-from .units import Units
+from .units import INT16_MAX, Units
 
 
 def build_modes(
@@ -60,13 +61,13 @@ def _profile_modes(
         yield ProfilePosition(units, position, warn, target_leads=leads)
     vl_target = objects.profile_target_writer(OperationMode.VELOCITY)
     if vl_target is not None:
-        yield Velocity(vl_target, units.vl_velocity_to_device)
+        yield Velocity(vl_target, partial(units.velocity.to_device, largest=INT16_MAX))
     velocity = target(OperationMode.PROFILE_VELOCITY, OperationMode.CYCLIC_VELOCITY)
     if velocity is not None:
-        yield ProfileVelocity(velocity, units.velocity_to_device)
+        yield ProfileVelocity(velocity, units.velocity.to_device)
     torque = target(OperationMode.PROFILE_TORQUE, OperationMode.CYCLIC_TORQUE)
     if torque is not None:
-        yield ProfileTorque(torque, units.effort_to_device)
+        yield ProfileTorque(torque, units.effort.to_device)
 
 
 def _cyclic_modes(
@@ -90,15 +91,15 @@ def _cyclic_modes(
     if velocity is not None:
         yield CyclicVelocity(
             velocity,
-            units.velocity_to_device,
-            units.velocity_commanded,
+            units.velocity.to_device,
+            units.velocity.commanded,
             lambda: parameters().profile.acceleration,
         )
     torque = target(OperationMode.CYCLIC_TORQUE)
     if torque is not None:
         yield CyclicTorque(
             torque,
-            units.effort_to_device,
-            units.effort_commanded,
+            units.effort.to_device,
+            units.effort.commanded,
             lambda: parameters().torque_slope,
         )

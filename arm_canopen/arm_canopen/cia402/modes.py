@@ -34,11 +34,7 @@ class Actual(NamedTuple):
 
 
 def fitting(target: Writer, value: int) -> int:
-    """Return a target in device units, if its object can hold it.
-
-    Raises:
-        DriveError: It cannot; the message names the limits.
-    """
+    """Return a target in device units, if its object can hold it."""
     low, high = target.limits
     if not low <= value <= high:
         raise DriveError(

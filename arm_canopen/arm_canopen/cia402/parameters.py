@@ -160,7 +160,7 @@ class ParameterCache:
         used = self._config.position_mode in (None, OperationMode.PROFILE_POSITION)
         if used and self.parameters.profile_velocity_inc == 0:
             self._warn('its profile velocity (0x6081) is 0: targets of mode 1 are refused')
-        scale = self._units.position_scale
+        scale = self._units.position.to_dev
         if self._config.scale_from_factor_group and is_coarse(scale):
             self._warn(
                 f'1.0 rad is {scale:g} increments by its factor group: targets between two of '
@@ -175,7 +175,7 @@ class ParameterCache:
         effort = await self._read(Index.MAX_TORQUE)
         window = await self._read(Index.FOLLOWING_ERROR_WINDOW)
         speed = await self._read(Index.MAX_PROFILE_VELOCITY)
-        speed_limit = abs(units.velocity_commanded(speed)) if speed else None
+        speed_limit = abs(units.velocity.commanded(speed)) if speed else None
         position_limits = await self._position_limits()
         profile = await self._profile(speed_limit, position_limits)
         quick_stop = await self._read(Index.QUICK_STOP_DECELERATION)
@@ -184,11 +184,11 @@ class ParameterCache:
             homing_method=await self._read(Index.HOMING_METHOD) or 0,
             position_limits=position_limits,
             speed_limit=speed_limit,
-            effort_limit=abs(units.effort_commanded(effort)) if effort else None,
+            effort_limit=abs(units.effort.commanded(effort)) if effort else None,
             following_window=self._following_window(window),
             profile=profile,
             quick_stop_deceleration=self._acceleration(quick_stop, profile.deceleration),
-            torque_slope=abs(units.effort_commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
+            torque_slope=abs(units.effort.commanded(slope or DEFAULT_TORQUE_SLOPE_DEV)),
             profile_velocity_inc=await self._profile_velocity(),
             offsets={index: await self._read(index) or 0 for index in OFFSET_OBJECTS.values()},
             units=self._units_from,
@@ -208,14 +208,14 @@ class ParameterCache:
         upper = await self._read(Index.SOFTWARE_POSITION_LIMIT, 2)
         if lower is None or upper is None or lower >= upper:
             return None
-        convert = self._units.position_commanded  # as targets go, which they are limits of
+        convert = self._units.position.commanded  # as targets go, which they are limits of
         ends = sorted((convert(lower), convert(upper)))
         return ends[0], ends[1]
 
     def _following_window(self, window: int | None) -> float | None:
         if window is None or window in NO_WINDOW:
             return None
-        return abs(window / self._units.position_scale)
+        return abs(window / self._units.position.to_dev)
 
     async def _profile(
         self, speed_limit: float | None, position_limits: tuple[float, float] | None
@@ -225,7 +225,7 @@ class ParameterCache:
         acceleration = await self._read(Index.PROFILE_ACCELERATION)
         deceleration = await self._read(Index.PROFILE_DECELERATION)
         if velocity_dev:
-            velocity = abs(self._units.velocity_commanded(velocity_dev))
+            velocity = abs(self._units.velocity.commanded(velocity_dev))
         elif speed_limit is not None:
             velocity = SPEED_SHARE * speed_limit
         elif position_limits is not None:
@@ -242,7 +242,7 @@ class ParameterCache:
 
     def _acceleration(self, value: int | None, default: float) -> float:
         """Convert an acceleration to user units; a drive without it has the default."""
-        return abs(self._units.acceleration_from_device(value)) if value else default
+        return abs(self._units.acceleration.from_device(value)) if value else default
 
     async def _read_units(self) -> str:
         """Take the units of the factor group (CiA 402-2, clause 8); report where they are from."""

@@ -149,7 +149,7 @@ class ProfilePosition(Mode):
         """Write the actual position as the target, without announcing it."""
         self._forget()
         self._bits = CHANGE_IMMEDIATELY
-        self._setpoint = self._reference = self._units.position_commanded(actual.position_inc)
+        self._setpoint = self._reference = self._units.position.commanded(actual.position_inc)
         return self._target.deliver(actual.position_inc)
 
     def brake(self) -> None:
@@ -187,8 +187,8 @@ class ProfilePosition(Mode):
             DriveError: The value does not fit 0x607A, too many moves wait, or it is relative and
                 there is nothing to count from.
         """
-        to_device = self._units.distance_to_device if move.relative else None
-        value = fitting(self._target, (to_device or self._units.position_to_device)(move.target))
+        to_device = self._units.distance.to_device if move.relative else None
+        value = fitting(self._target, (to_device or self._units.position.to_device)(move.target))
         waiting = Waiting(value, move, self.destination(move))
         if move.immediate and not move.relative:
             waiting = replace(waiting, delivery=self._replaced())

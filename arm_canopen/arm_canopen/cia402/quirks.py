@@ -37,11 +37,7 @@ QUIRKS: dict[str, Quirks] = {
 
 
 def quirks_of(name: str) -> Quirks:
-    """Return the quirks of a name in bus.yml.
-
-    Raises:
-        DriveError: The name is unknown; the message lists those that exist.
-    """
+    """Return the quirks of a name in bus.yml."""
     try:
         return QUIRKS[name]
     except KeyError:

@@ -304,7 +304,7 @@ class DriveSequences:
         control.select(acting)
         actual = self.drive.view.actual()
         if isinstance(acting, ProfilePosition):
-            here = self.drive.view.units.position_commanded(actual.position_inc)
+            here = self.drive.view.units.position.commanded(actual.position_inc)
             delivery = acting.set_target(here)
         else:
             delivery = acting.preload(actual)

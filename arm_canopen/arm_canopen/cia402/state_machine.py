@@ -72,9 +72,6 @@ def next_command(state: DriveState, target: DriveState) -> Command:
 
     By the shortest way. In a fault, and where the drive goes on by itself, it is DISABLE_VOLTAGE:
     a fault is never left as a side effect of wanting another state, only by an explicit reset.
-
-    Raises:
-        ValueError: The target cannot be commanded.
     """
     if target not in TARGETS:
         raise ValueError(f'{target.title} cannot be commanded; possible: {TARGETS}')

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, fields
 
 from ..exceptions import CanopenError, DriveError
 from ..master.scheduler import Promise, Scheduler
@@ -38,15 +37,6 @@ class StopReport:
         return '. '.join(f'{what}: {names}' for what, names in named if names) or 'no drives'
 
 
-class _Outcome(Enum):
-    """What became of one drive; the attributes of a StopReport."""
-
-    STOPPED = 'stopped'
-    STANDING = 'standing'
-    UNPOWERED = 'unpowered'
-    FAILED = 'failed'
-
-
 async def stop_all(commands: Sequence[DriveCommands], scheduler: Scheduler) -> StopReport:
     """Halt all drives, whatever moves them, and wait until each stands or has no power.
 
@@ -54,11 +44,16 @@ async def stop_all(commands: Sequence[DriveCommands], scheduler: Scheduler) -> S
     """
     ends = [scheduler.spawn(_stopped(each, scheduler)) for each in commands]
     outcomes = [await end for end in ends]
-    return StopReport(*(tuple(text for is_, text in outcomes if is_ is each) for each in _Outcome))
+    return StopReport(
+        **{
+            each.name: tuple(text for outcome, text in outcomes if outcome == each.name)
+            for each in fields(StopReport)
+        }
+    )
 
 
-async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[_Outcome, str]:
-    """Halt a drive; return what became of it, and its name or why that is not known."""
+async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[str, str]:
+    """Halt a drive; return its field of StopReport, and its name or why that is not known."""
     view = commands.drive.view
     moved = not view.stands
     try:
@@ -69,12 +64,12 @@ async def _stopped(commands: DriveCommands, scheduler: Scheduler) -> tuple[_Outc
                 raise
         await _at_rest(commands, scheduler)
     except CanopenError as error:
-        return _Outcome.FAILED, str(error)
+        return 'failed', str(error)
     if view.state is DriveState.FAULT:  # its own reaction has ended its motion
-        return _Outcome.UNPOWERED, f'{view.name} (faulted)'
+        return 'unpowered', f'{view.name} (faulted)'
     if view.state not in POWERED:
-        return _Outcome.UNPOWERED, view.name
-    return _Outcome.STOPPED if moved else _Outcome.STANDING, view.name
+        return 'unpowered', view.name
+    return 'stopped' if moved else 'standing', view.name
 
 
 async def _to_its_end(halt: Promise[str], commands: DriveCommands, scheduler: Scheduler) -> None:

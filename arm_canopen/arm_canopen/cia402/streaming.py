@@ -34,11 +34,7 @@ class TargetStream:
         self._watch: Task[None] | None = None
 
     def admit(self) -> None:
-        """Take note of a target of a stream.
-
-        Raises:
-            DriveError: A command keeps streams out.
-        """
+        """Take note of a target of a stream."""
         self._came = self._scheduler.now
         if self._ended_by:
             raise DriveError(

@@ -34,11 +34,7 @@ def check_target(
     *,
     position: float = math.nan,
 ) -> None:
-    """Refuse a target that the drive would not go to: beyond its limits, or without any effect.
-
-    Raises:
-        DriveError: It is such a target; the message has the reason.
-    """
+    """Refuse a target that the drive would not go to: beyond its limits, or without any effect."""
     if mode.setpoint is not None:
         _check_position(name, parameters.position_limits, target, position)
         _check_rounding(name, units, target, parameters.position_limits)
@@ -51,7 +47,7 @@ def check_target(
         _check_size(name, parameters.speed_limit, target, 'velocity {:g} (0x607F)')
         _check_effect(
             name,
-            units.velocity_raw(target),
+            units.velocity.raw(target),
             target,
             'scale_vel_to_dev',
             NEGLIGIBLE * parameters.profile.velocity,
@@ -59,7 +55,7 @@ def check_target(
     elif mode.number in TORQUE_MODES:
         _check_size(name, parameters.effort_limit, target, 'torque {:g} (0x6072)')
         _check_effect(
-            name, units.effort_raw(target), target, 'scale_eff_to_dev', NEGLIGIBLE_EFFORT
+            name, units.effort.raw(target), target, 'scale_eff_to_dev', NEGLIGIBLE_EFFORT
         )
 
 
@@ -94,7 +90,10 @@ def _check_rounding(
     name: str, units: Units, target: float, limits: tuple[float, float] | None
 ) -> None:
     """Refuse a position that whole increments miss by more than the tolerance."""
-    nearest, tolerance = units.nearest_position(target), POSITION_TOLERANCE
+    increments, tolerance = units.position.raw(target), POSITION_TOLERANCE
+    nearest = target
+    if math.isfinite(increments):
+        nearest = units.position.commanded(round(increments))
     if limits is not None:
         tolerance = min(tolerance, RANGE_SHARE * (limits[1] - limits[0]))
     if abs(nearest - target) > tolerance:

@@ -18,116 +18,81 @@ def clamp(value: float, largest: int) -> int:
     return max(-largest - 1, min(largest, round(value)))
 
 
-class Units:
-    """Converts positions, velocities, accelerations and torques of one drive.
+class Scale:
+    """Converts one quantity of a drive.
 
-    To the device: ``position * scale_pos_to_dev + offset_pos_to_dev`` and
-    ``velocity * scale_vel_to_dev``; from it: ``position * scale_pos_from_dev +
-    offset_pos_from_dev`` and so on, as ros2_canopen has it.
+    To the device it is ``value * to_dev + offset_to_dev``, and from it ``value * from_dev +
+    offset_from_dev``, as ros2_canopen has it: bus.yml may scale the two ways differently.
     """
 
-    def __init__(self, config: DriveConfig) -> None:
-        self._config = config
+    __slots__ = ('_from_dev', '_largest', '_offset_from_dev', '_offset_to_dev', 'to_dev')
 
-    def use(self, config: DriveConfig) -> None:
-        """Take other factors, those of the drive itself."""
-        self._config = config
+    def __init__(self, largest: int = INT32_MAX) -> None:
+        """``largest`` is what objects of the quantity hold, INT16_MAX or INT32_MAX."""
+        self._largest = largest
+        self.set(1.0, 1.0)
 
-    def position_to_device(self, position: float) -> int:
-        """Convert a position to the nearest increment.
+    def set(
+        self,
+        to_dev: float,
+        from_dev: float,
+        offset_to_dev: float = 0.0,
+        offset_from_dev: float = 0.0,
+    ) -> None:
+        """Use other factors."""
+        self.to_dev, self._from_dev = to_dev, from_dev
+        self._offset_to_dev, self._offset_from_dev = offset_to_dev, offset_from_dev
+
+    def raw(self, value: float) -> float:
+        """Convert to device units, whether or not an object can hold it."""
+        return value * self.to_dev + self._offset_to_dev
+
+    def to_device(self, value: float, largest: int = 0) -> int:
+        """Convert to the nearest device unit.
 
         Raises:
-            DriveError: It is not a number or does not fit 0x607A (INTEGER32).
+            DriveError: It is not a number, or more than ``largest``.
         """
-        config = self._config
-        scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
-        return _to_integer(position, scaled, INT32_MAX)
+        scaled, largest = value * self.to_dev + self._offset_to_dev, largest or self._largest
+        if not math.isfinite(scaled):
+            raise DriveError(f'target {value} is not a finite number')
+        rounded = round(scaled)
+        if not -largest - 1 <= rounded <= largest:
+            raise DriveError(
+                f'target {value:g} is {rounded} device units, more than the object can hold '
+                f'({largest}); are the scale factors in bus.yml right?'
+            )
+        return rounded
 
-    @property
-    def config(self) -> DriveConfig:
-        """The axis, with the factors that count."""
-        return self._config
+    def commanded(self, value_dev: float) -> float:
+        """Return the target that :meth:`to_device` turns into these device units."""
+        return (value_dev - self._offset_to_dev) / self.to_dev
 
-    @property
-    def position_scale(self) -> float:
-        """Increments per user unit."""
-        return self._config.scale_pos_to_dev
-
-    def nearest_position(self, position: float) -> float:
-        """Return the position that a whole number of increments stands for."""
-        config = self._config
-        scaled = position * config.scale_pos_to_dev + config.offset_pos_to_dev
-        return self.position_commanded(round(scaled)) if math.isfinite(scaled) else position
-
-    def effort_raw(self, effort: float) -> float:
-        """Convert a torque to device units, whether or not an object can hold it."""
-        return effort * self._config.scale_eff_to_dev
-
-    def distance_to_device(self, distance: float) -> int:
-        """Convert a distance to the nearest increment; errors as for positions."""
-        return _to_integer(distance, distance * self._config.scale_pos_to_dev, INT32_MAX)
-
-    def position_commanded(self, position_inc: float) -> float:
-        """Return the target that :meth:`position_to_device` turns into these [inc].
-
-        It differs from :meth:`position_from_device` where bus.yml scales the two ways differently.
-        """
-        config = self._config
-        return (position_inc - config.offset_pos_to_dev) / config.scale_pos_to_dev
-
-    def velocity_to_device(self, velocity: float) -> int:
-        """Convert a velocity to the nearest device unit; errors as for positions."""
-        return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT32_MAX)
-
-    def velocity_commanded(self, velocity_dev: float) -> float:
-        """Return the target that :meth:`velocity_to_device` turns into these device units."""
-        return velocity_dev / self._config.scale_vel_to_dev
-
-    def velocity_raw(self, velocity: float) -> float:
-        """Convert a velocity to device units, whether or not an object can hold it."""
-        return velocity * self._config.scale_vel_to_dev
-
-    def acceleration_from_device(self, acceleration_dev: float) -> float:
-        """Convert a device acceleration to user units per second squared."""
-        scale = self._config.scale_acc_from_dev
-        return acceleration_dev * (1.0 / self._config.scale_vel_to_dev if scale is None else scale)
-
-    def rate_from_device(self, rate_inc: float) -> float:
-        """Convert the rate of a position in [inc/s] to user units per second."""
-        return rate_inc * self._config.scale_pos_from_dev
-
-    def vl_velocity_to_device(self, velocity: float) -> int:
-        """Convert a velocity for 0x6042, an INTEGER16; errors as for positions."""
-        return _to_integer(velocity, velocity * self._config.scale_vel_to_dev, INT16_MAX)
-
-    def effort_to_device(self, effort: float) -> int:
-        """Convert a torque for 0x6071, an INTEGER16; errors as for positions."""
-        return _to_integer(effort, effort * self._config.scale_eff_to_dev, INT16_MAX)
-
-    def effort_commanded(self, torque: float) -> float:
-        """Return the target that :meth:`effort_to_device` turns into this device torque."""
-        return torque / self._config.scale_eff_to_dev
-
-    def position_from_device(self, position: float) -> float:
-        """Convert increments to a position in user units."""
-        return position * self._config.scale_pos_from_dev + self._config.offset_pos_from_dev
-
-    def velocity_from_device(self, velocity: float) -> float:
-        """Convert a device velocity to user units per second."""
-        return velocity * self._config.scale_vel_from_dev
-
-    def effort_from_device(self, torque: float) -> float:
-        """Convert a device torque to user units."""
-        return torque * self._config.scale_eff_from_dev
+    def from_device(self, value_dev: float) -> float:
+        """Convert from device units."""
+        return value_dev * self._from_dev + self._offset_from_dev
 
 
-def _to_integer(value: float, scaled: float, largest: int) -> int:
-    if not math.isfinite(scaled):
-        raise DriveError(f'target {value} is not a finite number')
-    rounded = round(scaled)
-    if not -largest - 1 <= rounded <= largest:
-        raise DriveError(
-            f'target {value:g} is {rounded} device units, more than the object can hold '
-            f'({largest}); are the scale factors in bus.yml right?'
+class Units:
+    """The scales of one axis, by the quantity."""
+
+    def __init__(self, config: DriveConfig) -> None:
+        self.position = Scale()
+        self.distance = Scale()  # of positions, without their offsets
+        self.velocity = Scale()
+        self.acceleration = Scale()
+        self.effort = Scale(INT16_MAX)
+        self.use(config)
+
+    def use(self, config: DriveConfig) -> None:
+        """Take the factors of bus.yml, or those of the drive itself."""
+        self.config = config
+        scales = config.scale_pos_to_dev, config.scale_pos_from_dev
+        self.position.set(*scales, config.offset_pos_to_dev, config.offset_pos_from_dev)
+        self.distance.set(*scales)
+        self.velocity.set(config.scale_vel_to_dev, config.scale_vel_from_dev)
+        self.acceleration.set(
+            config.scale_acc_to_dev or config.scale_vel_to_dev,
+            config.scale_acc_from_dev or 1.0 / config.scale_vel_to_dev,
         )
-    return rounded
+        self.effort.set(config.scale_eff_to_dev, config.scale_eff_from_dev)

@@ -79,7 +79,7 @@ class ReplayedAxis:
             OperationMode.INTERPOLATED_POSITION if interpolated else OperationMode.CYCLIC_POSITION,
             self.view.parameters.offsets,
         )
-        return math.nan if target is None else self.view.units.position_commanded(target)
+        return math.nan if target is None else self.view.units.position.commanded(target)
 
     def status(self, now: float) -> DriveStatus:
         """Take a snapshot at a time of the log in [s]."""

@@ -281,11 +281,7 @@ class OutputWriter:
         self._low, self._high = self.limits
 
     def write(self, value: Number) -> None:
-        """Set the value for the next PDOs.
-
-        Raises:
-            CodecError: The object cannot hold it.
-        """
+        """Set the value for the next PDOs."""
         if not self._low <= value <= self._high:
             mapped = self._mapped
             raise CodecError(

@@ -136,11 +136,7 @@ class RemoteObjects:
         entry.timestamp = self._scheduler.now
 
     def entry(self, index: int, subindex: int = 0) -> ObjectEntry:
-        """Return the entry of an object in the EDS.
-
-        Raises:
-            SdoError: It is not in the EDS.
-        """
+        """Return the entry of an object in the EDS."""
         entry = self.config.dictionary.get(index, subindex)
         if entry is None:
             raise SdoError(
@@ -151,11 +147,7 @@ class RemoteObjects:
         return entry
 
     def check_owner(self, index: int) -> None:
-        """Refuse to write what the driver of this device writes.
-
-        Raises:
-            DriveError: It writes the object itself in each cycle.
-        """
+        """Refuse to write what the driver of this device writes."""
         if index in self.config.commanded_indices:
             raise DriveError(
                 f'{object_address(index)} of {self.name} is written by its driver in each cycle; '

@@ -108,9 +108,6 @@ class BusJointStates:
 
         By a URDF in XML, or by the topic ``robot_description``. Until it comes, the joints are
         those of bus.yml in its order; so they stay where it has none of them.
-
-        Raises:
-            CanopenError: The text is no URDF.
         """
         own = [axis.name for drive in self._drives for axis in drive.axes]
         robot = RobotJointStates(self._node, [RobotJoint(name) for name in own])

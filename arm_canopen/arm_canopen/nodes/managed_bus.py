@@ -55,11 +55,7 @@ class ManagedBus:
         LifecycleServices(self.manager, Managed(MANAGER, supervisor.work), thread, output)
 
     def admit(self) -> None:
-        """Let a request to the master pass.
-
-        Raises:
-            LifecycleError: It is not active.
-        """
+        """Let a request to the master pass."""
         _gate(self._master)()
 
     def _work(self, device: RemoteNode, axes: Sequence[DriveCommands]) -> Work:

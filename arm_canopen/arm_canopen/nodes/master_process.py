@@ -138,9 +138,6 @@ class MasterProcess:
         """Publish ``joint_states`` of all drives of the bus, too; call it before :meth:`start`.
 
         Order, and which joints mimic others, by a URDF in XML, or the topic ``robot_description``.
-
-        Raises:
-            CanopenError: The text is no URDF.
         """
         self._joint_states.publish_robot(description)
 

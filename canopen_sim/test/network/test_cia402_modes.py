@@ -472,8 +472,8 @@ def test_units_come_from_the_drive_when_bus_yml_has_none() -> None:
     config = replace(full_drive(), axes=(axis,), dictionary=dictionary)
     net = VirtualNetwork(bus_config(config))
     net.boot()
-    assert net.drives[JOINT].view.units.position_to_device(2 * math.pi) == 360_000
-    assert net.drives[JOINT].view.units.velocity_to_device(2 * math.pi) == 360_000
+    assert net.drives[JOINT].view.units.position.to_device(2 * math.pi) == 360_000
+    assert net.drives[JOINT].view.units.velocity.to_device(2 * math.pi) == 360_000
     assert '0x608F' in net.drives[JOINT].view.parameters.units
 
 
