@@ -75,7 +75,7 @@ class Configurator:
                 )
 
     async def write_error_control(self) -> None:
-        """Have the device send its heartbeat or be guarded, its TPDOs come, and watch the master."""
+        """Have the device be watched, its TPDOs come, and the device watch the master."""
         for write in await self._writes():
             if write.index in ERROR_CONTROL or write.key == WATCH_KEY or write.is_own_timer:
                 await self._bring(write)
