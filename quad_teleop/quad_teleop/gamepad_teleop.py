@@ -11,7 +11,6 @@ from operator_input.gamepad import Axis, Button, Deadman, GamepadState, Grip
 
 from .motion import (
     BodyPose,
-    Direction,
     Mode,
     NEUTRAL,
     PoseSteps,
@@ -66,7 +65,7 @@ class GamepadTeleop(DeadmanMapping):
         if speeds is None:
             return None
         axis = self.state.axis
-        velocity = Direction(axis(Axis.LEFT_Y), axis(Axis.LEFT_X), axis(Axis.RIGHT_X)).at(speeds)
+        velocity = Velocity(axis(Axis.LEFT_Y), axis(Axis.LEFT_X), axis(Axis.RIGHT_X)).at(speeds)
         return None if velocity == ZERO and self._deadman.enable is None else velocity
 
     def feed(self, state: GamepadState) -> list[Mode | BodyPose | RobotRequest]:

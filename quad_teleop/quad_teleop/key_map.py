@@ -8,27 +8,27 @@ letters are those of champ_teleop.
 
 from __future__ import annotations
 
-from .motion import BodyPose, Direction, Mode
+from .motion import BodyPose, Mode, Velocity
 
 MOVES = {
-    'u': Direction(x=1, yaw=1),
-    'i': Direction(x=1),
-    'o': Direction(x=1, yaw=-1),
-    'j': Direction(yaw=1),
-    'l': Direction(yaw=-1),
-    'm': Direction(x=-1, yaw=-1),
-    ',': Direction(x=-1),
-    '.': Direction(x=-1, yaw=1),
-    'U': Direction(x=1, y=1),
-    'I': Direction(x=1),
-    'O': Direction(x=1, y=-1),
-    'J': Direction(y=1),
-    'L': Direction(y=-1),
-    'M': Direction(x=-1, y=1),
-    '<': Direction(x=-1),
-    '>': Direction(x=-1, y=-1),
+    'u': Velocity(x=1, yaw=1),
+    'i': Velocity(x=1),
+    'o': Velocity(x=1, yaw=-1),
+    'j': Velocity(yaw=1),
+    'l': Velocity(yaw=-1),
+    'm': Velocity(x=-1, yaw=-1),
+    ',': Velocity(x=-1),
+    '.': Velocity(x=-1, yaw=1),
+    'U': Velocity(x=1, y=1),
+    'I': Velocity(x=1),
+    'O': Velocity(x=1, y=-1),
+    'J': Velocity(y=1),
+    'L': Velocity(y=-1),
+    'M': Velocity(x=-1, y=1),
+    '<': Velocity(x=-1),
+    '>': Velocity(x=-1, y=-1),
 }
-"""Keys that move as long as they are held."""
+"""Keys that move as long as they are held, which way as factors of the two speeds."""
 
 SPEEDS = {
     'q': (1, 1),

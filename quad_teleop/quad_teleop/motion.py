@@ -51,6 +51,10 @@ class Velocity:
     y: float = 0.0
     yaw: float = 0.0
 
+    def at(self, speeds: Speeds) -> Velocity:
+        """Return the velocity this way, where these are factors of the two speeds, -1 to 1."""
+        return Velocity(self.x * speeds.linear, self.y * speeds.linear, self.yaw * speeds.angular)
+
 
 ZERO = Velocity()
 """Stand still."""
@@ -59,19 +63,6 @@ ZERO = Velocity()
 def rest_of(_: Velocity | None) -> Velocity:
     """Return the velocity that ends a motion."""
     return ZERO
-
-
-@dataclass(frozen=True, slots=True)
-class Direction:
-    """Which way to go, as factors of the two speeds, -1 to 1."""
-
-    x: float = 0.0
-    y: float = 0.0
-    yaw: float = 0.0
-
-    def at(self, speeds: Speeds) -> Velocity:
-        """Return the velocity this way."""
-        return Velocity(self.x * speeds.linear, self.y * speeds.linear, self.yaw * speeds.angular)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 import math
 
 from operator_input import StatusPart, Style
@@ -16,18 +15,10 @@ from .motion import BodyPose, Mode, NEUTRAL, Speeds, Velocity
 NAME = 'controller_node: state'
 """Name of the status, after a namespace if there is one."""
 
+ERROR = 2  # of diagnostic_msgs/DiagnosticStatus: a fault is latched
 REPORT_TIMEOUT = 3.0  # [s] after which a report is history
 FOLLOWS_VELOCITIES = frozenset({'walk', 'turn', 'policy'})
 """Modes in which velocities do anything."""
-
-
-class Level(IntEnum):
-    """How it is; as in diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,25 +28,20 @@ class ControllerReport:
     Attributes:
         state: What the robot does: ``walk``, ``to stand``, ``fault``.
         goal: The mode that it is on its way to.
-        level: Whether all is well; an ERROR is a latched fault.
+        has_fault: Whether a fault is latched.
         message: What is not, in words.
         time: When it came [s].
     """
 
     state: str
     goal: str
-    level: Level
+    has_fault: bool
     message: str
     time: float
 
     def is_fresh(self, now: float) -> bool:
         """Return whether it still counts at a time [s]."""
         return now - self.time < REPORT_TIMEOUT
-
-    @property
-    def has_fault(self) -> bool:
-        """Whether a fault is latched."""
-        return self.level is Level.ERROR
 
 
 def read_report(
@@ -64,9 +50,8 @@ def read_report(
     """Read a status of /diagnostics, come at a time [s]; None if it is not the controller's."""
     if not name.endswith(NAME) or 'state' not in values:
         return None
-    known = level if level in set(Level) else Level.STALE
     state = values['state']
-    return ControllerReport(state, values.get('goal', state), Level(known), message, now)
+    return ControllerReport(state, values.get('goal', state), level == ERROR, message, now)
 
 
 def state_part(mode: Mode | None, report: ControllerReport | None) -> StatusPart:

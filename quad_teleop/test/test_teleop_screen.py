@@ -14,7 +14,7 @@ from operator_input import CommandStream, HeldKeys, KeyAction, KeyEvent, status_
 from quad_teleop import Mode, Speeds
 from quad_teleop.keyboard_teleop import KeyboardTeleop
 from quad_teleop.motion import PoseSteps, rest_of
-from quad_teleop.status import ControllerReport, Level, read_report
+from quad_teleop.status import ControllerReport, read_report
 
 
 @dataclass
@@ -35,9 +35,9 @@ class Robot:
         self.said.append(text)
 
 
-def report(state: str, goal: str, level: Level = Level.OK, message: str = '') -> ControllerReport:
+def report(state: str, goal: str, fault: str = '') -> ControllerReport:
     """Make a report of the controller."""
-    return ControllerReport(state, goal, level, message, 0.0)
+    return ControllerReport(state, goal, bool(fault), fault, 0.0)
 
 
 def teleop(robot: Robot, *keys: str) -> KeyboardTeleop:
@@ -92,7 +92,7 @@ def test_state_of_the_controller_is_shown() -> None:
         (Robot(Mode.LIE, report('walk', 'walk')), 'i', ''),
         (Robot(Mode.STAND, has_subscriber=False), 'i', ''),
         (
-            Robot(known=report('fault', 'fault', Level.ERROR, 'it fell over')),
+            Robot(known=report('fault', 'fault', 'it fell over')),
             '',
             'fault: it fell over; Backspace clears it, 0 lies down, 9 gets up',
         ),
@@ -123,11 +123,10 @@ def test_report_is_read_from_diagnostics() -> None:
     """Only the controller's own status counts, also below a namespace."""
     values = {'state': 'walk', 'goal': 'walk'}
     found = read_report('dog1: controller_node: state', 1, 'battery low', values, 5.0)
-    assert found == ControllerReport('walk', 'walk', Level.WARN, 'battery low', 5.0)
+    assert found == ControllerReport('walk', 'walk', False, 'battery low', 5.0)
     assert found.is_fresh(7.0)
     assert not found.is_fresh(9.0)
     assert read_report('hardware_node: serial link', 0, '', values, 0.0) is None
     assert read_report('controller_node: state', 0, '', {}, 0.0) is None
-    assert read_report('controller_node: state', 77, '', values, 0.0) == ControllerReport(
-        'walk', 'walk', Level.STALE, '', 0.0
-    )
+    fault = read_report('controller_node: state', 2, 'it fell over', values, 0.0)
+    assert fault == ControllerReport('walk', 'walk', True, 'it fell over', 0.0)

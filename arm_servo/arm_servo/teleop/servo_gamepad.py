@@ -12,7 +12,7 @@ from operator_input.devices import InputDevices
 from operator_input.ros import declare_gamepad, run_teleop, TeleopNode
 
 from .gamepad_teleop import GamepadTeleop
-from .servo_link import declare_link, ServoLink
+from .servo_link import ServoLink
 
 
 class ServoGamepad(TeleopNode):
@@ -36,15 +36,14 @@ class ServoGamepad(TeleopNode):
         """
         super().__init__('servo_gamepad')
         self.source, deadman = declare_gamepad(self, devices)
-        settings, read = declare_link(self), ParameterReader(self)
+        self.link, read = ServoLink(self, self.get_logger().info), ParameterReader(self)
         speeds = (
             read.number('speed', 0.3, (0.01, 1.0), "share of the servo's full speed"),
             read.number('turbo_speed', 1.0, (0.01, 1.0), 'the same with the turbo button'),
         )
-        refuse_misspelt(self)
-        self.link = ServoLink(self, settings, self.get_logger().info)
         warn = self.get_logger().warning
-        self.mapping = GamepadTeleop(self.link, deadman, settings.stream, speeds, warn)
+        self.mapping = GamepadTeleop(self.link, deadman, self.link.stream, speeds, warn)
+        refuse_misspelt(self)
 
 
 def main() -> int:

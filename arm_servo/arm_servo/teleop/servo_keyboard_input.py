@@ -12,7 +12,7 @@ from operator_input.ros import declare_keyboard, run_teleop, TeleopNode
 
 from .jog import Steps
 from .keyboard_teleop import KeyboardTeleop, MIN_SPEED
-from .servo_link import declare_link, ServoLink
+from .servo_link import ServoLink
 
 
 class ServoKeyboardInput(TeleopNode):
@@ -27,15 +27,14 @@ class ServoKeyboardInput(TeleopNode):
         """
         super().__init__('servo_keyboard_input')
         self.source, held = declare_keyboard(self)
-        settings, read = declare_link(self), ParameterReader(self)
+        link, read = ServoLink(self, self.get_logger().info), ParameterReader(self)
         speed = read.number('speed', 0.5, (MIN_SPEED, 1.0), "share of the servo's full speed")
         steps = Steps(
             read.number('linear_step', 1e-3, (1e-5, 0.1), 'single step of the tool [m]'),
             read.number('angular_step', 0.01745, (1e-4, 0.5), 'single step [rad]'),
         )
+        self.mapping = KeyboardTeleop(link, held, link.stream, speed, steps)
         refuse_misspelt(self)
-        link = ServoLink(self, settings, self.get_logger().info)
-        self.mapping = KeyboardTeleop(link, held, settings.stream, speed, steps)
 
 
 def main() -> int:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 import time
 from typing import Any
 
@@ -31,40 +30,6 @@ FLUSH_TIMEOUT = Duration(nanoseconds=300_000_000)
 STATUS_TIMEOUT = 1.0  # [s] after which a status is history
 
 
-@dataclass(frozen=True, slots=True)
-class LinkSettings:
-    """Whom a program jogs.
-
-    Attributes:
-        servo: Name of the servo's node, relative to the namespace or full.
-        base_frame: Frame of jogs in the base; empty takes the arm's base link.
-        tool_frame: Frame of jogs in the tool; empty takes the arm's tip link.
-        stream: Decides when to publish.
-    """
-
-    servo: str
-    base_frame: str
-    tool_frame: str
-    stream: CommandStream[Jog]
-
-
-def declare_link(node: Node) -> LinkSettings:
-    """Declare whom the program jogs, and how often.
-
-    Raises:
-        ParameterError: A value is of another kind or out of its range.
-    """
-    read = ParameterReader(node)
-    return LinkSettings(
-        read.text('servo', 'servo_node', 'name of the servo node'),
-        read.text('base_frame', '', "base frame; empty takes the arm's base link"),
-        read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
-        CommandStream(
-            1.0 / read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]'), rest_of
-        ),
-    )
-
-
 class ServoLink:
     """Publishes jogs, and knows the arm's names from the servo, or else from the robot.
 
@@ -73,12 +38,23 @@ class ServoLink:
         names: Names of the arm's parts, as far as they are known.
         scales: Full speeds of the servo.
         paused: Whether the person paused the servo.
+        stream: Decides when to publish.
     """
 
-    def __init__(self, node: Node, settings: LinkSettings, say: Callable[[str], None]) -> None:
-        """Advertise and subscribe."""
-        servo = settings.servo
-        self._frames = settings.base_frame, settings.tool_frame
+    def __init__(self, node: Node, say: Callable[[str], None]) -> None:
+        """Declare whom to jog and how often, advertise and subscribe.
+
+        Raises:
+            ParameterError: A value is of another kind or out of its range.
+        """
+        read = ParameterReader(node)
+        servo = read.text('servo', 'servo_node', 'name of the servo node')
+        self._frames = (
+            read.text('base_frame', '', "base frame; empty takes the arm's base link"),
+            read.text('tool_frame', '', "tool frame; empty takes the arm's tip link"),
+        )
+        rate = read.number('rate', 50.0, (10.0, 500.0), 'commands per second [Hz]')
+        self.stream: CommandStream[Jog] = CommandStream(1.0 / rate, rest_of)
         self.say = say
         self.names = ArmNames((), *self._frames)
         self.scales = Scales()

@@ -178,15 +178,7 @@ class DeviceSearch:
         period: float,
         others_period: float,
     ) -> None:
-        """Prepare.
-
-        Args:
-            devices: Where to look.
-            fits: Whether a device is of the kind.
-            period: Time between two looks.
-            others_period: Time for which a device of another kind is not opened again: that wakes
-                a sleeping one.
-        """
+        """Look once a period; what does not fit is left alone for longer: opening wakes it."""
         self._devices = devices
         self._fits = fits
         self._period = period

@@ -10,7 +10,6 @@ from enum import Enum
 import os
 import select
 import time
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from .devices import InputDevices
@@ -109,12 +108,7 @@ class Keyboard:
         self._terminal.__enter__()
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Give the terminal back, whatever happened."""
         self._keyboards.close()
-        self._terminal.__exit__(exc_type, exc, traceback)
+        self._terminal.__exit__()

@@ -12,14 +12,13 @@ the report never comes; so the terminal is probed as long as a key is held.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
 from enum import Enum
 import os
 import select
 import termios
 import time
-from types import TracebackType
 from typing import Any, TYPE_CHECKING
 
 from .exceptions import TerminalError
@@ -140,23 +139,15 @@ class TerminalKeyboard:
     standard input, which the shell shares. What is printed is formatted by it as usual.
     """
 
-    def __init__(
-        self,
-        path: str = CONTROLLING_TERMINAL,
-        *,
-        kitty: bool = True,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, path: str = CONTROLLING_TERMINAL, *, kitty: bool = True) -> None:
         """Prepare; the terminal is touched on entering the context.
 
         Args:
             path: Device of the terminal.
             kitty: Request the Kitty keyboard protocol.
-            clock: Returns the time [s].
         """
         self._path = path
         self._kitty = kitty
-        self._clock = clock
         self._descriptor: int | None = None
         self._before: list[Any] = []  # its settings
         self._decoder, self._dialogue = KeyDecoder(), TerminalDialogue()
@@ -201,7 +192,7 @@ class TerminalKeyboard:
             TerminalError: The terminal was closed. All keys count as released.
         """
         data = self._read_bytes(min(timeout, self.longest_wait()))
-        now = self._clock()
+        now = time.monotonic()
         found: list[KeyEvent | Report] = []
         if data:
             self._dialogue.received()
@@ -234,12 +225,7 @@ class TerminalKeyboard:
         self.write(_MODES_ON + (self._dialogue.start() if self._kitty else ''))
         return self
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None = None,
-        exc: BaseException | None = None,
-        traceback: TracebackType | None = None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Give the terminal back."""
         if self._descriptor is None:
             return
@@ -297,8 +283,10 @@ class TerminalKeyboard:
 
     def _drain(self) -> None:
         """Read the answers that are still on their way."""
-        deadline = self._clock() + DRAIN_TIMEOUT
-        while self._dialogue.is_waiting and (data := self._read_bytes(deadline - self._clock())):
+        deadline = time.monotonic() + DRAIN_TIMEOUT
+        while self._dialogue.is_waiting and (
+            data := self._read_bytes(deadline - time.monotonic())
+        ):
             self._dialogue.received()
             for report in self._decoder.feed(data, 0.0):
                 if isinstance(report, Report):

@@ -9,8 +9,6 @@ import contextlib
 import re
 import select
 import time
-from types import TracebackType
-from typing import TYPE_CHECKING
 
 from ..devices import (
     AxisRange,
@@ -29,14 +27,11 @@ from ..exceptions import DeviceError, PresetError
 from .controls import AT_REST, Axis, Button, GamepadState
 from .presets import AUTO, check_preset, choose_preset, DPAD_BUTTONS, is_gamepad, Preset
 
-if TYPE_CHECKING:
-    from typing_extensions import Self
-
 SCAN_PERIOD = 1.0  # [s] between two looks for a gamepad when there is none
 OTHERS_PERIOD = 10.0  # [s] for which a device that is no gamepad is not opened again
 
 
-class Gamepad:
+class Gamepad(contextlib.AbstractContextManager['Gamepad']):
     """Reads the first gamepad that fits; when it is unplugged, all is at rest.
 
     A context manager that closes it. Times are in [s].
@@ -147,16 +142,7 @@ class Gamepad:
             self._device.close()
         self._device, self._reading, self.name = None, None, ''
 
-    def __enter__(self) -> Self:
-        """Do nothing: a gamepad is opened when it is found."""
-        return self
-
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the device."""
         self.close()
 
