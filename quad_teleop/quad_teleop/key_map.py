@@ -8,7 +8,9 @@ letters are those of champ_teleop.
 
 from __future__ import annotations
 
-from .motion import BodyPose, Mode, Velocity
+from operator_input import ProgramRequest
+
+from .motion import BodyPose, Mode, RobotRequest, Velocity
 
 MOVES = {
     'u': Velocity(x=1, yaw=1),
@@ -75,16 +77,7 @@ NEUTRAL_KEYS = frozenset({'g', 'home'})
 STOP_KEYS = frozenset({'space', 'k'})
 """Keys that stop at once, and say so even when nothing moves. Any other key stops a motion too."""
 
-ROBOT_STOP_KEY = 'space'
-"""The one of them that ends the gait, too, whoever walks it."""
-
-CLEAR_KEY = 'backspace'
-"""Key that clears the controller's latched faults."""
-
 HELP_KEY = '?'
-
-QUIT_KEYS = frozenset({'ctrl+c', 'ctrl+d', 'ctrl+\\'})
-SUSPEND_KEY = 'ctrl+z'
 
 HELP = """\
   hold to move     Shift: sideways     body                   speed
@@ -98,3 +91,13 @@ HELP = """\
   Backspace clears a fault           Ctrl-C quits\
 """
 """The map, for the eye: plain characters, fits into 79 columns."""
+
+Request = Mode | BodyPose | RobotRequest | ProgramRequest | str
+
+REQUESTS: dict[str, Request] = {
+    HELP_KEY: HELP,
+    'backspace': RobotRequest.CLEAR_FAULT,
+    'space': RobotRequest.STOP,  # ends the gait, too, whoever walks it
+    'ctrl+z': ProgramRequest.SUSPEND,
+    **dict.fromkeys(('ctrl+c', 'ctrl+d', 'ctrl+\\'), ProgramRequest.QUIT),
+}

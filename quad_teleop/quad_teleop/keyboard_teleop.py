@@ -12,36 +12,24 @@ from operator_input import (
     KeyAction,
     KeyEvent,
     KeyMapping,
-    ProgramRequest,
     Robot,
     StatusPart,
 )
 
 from .key_map import (
-    CLEAR_KEY,
     HELP,
     HELP_KEY,
     MODES,
     MOVES,
     NEUTRAL_KEYS,
     POSES,
-    QUIT_KEYS,
-    ROBOT_STOP_KEY,
+    Request,
+    REQUESTS,
     SPEEDS,
     STOP_KEYS,
-    SUSPEND_KEY,
 )
-from .motion import BodyPose, Mode, NEUTRAL, PoseSteps, RobotRequest, Speeds, Velocity
+from .motion import BodyPose, Mode, NEUTRAL, PoseSteps, Speeds, Velocity
 from .status import ControllerReport, hint, motion_parts, state_part
-
-REQUESTS: dict[str, ProgramRequest | RobotRequest] = {
-    CLEAR_KEY: RobotRequest.CLEAR_FAULT,
-    SUSPEND_KEY: ProgramRequest.SUSPEND,
-    ROBOT_STOP_KEY: RobotRequest.STOP,
-    **dict.fromkeys(QUIT_KEYS, ProgramRequest.QUIT),
-}
-
-Request = Mode | BodyPose | RobotRequest | ProgramRequest | str
 
 
 class WatchedRobot(Robot, Protocol):
@@ -124,9 +112,8 @@ class KeyboardTeleop(KeyMapping):
             return [mode]
         if key in NEUTRAL_KEYS:
             return self._move_body(NEUTRAL)
-        if key == HELP_KEY:
-            return [HELP]
-        self._held.clear()
+        if key != HELP_KEY:
+            self._held.clear()
         if key in STOP_KEYS:
             self._stream.stop()
         return [REQUESTS[key]] if key in REQUESTS else []

@@ -19,8 +19,17 @@ from operator_input import (
 )
 from operator_input.key_decoder import KeyDecoder
 from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
-from quad_teleop.key_map import HELP, MODES, MOVES, NEUTRAL_KEYS, POSES, SPEEDS, STOP_KEYS
-from quad_teleop.keyboard_teleop import KeyboardTeleop, Request
+from quad_teleop.key_map import (
+    HELP,
+    MODES,
+    MOVES,
+    NEUTRAL_KEYS,
+    POSES,
+    Request,
+    SPEEDS,
+    STOP_KEYS,
+)
+from quad_teleop.keyboard_teleop import KeyboardTeleop
 from quad_teleop.motion import NEUTRAL, PoseSteps, rest_of, RobotRequest, ZERO
 
 NO_ROBOT: Any = None

@@ -41,42 +41,19 @@ _PRIVATE = range(0xE000, 0xF900)  # codes of keys that have no character
 _MODIFIER_CODES = frozenset({*range(57358, 57364), *range(57441, 57455)})
 
 _CONTROL_NAMES = {
-    '\r': 'enter',
-    '\n': 'enter',
-    '\t': 'tab',
-    '\b': 'backspace',
-    '\x7f': 'backspace',
-    _ESCAPE: 'escape',
-    ' ': 'space',
-    '\0': 'ctrl+space',
-}
+    '\r': 'enter', '\n': 'enter', '\t': 'tab', '\b': 'backspace', '\x7f': 'backspace',
+    _ESCAPE: 'escape', ' ': 'space', '\0': 'ctrl+space',
+}  # fmt: skip
 _FINAL_NAMES = {
-    'A': 'up',
-    'B': 'down',
-    'C': 'right',
-    'D': 'left',
-    'F': 'end',
-    'H': 'home',
-    'P': 'f1',
-    'Q': 'f2',
-    'R': 'f3',
-    'S': 'f4',
-    'Z': 'tab',  # with Shift
-}
+    'A': 'up', 'B': 'down', 'C': 'right', 'D': 'left', 'F': 'end', 'H': 'home',
+    'P': 'f1', 'Q': 'f2', 'R': 'f3', 'S': 'f4', 'Z': 'tab',  # with Shift
+}  # fmt: skip
 _TILDE_NAMES = {
-    1: 'home',
-    2: 'insert',
-    3: 'delete',
-    4: 'end',
-    5: 'page_up',
-    6: 'page_down',
-    7: 'home',
-    8: 'end',
-    **{11 + index: f'f{1 + index}' for index in range(5)},
-    **{17 + index: f'f{6 + index}' for index in range(5)},
-    23: 'f11',
-    24: 'f12',
-}
+    1: 'home', 2: 'insert', 3: 'delete', 4: 'end',
+    5: 'page_up', 6: 'page_down', 7: 'home', 8: 'end',
+    11: 'f1', 12: 'f2', 13: 'f3', 14: 'f4', 15: 'f5',
+    17: 'f6', 18: 'f7', 19: 'f8', 20: 'f9', 21: 'f10', 23: 'f11', 24: 'f12',
+}  # fmt: skip
 _KEYPAD = (
     '0 1 2 3 4 5 6 7 8 9 . / * - + enter = , '
     'left right up down page_up page_down home end insert delete'

@@ -46,40 +46,24 @@ HID_AXES = _LEFT_STICK_AND_DPAD | {
 """Axes of a pad that describes itself (HID usages Z and Rz, Brake and Accelerator)."""
 
 STANDARD_BUTTONS = {
-    0x130: Button.SOUTH,
-    0x131: Button.EAST,
-    0x133: Button.NORTH,
-    0x134: Button.WEST,
-    0x136: Button.LEFT_SHOULDER,
-    0x137: Button.RIGHT_SHOULDER,
-    0x138: Button.LEFT_TRIGGER,
-    0x139: Button.RIGHT_TRIGGER,
-    0x13A: Button.SELECT,
-    0x13B: Button.START,
-    0x13C: Button.GUIDE,
-    0x13D: Button.LEFT_STICK,
-    0x13E: Button.RIGHT_STICK,
-}
+    0x130: Button.SOUTH, 0x131: Button.EAST, 0x133: Button.NORTH, 0x134: Button.WEST,
+    0x136: Button.LEFT_SHOULDER, 0x137: Button.RIGHT_SHOULDER,
+    0x138: Button.LEFT_TRIGGER, 0x139: Button.RIGHT_TRIGGER,
+    0x13A: Button.SELECT, 0x13B: Button.START, 0x13C: Button.GUIDE,
+    0x13D: Button.LEFT_STICK, 0x13E: Button.RIGHT_STICK,
+}  # fmt: skip
 """Buttons of the kernel's specification."""
 
 XBOX_BUTTONS = STANDARD_BUTTONS | {0x133: Button.WEST, 0x134: Button.NORTH}
 """Buttons of the driver xpad, and of pads that imitate it."""
 
 HID_BUTTONS = {
-    0x120: Button.WEST,
-    0x121: Button.SOUTH,
-    0x122: Button.EAST,
-    0x123: Button.NORTH,
-    0x124: Button.LEFT_SHOULDER,
-    0x125: Button.RIGHT_SHOULDER,
-    0x126: Button.LEFT_TRIGGER,
-    0x127: Button.RIGHT_TRIGGER,
-    0x128: Button.SELECT,
-    0x129: Button.START,
-    0x12A: Button.LEFT_STICK,
-    0x12B: Button.RIGHT_STICK,
-    0x12C: Button.GUIDE,
-}
+    0x120: Button.WEST, 0x121: Button.SOUTH, 0x122: Button.EAST, 0x123: Button.NORTH,
+    0x124: Button.LEFT_SHOULDER, 0x125: Button.RIGHT_SHOULDER,
+    0x126: Button.LEFT_TRIGGER, 0x127: Button.RIGHT_TRIGGER,
+    0x128: Button.SELECT, 0x129: Button.START,
+    0x12A: Button.LEFT_STICK, 0x12B: Button.RIGHT_STICK, 0x12C: Button.GUIDE,
+}  # fmt: skip
 """Buttons of pads without a driver, from BTN_JOYSTICK in the order that most of them have."""
 
 DPAD_BUTTONS = {
