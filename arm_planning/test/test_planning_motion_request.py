@@ -1,10 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""MoveIt's requests as requests of the core: what counts, and what is refused."""
+"""MoveIt's requests as requests of the core; test_planning_bad_input has what is refused."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from geometry_msgs.msg import Vector3
@@ -21,7 +20,7 @@ import pytest
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Sphere
-from arm_planning import CircPointKind, JointGoal, PlanningCode, PlanningError, PoseGoal
+from arm_planning import CircPointKind, JointGoal, PoseGoal
 from arm_planning.requests import Parameterization
 from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.scene_snapshot import SceneSnapshot
@@ -127,48 +126,3 @@ def test_path_constraints_hold_on_the_path() -> None:
     assert read.joints['panda_joint2'] == pytest.approx((-0.1, 0.3))
     assert np.allclose(read.orientations[0].rotation, np.eye(3))
     assert read.positions[0].regions[0].pose.position == pytest.approx([0.4, 0.1, 0.5])
-
-
-GOAL = PlanningCode.INVALID_GOAL_CONSTRAINTS
-
-
-def _goal(**fields: Any) -> MotionPlanRequest:
-    return request(goal_constraints=[Constraints(**fields)])
-
-
-@pytest.mark.parametrize(
-    ('message', 'code', 'words'),
-    [
-        (MotionPlanRequest(), GOAL, 'no goal'),
-        (_goal(), GOAL, '0 position'),
-        (_goal(joint_constraints=[joint(9, 0.0)]), GOAL, 'panda_joint9'),
-        (_goal(joint_constraints=[joint(1, math.nan)]), GOAL, 'nan'),
-        (_goal(joint_constraints=[joint(1, 0.0), joint(1, 0.5)]), GOAL, 'contradict'),
-        (
-            _goal(joint_constraints=[joint(1, 0.0)], orientation_constraints=[turn()]),
-            GOAL,
-            'not both',
-        ),
-        (
-            _goal(position_constraints=[place(0.4, 0, 0)], orientation_constraints=[turn('b')]),
-            GOAL,
-            'one link',
-        ),
-        (
-            _goal(position_constraints=[place(0.4, 0.0, 0.0, 'moon')]),
-            PlanningCode.INVALID_LINK_NAME,
-            'moon',
-        ),
-        (_goal(position_constraints=[place(math.nan, 0.0, 0.0)]), GOAL, 'nan'),
-        (request(pipeline_id='stomp'), PlanningCode.PLANNING_FAILED, 'ompl'),
-        (request(max_velocity_scaling_factor=1.5), PlanningCode.FAILURE, '1.5'),
-        (request(max_acceleration_scaling_factor=math.nan), PlanningCode.FAILURE, 'nan'),
-    ],
-)
-def test_requests_that_are_wrong_are_refused(
-    message: MotionPlanRequest, code: PlanningCode, words: str
-) -> None:
-    """With MoveIt's code, and with what is wrong."""
-    with pytest.raises(PlanningError, match=words) as refusal:
-        READER.request(message)
-    assert refusal.value.code is code

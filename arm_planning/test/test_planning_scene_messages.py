@@ -295,25 +295,12 @@ BEYOND = Mesh(
 REFUSED: dict[str, tuple[Any, PlanningCode, str]] = {
     'no name': (box(''), PlanningCode.INVALID_OBJECT_NAME, 'name'),
     'name of a link': (box('panda_link3'), PlanningCode.INVALID_OBJECT_NAME, 'link'),
-    'no shape': (ObjectMessage(id='a'), PlanningCode.FAILURE, 'no shapes'),
     'frame': (
         _box_with(header=ObjectMessage().header.__class__(frame_id='moon')),
         PlanningCode.FRAME_TRANSFORM_FAILURE,
         'moon',
     ),
     'NaN pose': (_box_with(pose=NAN), PlanningCode.FAILURE, 'nan'),
-    'NaN pose of a shape': (_box_with(primitive_poses=[NAN]), PlanningCode.FAILURE, 'nan'),
-    'two poses': (
-        _box_with(primitive_poses=[pose_at(), pose_at()]),
-        PlanningCode.FAILURE,
-        '1 primitive shapes and 2 poses',
-    ),
-    'negative edge': (
-        _box_with(primitives=[SolidPrimitive(type=1, dimensions=[0.1, -0.1, 0.1])]),
-        PlanningCode.FAILURE,
-        'positive',
-    ),
-    'no dimensions': (_box_with(primitives=[SolidPrimitive(type=2)]), PlanningCode.FAILURE, '1'),
     'prism': (_box_with(primitives=[SolidPrimitive(type=5)]), PlanningCode.FAILURE, 'prism'),
     'empty mesh': (_box_with(meshes=[Mesh()]), PlanningCode.FAILURE, 'volume'),
     'flat mesh': (_box_with(meshes=[FLAT]), PlanningCode.FAILURE, 'flat'),
