@@ -5,21 +5,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-import struct
 from typing import Any
 
 import canopen
-from concise_reading import decode_concise, IncompleteError
 from config_samples import eds_text, load_text, write_bus
-from device_rig import drive_dictionary, Rig
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from tool_environment import REPOSITORY
 
 from arm_canopen.config import BusConfig, load_bus, load_eds
 from arm_canopen.config.model import SdoWrite
-from arm_canopen.standard.nmt import NmtCommand
 from canopen_tools.cli.diff import expected_objects
 from canopen_tools.cli.main import main
 from canopen_tools.dcf.concise import (
@@ -191,85 +185,35 @@ def test_everything_on_request(tmp_path: Path) -> None:
     assert set(writes_of(tmp_path, text)) < set(writes_of(tmp_path, text, complete=True))
 
 
-@pytest.mark.parametrize('entry', ['0x00010000', '0x00010064'])
-def test_a_device_that_watches_the_master_by_default_is_configured_not_to(
-    tmp_path: Path, entry: str
-) -> None:
-    """Without heartbeat_consumer the entry for the master that the EDS has is cleared."""
-    eds = eds_text().splitlines()
-    place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
-    eds[place] = f'DefaultValue={entry}'
-    text = edited('heartbeat_consumer: true', 'heartbeat_consumer: false')
-    config = load_text(tmp_path, text, eds='\n'.join(eds))
-    first = device_writes(config, config.nodes[0])[0]
-    assert first == SdoWrite(0x1016, 1, bytes(4))
-
-
-@pytest.mark.parametrize('options', [(), ('--complete',)])
-def test_a_device_that_was_configured_by_the_file_does_what_bus_yml_says(
-    tmp_path: Path, options: tuple[str, ...]
-) -> None:
-    """It takes each write, then sends and follows the PDOs of the article, at its heartbeat."""
-    assert main(['dcf', str(PANDA), '--out', str(tmp_path), *options]) == 0
-    rig = Rig(drive_dictionary(), node_id=2)
-    for write in decode_concise((tmp_path / 'panda_joint1.bin').read_bytes()):
-        rig.write(write.index, write.subindex, write.data)
-    for index, subindex, value in (
-        (0x6081, 0, 1_000),
-        (0x6083, 0, 10_000),
-        (0x6085, 0, 10_000),
-        (0x60C2, 1, 10),
-        (0x60C2, 2, -3),
-    ):
-        data = rig.read(index, subindex)
-        assert int.from_bytes(data, 'little', signed=True) == value, f'{index:04X}:{subindex}'
-    rig.nmt(NmtCommand.START)
-    rig.take()
-    rig.send(0x202, struct.pack('<Hbi', 0x0006, 1, 500))  # controlword, mode, target position
-    rig.send(0x302, struct.pack('<i', 70))  # target velocity
-    rig.cycles(2)
-    sent = {frame.can_id: frame.data for _, frame in rig.sent}
-    assert sent == {
-        0x182: bytes.fromhex('3102 01'),  # Ready to switch on, mode 1
-        0x282: bytes(8),  # position and velocity
-    }
-    assert rig.read(0x607A) == struct.pack('<i', 500)
-    assert rig.read(0x60FF) == struct.pack('<i', 70)
-    rig.run(2.5)
-    first, second = rig.times(0x702)[-2:]
-    assert second - first == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(('entry', 'reported'), [('0x00090000', True), ('0x00090064', False)])
-def test_an_entry_that_watches_somebody_else_is_left_alone(
-    tmp_path: Path, entry: str, reported: bool
-) -> None:
-    """The device watches the master in a free entry, or not at all."""
-    eds = eds_text().splitlines()
-    place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
-    eds[place] = f'DefaultValue={entry}'
-    config = load_text(tmp_path, BUS, eds='\n'.join(eds))
-    first = device_writes(config, config.nodes[0])[0]
-    assert (first == SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')) is reported
-    watched = [e for e in expected_objects(config, config.nodes[0]) if e.index == 0x1016]
-    assert bool(watched) is reported
-
-
-@given(
-    st.lists(
-        st.builds(SdoWrite, st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.binary(max_size=20)),
-        max_size=10,
-    )
+@pytest.mark.parametrize(
+    ('wanted', 'entry', 'first'),
+    [
+        ('false', '0x00010000', SdoWrite(0x1016, 1, bytes(4))),
+        ('false', '0x00010064', SdoWrite(0x1016, 1, bytes(4))),
+        ('true', '0x00090000', SdoWrite(0x1016, 1, b'\x2c\x01\x01\0')),
+        ('true', '0x00090064', None),
+    ],
 )
-def test_what_is_encoded_is_decoded(writes: list[SdoWrite]) -> None:
-    """Any list of writes survives the round trip; a file that is cut off is refused."""
-    data = encode_concise(writes)
-    assert decode_concise(data) == writes
-    for length in range(len(data)):
-        with pytest.raises(IncompleteError):
-            decode_concise(data[:length])
-    with pytest.raises(IncompleteError, match='1 bytes stand behind'):
-        decode_concise(data + b'\0')
+def test_an_entry_of_the_eds_is_the_masters_or_left_alone(
+    tmp_path: Path, wanted: str, entry: str, first: SdoWrite | None
+) -> None:
+    """Cleared where the device shall not watch the master; one of somebody else stays."""
+    eds = eds_text().splitlines()
+    place = eds.index('DefaultValue=0', eds.index('[1016sub1]'))
+    eds[place] = f'DefaultValue={entry}'
+    text = edited('heartbeat_consumer: true', f'heartbeat_consumer: {wanted}')
+    config = load_text(tmp_path, text, eds='\n'.join(eds))
+    watching = [w for w in device_writes(config, config.nodes[0]) if w.index == 0x1016]
+    assert watching == ([] if first is None else [first])
+    compared = {item.index for item in expected_objects(config, config.nodes[0])}
+    assert (0x1016 in compared) is (first is not None)
+
+
+def test_data_of_any_length_are_written() -> None:
+    """A text, and nothing."""
+    writes = [SdoWrite(0x2001, 2, b'abcde'), SdoWrite(0x2002, 0, b'')]
+    golden = '02000000 0120 02 05000000 6162636465 0220 00 00000000'
+    assert encode_concise(writes) == bytes.fromhex(golden)
 
 
 def test_the_bit_rate_is_one_that_the_file_of_the_master_supports(tmp_path: Path) -> None:
@@ -289,7 +233,8 @@ def test_expected_numbers_are_in_the_file_of_the_master(tmp_path: Path) -> None:
         SdoWrite(0x1F87, 2, b'\3\0\0\0'),
     ]
     assert main(['dcf', str(tmp_path / 'bus.yml'), '--out', str(tmp_path)]) == 0
-    assert decode_concise((tmp_path / 'master.bin').read_bytes()) == master_writes(config)
+    golden = '02000000 1810 04 04000000 77000000 871F 02 04000000 03000000'
+    assert (tmp_path / 'master.bin').read_bytes() == bytes.fromhex(golden)
 
 
 class MasterFile:
