@@ -7,7 +7,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Mapping, Sequence
 import difflib
-from typing import TYPE_CHECKING, TypeAlias
+from typing import Any, TYPE_CHECKING, TypeAlias
 
 from arm_canopen.exceptions import CanopenError
 from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
@@ -24,6 +24,9 @@ class UsageError(CanopenError):
 
 class SuggestingParser(argparse.ArgumentParser):
     """Names the likely verb or option where one is misspelt; its sub-parsers do so, too."""
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401  # those of argparse
+        super().__init__(**settings, allow_abbrev=False)
 
     def parse_known_args(  # type: ignore[override]  # without the overloads of typeshed
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None

@@ -39,7 +39,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='report everything that is wrong with a bus.yml and its EDS files',
         description='Report everything that is wrong with a bus.yml and its EDS files, and what '
         'the bus will carry. Exit code: 0, 1 with errors, 2 wrong usage.',
-        allow_abbrev=False,
     )
     parser.add_argument('bus_yml', metavar='BUS.yml', type=Path)
     parser.add_argument(

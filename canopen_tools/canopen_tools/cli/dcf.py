@@ -25,7 +25,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='write master.dcf and .bin files for other masters',
         description='Write master.dcf, and for each device with objects to write a concise DCF '
         '(<device>.bin), in the format and order of dcfgen, for masters built on Lely.',
-        allow_abbrev=False,
     )
     parser.add_argument('bus_yml', metavar='BUS.yml', type=Path)
     parser.add_argument(

@@ -51,7 +51,6 @@ def add_parser(parsers: SubParsers) -> None:
         description='Read every object of a device that bus.yml configures, and show where it '
         'differs; without bus.yml every object that has a default in the EDS. Nothing is written. '
         'Exit code: 0 when all is equal, 1, 2 wrong usage.',
-        allow_abbrev=False,
     )
     add_node_arguments(parser)
     parser.add_argument(
@@ -148,15 +147,10 @@ def _identity(node: NodeConfig) -> Iterator[BootWrite]:
 
 
 def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
-    """Read an object."""
-
-    async def upload() -> bytes:
-        client = session.client(target.node_id, target.name, target.dictionary)
-        return await client.read(index, subindex, target.timeout)
-
     if session.masters:
         session.await_quiet(target.node_id)
-    return session.run(upload())
+    client = session.client(target.node_id, target.name, target.dictionary)
+    return session.read(client, index, subindex, target.timeout)
 
 
 def _compare(session: Session, target: Target, expected: BootWrite) -> Row:

@@ -22,7 +22,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='report what is wrong with EDS and DCF files',
         description='Report what is wrong with EDS and DCF files (CiA 306), and what reading them '
         'passes over. Exit code: 0, 1 with errors, 2 wrong usage.',
-        allow_abbrev=False,
     )
     parser.add_argument('files', metavar='FILE', type=Path, nargs='+')
     parser.add_argument('--strict', action='store_true', help='warnings count as errors')

@@ -27,7 +27,6 @@ def add_parser(parsers: SubParsers) -> None:
         'of the bus for that time. Exit code: 0 when the joint moved as it should, 1 when not, 2 '
         'wrong usage, 130 interrupted.',
         epilog='example: canopen first-motion bus.yml shoulder --can can0 --distance 2deg',
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add('bus_yml', metavar='BUS.yml', type=Path)

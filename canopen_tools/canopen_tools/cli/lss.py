@@ -42,7 +42,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='find devices without node id, set node ids and bit rates',
         description='Layer setting services (CiA 305). Devices are set one at a time; at the end '
         'all are in the waiting state again.',
-        allow_abbrev=False,
     )
     verbs = parser.add_subparsers(title='verbs', metavar='VERB', required=True)
     scan = verbs.add_parser(
@@ -50,22 +49,27 @@ def add_parser(parsers: SubParsers) -> None:
         help='find devices without node id',
         description='Find every device without a node id by fast scan. Exit code: 0, 1 when '
         'there is none, 2 wrong usage.',
-        allow_abbrev=False,
     )
     scan.set_defaults(run=run_scan)
-    inquire = verbs.add_parser(
-        'inquire', help='read the address and node id of a device', allow_abbrev=False
-    )
+    inquire = verbs.add_parser('inquire', help='read the address and node id of a device')
     inquire.set_defaults(run=run_inquire)
     setting = verbs.add_parser(
         'set',
         help='give a device a node id or a bit rate',
         description='Give a device a node id or a bit rate. Without --address and --only it is '
         'the first one without node id that fast scan finds.',
-        allow_abbrev=False,
     )
     setting.set_defaults(run=run_set)
-    _add_settings(setting)
+    add = setting.add_argument
+    add('--node-id', type=node_id, metavar='N', help='1 to 127; not used by another device')
+    add('--bitrate', type=bitrate, help='in bit/s, e.g. 500000 or 500k')
+    add('--store', action='store_true', help='keep it without power')
+    add(
+        '--activate',
+        type=seconds,
+        metavar='S',
+        help='have the device take the bit rate after so many seconds of silence',
+    )
     for verb in (scan, inquire, setting):
         add_bus_argument(verb)
         verb.add_argument(
@@ -73,20 +77,6 @@ def add_parser(parsers: SubParsers) -> None:
         )
     _add_choice(inquire, required=True)
     _add_choice(setting, required=False)
-
-
-def _add_settings(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--node-id', type=node_id, metavar='N', help='1 to 127; not used by another device'
-    )
-    parser.add_argument('--bitrate', type=bitrate, help='in bit/s, e.g. 500000 or 500k')
-    parser.add_argument('--store', action='store_true', help='keep it without power')
-    parser.add_argument(
-        '--activate',
-        type=seconds,
-        metavar='S',
-        help='have the device take the bit rate after so many seconds of silence',
-    )
 
 
 def _add_choice(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -227,14 +217,10 @@ def _let_go(session: Session, master: LssMaster, new_id: int | None, before: int
 
 def _refuse_taken(session: Session, wanted: int) -> None:
     """Refuse a node id whose heartbeat or SDO answer is on the bus."""
-
-    async def probe() -> bytes:
-        return await session.client(wanted).read(Index.DEVICE_TYPE, 0, PROBE_TIMEOUT)
-
     taken = wanted in session.states
     if not taken and not session.masters:
         try:
-            session.run(probe())
+            session.read(session.client(wanted), Index.DEVICE_TYPE, 0, PROBE_TIMEOUT)
         except SdoTimeoutError:
             return
         except SdoAbortError:

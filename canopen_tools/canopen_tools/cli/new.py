@@ -41,7 +41,6 @@ def add_parser(parsers: SubParsers) -> None:
         'says is asked for. Exit code: 0, 1 with errors, 2 wrong usage.',
         epilog='examples: canopen new shoulder=drive.eds@2 elbow=drive.eds@3 --turn elbow=360000; '
         'canopen new --scan --can can0 eds_files/ shoulder@2 elbow@3',
-        allow_abbrev=False,
     )
     add = parser.add_argument
     add(

@@ -219,15 +219,11 @@ def _match(
 def _stored_eds(session: Session, found: Found, folder: Path) -> Eds | None:
     """Read the EDS that a device has in itself; None where it has none that can be read."""
     client = session.client(found.node_id)
-
-    async def upload(index: int) -> bytes:
-        return await client.read(index, 0, TIMEOUT, block=index == STORE_EDS)
-
     try:
-        form = session.run(upload(STORE_FORMAT))
+        form = session.read(client, STORE_FORMAT, 0, TIMEOUT)
         if int.from_bytes(form, 'little') != UNCOMPRESSED:
             return None
-        data = session.run(upload(STORE_EDS))
+        data = session.read(client, STORE_EDS, 0, TIMEOUT, block=True)
     except SdoError:
         return None
     identity = _identity(found)
@@ -243,15 +239,11 @@ def _stored_eds(session: Session, found: Found, folder: Path) -> Eds | None:
 
 def _values(session: Session, node: int) -> dict[tuple[int, int], int]:
     """Read what a drive says of its modes and units."""
-    client = session.client(node)
     values: dict[tuple[int, int], int] = {}
     for address in FACTS:
-
-        async def upload(index: int = address[0], subindex: int = address[1]) -> bytes:
-            return await client.read(index, subindex, TIMEOUT)
-
+        client = session.client(node)
         try:
-            values[address] = int.from_bytes(session.run(upload()), 'little')
+            values[address] = int.from_bytes(session.read(client, *address, TIMEOUT), 'little')
         except TimeoutError:
             break  # it will not answer the others either
         except SdoError:

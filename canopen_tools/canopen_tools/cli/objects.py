@@ -45,7 +45,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='read objects of a device by name or number',
         description='Read objects of a device by SDO. OBJECT is a number (0x6041, 0x607D:02), or '
         'with --bus-config or --eds a name ("Statusword", "Software position limit/Max").',
-        allow_abbrev=False,
     )
     add_node_arguments(reader)
     reader.add_argument('objects', metavar='OBJECT', nargs='+')
@@ -56,7 +55,6 @@ def add_parser(parsers: SubParsers) -> None:
         help='write an object of a device by name or number',
         description='Write an object of a device by SDO, and read it back. VALUE is a number, '
         'true or false, a text, or bytes in hexadecimal, as the type of the object is.',
-        allow_abbrev=False,
     )
     add_node_arguments(writer)
     writer.add_argument('object', metavar='OBJECT')
@@ -132,12 +130,10 @@ def _data(target: Target, entry: ObjectEntry, options: argparse.Namespace) -> by
 
 
 def _upload(session: Session, target: Target, entry: ObjectEntry) -> bytes:
-    async def upload() -> bytes:
-        client = session.client(target.node_id, target.name, target.dictionary)
-        long = entry.data_type in LONG_TYPES
-        return await client.read(*entry.address, target.timeout, block=long)
-
-    return fitted(entry.data_type, session.run(upload()))  # of the type that --type names
+    client = session.client(target.node_id, target.name, target.dictionary)
+    long = entry.data_type in LONG_TYPES
+    data = session.read(client, *entry.address, target.timeout, block=long)
+    return fitted(entry.data_type, data)  # of the type that --type names
 
 
 def _title(target: Target, entry: ObjectEntry) -> str:

@@ -76,7 +76,6 @@ def add_parser(parsers: SubParsers) -> None:
         'reads the identity of every node id. Exit code: 0; 1 when there is no device, several '
         'have one node id, or with --bus-config when one is missing or another one; 2 wrong '
         'usage.',
-        allow_abbrev=False,
     )
     add_bus_arguments(parser)
     parser.add_argument(
@@ -203,12 +202,8 @@ def _read_identity(session: Session, device: Found, client: SdoClient) -> None:
     for attribute, index, subindex in IDENTITY_OBJECTS:
         if session.masters:
             session.await_quiet(device.node_id)
-
-        async def read(index: int = index, subindex: int = subindex) -> bytes:
-            return await client.read(index, subindex, ANSWER)
-
         try:
-            data = session.run(read())
+            data = session.read(client, index, subindex, ANSWER)
         except TimeoutError:
             return  # it will not answer the others either
         except SdoError:

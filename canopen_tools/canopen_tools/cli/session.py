@@ -83,6 +83,20 @@ class Session:
             self._clients[node_id] = client
         return client
 
+    def read(
+        self, client: SdoClient, index: int, subindex: int, timeout: float, *, block: bool = False
+    ) -> bytes:
+        """Read an object of a device.
+
+        Raises:
+            SdoError: The device refuses, or does not answer.
+        """
+
+        async def upload() -> bytes:
+            return await client.read(index, subindex, timeout, block=block)
+
+        return self.run(upload())
+
     def await_quiet(self, node_id: int) -> None:
         """Wait until nobody else talks to the SDO server of a device, for a while at most."""
         self._step(0.0)
