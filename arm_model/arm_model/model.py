@@ -16,13 +16,7 @@ import pinocchio as pin
 from urdf_reader import EndEffector, find_group, KinematicTree, Pair, parse_srdf, read_urdf
 
 from .arrays import Array, frozen, Native
-from .exceptions import (
-    CommandError,
-    description_refused,
-    limits_refused,
-    ModelError,
-    SceneError,
-)
+from .exceptions import CommandError, description_refused, limits_refused, ModelError, SceneError
 from .kinematics import Kinematics
 from .limits import JointLimits, load_limits, merge_limits
 from .pose import Pose, turned_twists
@@ -43,11 +37,6 @@ class RobotModel:
     It caches the kinematics of the last position, so it belongs to one loop.
 
     Attributes:
-        name: Name of the robot.
-        group: Name of the group.
-        base: Name of its base link.
-        tip: Name of its tip link.
-        limits: Limits of the joints, with their names.
         poses: Named poses of the SRDF, in the order of the joints.
         end_effectors: Tools of the SRDF that are fixed to a link of the group.
         notes: What was passed over in description and SRDF, in words.

@@ -34,12 +34,7 @@ from arm_trajectory import Path
 
 from .exceptions import PlanningCode, PlanningError
 from .ik.link_kinematics import LinkKinematics
-from .requests import (
-    OrientationConstraint,
-    Parameterization,
-    PathConstraints,
-    PositionConstraint,
-)
+from .requests import OrientationConstraint, Parameterization, PathConstraints, PositionConstraint
 from .validity import Violation
 
 TOLERANCE = 1e-6  # rounding beyond a constraint that is let pass in [rad] and [m]
@@ -102,11 +97,7 @@ class _Rows:
 
 
 class ConstraintCheck:
-    """Looks at states and paths of one arm; belongs to one thread.
-
-    Attributes:
-        constraints: What must hold, all of it.
-    """
+    """Looks at states and paths of one arm; belongs to one thread."""
 
     def __init__(self, model: RobotModel, *constraints: PathConstraints) -> None:
         """Prepare.

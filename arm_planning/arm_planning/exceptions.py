@@ -56,9 +56,6 @@ class PlanningError(ArmError):
     """A request is refused, or no motion was found.
 
     Scenarios: the start is in contact, the goal is out of reach, no path in the time allowed.
-
-    Attributes:
-        code: What MoveIt reports for it.
     """
 
     def __init__(self, code: PlanningCode, reason: str) -> None:

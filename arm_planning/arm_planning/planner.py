@@ -12,15 +12,7 @@ import time
 
 import numpy as np
 
-from arm_model import (
-    Array,
-    checked,
-    CommandError,
-    frozen,
-    PlanningScene,
-    Pose,
-    RobotModel,
-)
+from arm_model import Array, checked, CommandError, frozen, PlanningScene, Pose, RobotModel
 
 from .constraints import ConstraintCheck
 from .exceptions import PlanningCode, PlanningError
@@ -30,14 +22,7 @@ from .industrial.limits import CartesianLimits
 from .industrial.planner import IndustrialPlanner, PLANNER_IDS
 from .industrial.sequence import SequenceItem
 from .link_speed import speed_limited
-from .requests import (
-    Goal,
-    JointGoal,
-    MotionPlan,
-    MotionRequest,
-    PathConstraints,
-    PoseGoal,
-)
+from .requests import Goal, JointGoal, MotionPlan, MotionRequest, PathConstraints, PoseGoal
 from .validity import ValidityCheck, Violation
 
 FREE_MOTION = ('RRTConnectkConfigDefault', 'RRTConnect', 'geometric::RRTConnect')
@@ -345,11 +330,7 @@ class Planner:
         return state if constraints is None or constraints.heeds(state) else None
 
     def _tolerated(
-        self,
-        goal: Goal,
-        start: Array,
-        check: ValidityCheck,
-        constraints: ConstraintCheck | None,
+        self, goal: Goal, start: Array, check: ValidityCheck, constraints: ConstraintCheck | None
     ) -> Iterator[Array | None]:
         """Yield states within the tolerances of a goal without end, None where a try found none.
 

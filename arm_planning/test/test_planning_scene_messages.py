@@ -295,6 +295,7 @@ BEYOND = Mesh(
 REFUSED: dict[str, tuple[Any, PlanningCode, str]] = {
     'no name': (box(''), PlanningCode.INVALID_OBJECT_NAME, 'name'),
     'name of a link': (box('panda_link3'), PlanningCode.INVALID_OBJECT_NAME, 'link'),
+    'no shape': (ObjectMessage(id='a'), PlanningCode.FAILURE, 'no shapes'),
     'frame': (
         _box_with(header=ObjectMessage().header.__class__(frame_id='moon')),
         PlanningCode.FRAME_TRANSFORM_FAILURE,

@@ -31,9 +31,6 @@ class GoalError(CommandError):
     """A trajectory is refused before anything moves.
 
     Scenarios: times that do not increase, a joint that the arm lacks, a point beyond a limit.
-
-    Attributes:
-        code: Code of the action's result.
     """
 
     def __init__(self, code: GoalCode, reason: str) -> None:

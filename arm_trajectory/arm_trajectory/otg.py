@@ -19,13 +19,7 @@ MIN_ACCELERATION_FACTOR = 0.05
 
 
 class Plan:
-    """A jerk-limited motion from one state to another.
-
-    Attributes:
-        duration: How long it takes in [s].
-        lower: Least position of each joint on it in [rad].
-        upper: Greatest position of each joint on it in [rad].
-    """
+    """A jerk-limited motion from one state to another."""
 
     __slots__ = ('_begin', '_lower', '_trajectory', '_upper', 'duration')
 

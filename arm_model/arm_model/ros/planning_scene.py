@@ -13,18 +13,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from moveit_msgs.msg import (
-    AllowedCollisionMatrix as MatrixMessage,
-)
-from moveit_msgs.msg import (
-    AttachedCollisionObject,
-)
-from moveit_msgs.msg import (
-    CollisionObject as ObjectMessage,
-)
-from moveit_msgs.msg import (
-    PlanningScene as SceneMessage,
-)
+from moveit_msgs.msg import AllowedCollisionMatrix as MatrixMessage
+from moveit_msgs.msg import AttachedCollisionObject
+from moveit_msgs.msg import CollisionObject as ObjectMessage
+from moveit_msgs.msg import PlanningScene as SceneMessage
 import numpy as np
 from octomap_msgs.msg import OctomapWithPose
 from shape_msgs.msg import Mesh as MeshMessage
@@ -46,22 +38,14 @@ FrameOf = Callable[[str], Pose]
 
 ADD, REMOVE, APPEND, MOVE = (  # in Python a constant of the type byte is bytes
     int.from_bytes(each, 'little') if isinstance(each, bytes) else int(each)
-    for each in (
-        ObjectMessage.ADD,
-        ObjectMessage.REMOVE,
-        ObjectMessage.APPEND,
-        ObjectMessage.MOVE,
-    )
+    for each in (ObjectMessage.ADD, ObjectMessage.REMOVE, ObjectMessage.APPEND, ObjectMessage.MOVE)
 )
 
 MAX_CORNERS = 300
 """Corners of the hull of a mesh at most: a controller makes it in less than a millisecond."""
 
 LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]] = {
-    SolidPrimitive.BOX: (
-        Box,
-        (SolidPrimitive.BOX_X, SolidPrimitive.BOX_Y, SolidPrimitive.BOX_Z),
-    ),
+    SolidPrimitive.BOX: (Box, (SolidPrimitive.BOX_X, SolidPrimitive.BOX_Y, SolidPrimitive.BOX_Z)),
     SolidPrimitive.SPHERE: (Sphere, (SolidPrimitive.SPHERE_RADIUS,)),
     SolidPrimitive.CYLINDER: (
         Cylinder,
@@ -73,10 +57,7 @@ LENGTHS: dict[int, tuple[type[Box | Sphere | Cylinder | Cone], tuple[int, ...]]]
 
 
 def apply_planning_scene(
-    scene: PlanningScene,
-    message: SceneMessage,
-    positions: Array,
-    frame_of: FrameOf | None = None,
+    scene: PlanningScene, message: SceneMessage, positions: Array, frame_of: FrameOf | None = None
 ) -> PlanningScene:
     """Return a scene with what a message has in the place of what it replaces.
 
@@ -118,10 +99,7 @@ def apply_planning_scene(
 
 
 def apply_collision_object(
-    scene: PlanningScene,
-    message: ObjectMessage,
-    positions: Array,
-    frame_of: FrameOf | None = None,
+    scene: PlanningScene, message: ObjectMessage, positions: Array, frame_of: FrameOf | None = None
 ) -> PlanningScene:
     """Return a scene with an object added, moved, extended or removed.
 

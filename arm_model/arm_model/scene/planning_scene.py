@@ -59,11 +59,6 @@ class PlanningScene:
     for each thread. What no joint of the group moves against each other is not checked.
 
     Attributes:
-        kinematics: The joints that move the links.
-        link_shapes: Shapes of the links.
-        allowed: Pairs that may touch.
-        objects: Objects of the world by name.
-        attached_bodies: Attached bodies by name.
         padding: How much thicker links and what is attached to them count against objects of the
             world in [m], by link; against each other they do not, as in MoveIt.
         scale: The same of factors of their lengths.

@@ -71,7 +71,6 @@ class Mesh:
 
     Attributes:
         points: Its corners (m, 3) in [m].
-        hull: The shape of coal, shared by all scenes.
     """
 
     __slots__ = ('hull', 'points')
@@ -110,8 +109,6 @@ class Cells:
 
     Attributes:
         middles: Their middles (m, 3) in [m], on the grid of their edge about the origin.
-        edge: Their edge in [m].
-        tree: The shape of coal, shared by all scenes.
     """
 
     __slots__ = ('edge', 'middles', 'tree')

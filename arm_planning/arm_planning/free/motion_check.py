@@ -29,11 +29,7 @@ LOOK = 0.03  # turn of all joints together between two looks at constraints in [
 
 
 class MotionCheck:
-    """Collision checks of one search; belongs to one thread.
-
-    Attributes:
-        constraints: What holds everywhere; None for nothing.
-    """
+    """Collision checks of one search; belongs to one thread."""
 
     def __init__(
         self,

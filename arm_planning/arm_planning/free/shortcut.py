@@ -18,10 +18,7 @@ MIN_GAIN = 0.05  # length that a shortcut saves at least in [rad]
 
 
 def shortened(
-    places: Array,
-    draw: np.random.Generator,
-    check: MotionCheck,
-    expired: Callable[[], bool],
+    places: Array, draw: np.random.Generator, check: MotionCheck, expired: Callable[[], bool]
 ) -> Array:
     """Return a path of the same ends that is no longer, as far as the check can see.
 

@@ -13,12 +13,7 @@ from ..exceptions import PlanningCode, PlanningError
 
 
 class LinkKinematics:
-    """Where a link is and how the joints move it; for one thread.
-
-    Attributes:
-        link: Name of the link.
-        kinematics: The joints that move it.
-    """
+    """Where a link is and how the joints move it; for one thread."""
 
     def __init__(self, model: RobotModel, link: str = '') -> None:
         """Prepare.

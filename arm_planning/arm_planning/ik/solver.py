@@ -54,7 +54,6 @@ class IkSolver:
     """Inverse kinematics of one link; for one thread.
 
     Attributes:
-        link: The link that is placed.
         closed_form: Geometry of an arm with a spherical wrist; None for others.
     """
 
@@ -138,12 +137,7 @@ class IkSolver:
         return refined.positions if np.abs(refined.error).max() < error else positions
 
     def _searched(
-        self,
-        pose: Pose,
-        seed: Array,
-        clearances: Clearances | None,
-        timeout: float,
-        count: int,
+        self, pose: Pose, seed: Array, clearances: Clearances | None, timeout: float, count: int
     ) -> list[Array]:
         """Return the solutions that the seed and random starts lead to."""
         limits = self._limits

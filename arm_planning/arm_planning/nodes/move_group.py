@@ -80,11 +80,7 @@ parameters, each before what the package says:
 
 
 class MoveGroup(Node):
-    """Serves clients of MoveIt.
-
-    Attributes:
-        groups: Names of the groups that it plans for.
-    """
+    """Serves clients of MoveIt."""
 
     @destroyed_when_refused
     def __init__(self, package: MoveItPackage | None = None) -> None:

@@ -32,10 +32,7 @@ class RobotGroups:
     It belongs to one thread, as the models do; ``kinematics`` and ``scene`` are for any.
 
     Attributes:
-        name: Name of the robot.
-        names: Names of the groups.
         all_joints: Names of all joints, those that follow others too.
-        kinematics: All joints of the robot.
         scene: The robot alone; all joints move.
         world_frames: Frames in which the root link is held, by the SRDF.
     """

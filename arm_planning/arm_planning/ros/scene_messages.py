@@ -56,10 +56,7 @@ def collision_message(snapshot: SceneSnapshot, robot_name: str) -> SceneMessage:
 
 
 def scene_message(
-    snapshot: SceneSnapshot,
-    robot_name: str,
-    state: StateMessage,
-    components: int = ALL_COMPONENTS,
+    snapshot: SceneSnapshot, robot_name: str, state: StateMessage, components: int = ALL_COMPONENTS
 ) -> SceneMessage:
     """Return a scene as a moveit_msgs/PlanningScene, whole or the parts that are asked for.
 

@@ -29,12 +29,7 @@ from ..exceptions import PlanningCode, PlanningError
 from .robot_groups import RobotGroups
 from .robot_state import joints_of, state_message
 from .scene_changes import apply_attached, apply_object, apply_scene
-from .scene_messages import (
-    ALL_COMPONENTS,
-    attached_messages,
-    collision_message,
-    scene_message,
-)
+from .scene_messages import ALL_COMPONENTS, attached_messages, collision_message, scene_message
 from .scene_snapshot import SceneSnapshot
 from .tf_frames import TfFrames
 
@@ -50,7 +45,6 @@ class SceneMonitor:
     """The scene, and where the joints are; belongs to the executor of its node.
 
     Attributes:
-        robot: The robot.
         snapshot: The scene; a value that any thread may keep.
     """
 

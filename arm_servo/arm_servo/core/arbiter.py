@@ -27,7 +27,6 @@ class CommandArbiter:
     """What may move an arm, and what does.
 
     Attributes:
-        active: What moves the arm.
         execution: The trajectory that was followed last; None before the first.
         target: The single target that was aimed at last; None before the first.
         jogger: Who has jogged last.

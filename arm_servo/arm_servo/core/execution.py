@@ -80,7 +80,6 @@ class Execution:
     Pause, speed and cancel act on the speed scaling of the path, so the arm stays on it.
 
     Attributes:
-        phase: Where the execution is.
         feedback: Where it is on the path, as of the last step.
         on_path: Whether the last step was taken exactly on the path, which was checked.
         ending: How it ends or has ended; None while nothing is decided.

@@ -47,16 +47,12 @@ class CommandGateway:
     belong to the cycle too. Times are steady times in [s].
 
     Attributes:
-        model: The arm.
         holds: Which clients hold a jog, and have to let go after the arm had stopped following.
         stream: What comes on the topic of trajectories, and ends in the same way.
     """
 
     def __init__(
-        self,
-        core: MotionCore,
-        worker: Executor,
-        clock: Callable[[], float] = time.monotonic,
+        self, core: MotionCore, worker: Executor, clock: Callable[[], float] = time.monotonic
     ) -> None:
         """Wait for the arm.
 

@@ -242,8 +242,7 @@ class MotionQueue:
         def rest(cycle: Cycle) -> bool:
             since = cycle.now if command.holds else ordered
             if not self._guarded(
-                command,
-                lambda: self._order.admit(command.source, command.number, since, cycle),
+                command, lambda: self._order.admit(command.source, command.number, since, cycle)
             ):
                 return True
             if not command.holds:

@@ -115,7 +115,6 @@ class MovingArms:
     Attributes:
         lock: Held while an arm looks at the others and lets them know its stop: loops of several
             threads take turns.
-        version: Number of the scene that counts.
     """
 
     def __init__(self, models: Sequence[RobotModel]) -> None:

@@ -31,9 +31,6 @@ class SceneUpdater:
     """Has the newest scene count for one group, as it is with the joints beside the group.
 
     :meth:`replace` is for any thread, :meth:`update` for one: it takes as long as it needs.
-
-    Attributes:
-        gateway: Commands to the core of the group.
     """
 
     def __init__(

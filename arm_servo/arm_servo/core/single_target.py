@@ -19,7 +19,6 @@ class SingleTarget:
     """Plans to one target, anew in every cycle.
 
     Attributes:
-        target: Positions in [rad].
         outcome: How it ended; None while it goes on.
     """
 

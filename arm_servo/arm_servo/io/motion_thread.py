@@ -133,10 +133,7 @@ class MotionThread:
     """
 
     def __init__(
-        self,
-        cycle: MotionCycle,
-        period: float,
-        begin: Callable[[], None] = lambda: None,
+        self, cycle: MotionCycle, period: float, begin: Callable[[], None] = lambda: None
     ) -> None:
         """Prepare.
 

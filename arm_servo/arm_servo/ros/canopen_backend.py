@@ -50,11 +50,7 @@ def serve_canopen(stop: threading.Event, offers: Offers) -> None:
 
 
 class BusDrives:
-    """The drives of a group under a core of their own.
-
-    Attributes:
-        gateway: Commands to the core.
-    """
+    """The drives of a group under a core of their own."""
 
     def __init__(self, master: MasterProcess, model: RobotModel, settings: CoreSettings) -> None:
         """Build the core; nothing moves yet.
@@ -91,11 +87,7 @@ def _check_drives(master: MasterProcess, model: RobotModel) -> None:
 
 
 class CanopenMotion:
-    """The nodes of a robot whose drives are on one bus.
-
-    Attributes:
-        nodes: The nodes, for the executor of the master.
-    """
+    """The nodes of a robot whose drives are on one bus."""
 
     def __init__(self, master: MasterProcess, offers: Offers) -> None:
         """Build cores and nodes; nothing moves yet.

@@ -91,12 +91,7 @@ def declare_broadcaster(node: Node) -> tuple[str, float, bool]:
 
 
 class JointStateBroadcaster:
-    """Publishes what the drives measure, stamped when the oldest of it was measured.
-
-    Attributes:
-        active: Whether it publishes.
-        rate: Its rate in [Hz].
-    """
+    """Publishes what the drives measure, stamped when the oldest of it was measured."""
 
     def __init__(
         self,

@@ -12,11 +12,7 @@ from rclpy.node import Node
 
 
 class ParameterSheet:
-    """What declarations need of a node; made of the tables of a parameter file.
-
-    Attributes:
-        node: Itself, for functions that declare parameters of a node.
-    """
+    """What declarations need of a node; made of the tables of a parameter file."""
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
         """Take what the file has for a node.

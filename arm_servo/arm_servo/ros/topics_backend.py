@@ -182,11 +182,7 @@ class TopicDrives:
     """Drives elsewhere under a core: joint states in, set-points out.
 
     Attributes:
-        gateway: Commands to the core.
         thread: Steps the core; not started yet.
-        period: Period of its loop in [s].
-        topic: Where set-points leave.
-        joint_topic: Joint states of the robot.
     """
 
     def __init__(

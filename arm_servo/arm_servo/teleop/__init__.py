@@ -5,11 +5,4 @@
 from .jog import CartesianJog, Frame, Jog, JointJog, Scales
 from .keyboard_teleop import KeyboardTeleop
 
-__all__ = [
-    'CartesianJog',
-    'Frame',
-    'Jog',
-    'JointJog',
-    'KeyboardTeleop',
-    'Scales',
-]
+__all__ = ['CartesianJog', 'Frame', 'Jog', 'JointJog', 'KeyboardTeleop', 'Scales']

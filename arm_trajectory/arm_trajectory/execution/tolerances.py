@@ -51,9 +51,7 @@ def _distinct(error: float, tolerance: float) -> tuple[str, str]:
 
 
 def merge_tolerances(
-    limits: JointLimits,
-    given: Mapping[str, JointTolerance] | None,
-    default: JointTolerance,
+    limits: JointLimits, given: Mapping[str, JointTolerance] | None, default: JointTolerance
 ) -> Tolerances:
     """Put tolerances together: those of a goal, else the default.
 
@@ -74,10 +72,7 @@ def merge_tolerances(
         if math.isnan(asked.position) or math.isnan(asked.velocity):
             raise GoalError(GoalCode.INVALID_GOAL, f'tolerance of {name}: it is not a number')
     rows = [
-        (
-            _one(asked.position, default.position),
-            _one(asked.velocity, default.velocity),
-        )
+        (_one(asked.position, default.position), _one(asked.velocity, default.velocity))
         for asked in ((given or {}).get(name, JointTolerance()) for name in limits.names)
     ]
     return Tolerances(np.array([row[0] for row in rows]), np.array([row[1] for row in rows]))

@@ -123,10 +123,7 @@ def _place(tree: KinematicTree, joint: str) -> tuple[int, int]:
 
 
 def _ends(
-    tree: KinematicTree,
-    chains: Sequence[tuple[str, str]],
-    joints: Sequence[str],
-    tip: str | None,
+    tree: KinematicTree, chains: Sequence[tuple[str, str]], joints: Sequence[str], tip: str | None
 ) -> tuple[str, str]:
     """Return the base link and the tip link of a group."""
     by_name = {joint.name: joint for joint in tree.joints}

@@ -36,7 +36,6 @@ class CommandConverter:
     A request expires some time after its message was sent; both are steady times in [s].
 
     Attributes:
-        scales: How numbers become speeds.
         capped: What was cut off the last command, in words; empty when nothing was.
     """
 

@@ -40,11 +40,7 @@ MAX_STAMP_AHEAD = 0.1  # how far ahead of this clock a stamp may be in [s]
 
 
 class Servo:
-    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds`` and their services.
-
-    Attributes:
-        converter: Makes requests of messages.
-    """
+    """``~/delta_twist_cmds``, ``~/delta_joint_cmds``, ``~/pose_target_cmds``, and services."""
 
     def __init__(
         self,

@@ -36,11 +36,7 @@ from .pause import TrajectoryPause
 
 
 class TrajectoryController:
-    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and what belongs to them.
-
-    Attributes:
-        active: Whether it takes trajectories.
-    """
+    """``~/follow_joint_trajectory``, ``~/joint_trajectory`` and what belongs to them."""
 
     def __init__(
         self,

@@ -100,9 +100,7 @@ def _point(point: Any) -> GoalPoint:  # noqa: ANN401
 
 
 def _overridden(
-    defaults: Mapping[str, JointTolerance],
-    asked: Sequence[Any],
-    what: str,
+    defaults: Mapping[str, JointTolerance], asked: Sequence[Any], what: str
 ) -> Mapping[str, JointTolerance]:
     """Return tolerances of the parameters, overridden by those of a goal."""
     merged = dict(defaults)

@@ -39,10 +39,7 @@ class TrajectoryPause:
         return self._order(False, words_of_resume, response)
 
     def _order(
-        self,
-        paused: bool,
-        words: Callable[[Snapshot], str],
-        response: Trigger.Response,
+        self, paused: bool, words: Callable[[Snapshot], str], response: Trigger.Response
     ) -> Trigger.Response:
         snapshot = self._gateway.snapshot
         response.message = snapshot.stale(time.monotonic() - snapshot.time)
