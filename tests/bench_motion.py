@@ -34,13 +34,11 @@ from arm_bringup.robots import installed_robots_folder
 from arm_canopen.can import Frame
 from arm_canopen.standard.cob_id import CobId
 from arm_model import Array, load_limits, RobotModel
-from arm_servo import MotionCore, SetPoint
+from arm_servo import JogRequest, MotionCore, SetPoint, TwistCommand
 from arm_servo.core.gateway import CommandGateway, start_worker
-from arm_servo.core.requests import JogRequest
 from arm_servo.io.following import FollowingLimits, FollowingWatch
 from arm_servo.io.joint_feedback import JointFeedback
 from arm_servo.io.motion_thread import MotionCycle, MotionThread
-from arm_servo.jog.servo_source import TwistCommand
 from realtime_loop import raise_priority
 
 if TYPE_CHECKING:
@@ -81,10 +79,7 @@ def on_the_bus(period: int) -> Rows:
     with reserve() as isolation, TemporaryDirectory() as name:
         folder = Path(name)
         bus = fine_bus(folder, period)
-        with (
-            BusRecorder(isolation.bus) as recorder,
-            MovingArm(isolation, folder, bus=bus) as arm,
-        ):
+        with BusRecorder(isolation.bus) as recorder, MovingArm(isolation, folder, bus=bus) as arm:
             arm.follow()
             ended(arm, READY, 3.0)
             begin = len(recorder.frames)

@@ -19,10 +19,9 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import MotionSource
 from arm_canopen.standard.drive import OperationMode
-from arm_servo import MotionCore
+from arm_servo import DisplacementRequest, MotionCore
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.core.requests import DisplacementRequest
 from arm_servo.io.drive_source import DriveSource
 from arm_trajectory import GoalPoint, TrajectoryGoal
 

@@ -17,15 +17,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from arm_model import (
-    Array,
-    CommandError,
-    example_files,
-    load_limits,
-    ModelError,
-    Pose,
-    RobotModel,
-)
+from arm_model import Array, CommandError, example_files, load_limits, ModelError, Pose, RobotModel
 
 CHAINS = ('zyy', 'zyyz', 'zyyzy', 'cyyzyz', 'zpyzyzc', 'zyzyzyzy')
 

@@ -18,15 +18,7 @@ from model_robots import chain_texts
 import numpy as np
 import pytest
 
-from arm_model import (
-    Clearances,
-    CollisionObject,
-    combined,
-    ModelError,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+from arm_model import Clearances, CollisionObject, combined, ModelError, Pose, RobotModel, Sphere
 from arm_model.scene import meshes
 
 CORNERS = list(product((-0.5, 0.5), repeat=3))

@@ -84,9 +84,7 @@ class Bench:
     """An execution with controllers of two joints, which stand at 0."""
 
     def __init__(
-        self,
-        monkeypatch: pytest.MonkeyPatch,
-        known: Mapping[str, controllers.Controller] = ARM,
+        self, monkeypatch: pytest.MonkeyPatch, known: Mapping[str, controllers.Controller] = ARM
     ) -> None:
         self.clients = {each.action(name): Controller() for name, each in known.items()}
         self.controller = next(iter(self.clients.values()))
@@ -436,9 +434,7 @@ def test_what_waits_for_its_controller_can_be_stopped(bench: Bench) -> None:
     assert bench.controller.goal is not None
 
 
-def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(
-    bench: Bench,
-) -> None:
+def test_a_robot_that_moved_while_its_controller_was_waited_for_is_not_moved(bench: Bench) -> None:
     """The trajectory does not begin where it is any more."""
     bench.controller.is_ready = False
     bench.start()

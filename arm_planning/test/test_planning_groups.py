@@ -14,15 +14,7 @@ import numpy as np
 from planning_scenes import distances
 import pytest
 
-from arm_model import (
-    Array,
-    AttachedBody,
-    Box,
-    Clearances,
-    CollisionObject,
-    PlacedShape,
-    Pose,
-)
+from arm_model import Array, AttachedBody, Box, Clearances, CollisionObject, PlacedShape, Pose
 from arm_planning import JointGoal, MotionRequest
 from arm_planning.ros.geometry import pose_message
 from arm_planning.ros.kinematic_services import GroupKinematics

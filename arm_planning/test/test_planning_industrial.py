@@ -27,6 +27,7 @@ from arm_planning import (
     PlanningCode,
     PlanningError,
     PoseGoal,
+    SequenceItem,
     ValidityCheck,
 )
 from arm_planning.curves import arc_around, arc_through, Curve, Line
@@ -34,7 +35,6 @@ from arm_planning.ik.link_kinematics import LinkKinematics
 from arm_planning.ik.solver import IkSolver
 from arm_planning.industrial.limits import CartesianLimits
 from arm_planning.industrial.planner import IndustrialPlanner
-from arm_planning.industrial.sequence import SequenceItem
 from arm_trajectory import Path
 
 pytestmark = pytest.mark.slow

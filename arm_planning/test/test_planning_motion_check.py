@@ -12,8 +12,9 @@ from planning_scenes import DENSE, distances, with_box, with_random_boxes
 import pytest
 
 from arm_model import Array, CollisionObject, Mesh, Plane, PlanningScene, RobotState
+from arm_planning import ValidityCheck
 from arm_planning.free.motion_check import MotionCheck
-from arm_planning.validity import MARGIN, ValidityCheck
+from arm_planning.validity import MARGIN
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 
 MOTIONS = 40  # straight motions that are compared with a dense sampler in each scene

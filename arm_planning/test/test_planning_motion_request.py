@@ -20,8 +20,7 @@ import pytest
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Sphere
-from arm_planning import CircPointKind, JointGoal, PoseGoal
-from arm_planning.requests import Parameterization
+from arm_planning import CircPointKind, JointGoal, Parameterization, PoseGoal
 from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.scene_snapshot import SceneSnapshot
 

@@ -10,13 +10,7 @@ from typing import Any
 
 from geometry_msgs.msg import Pose as PoseMessage
 from isolation import reserve
-from move_group_rig import (
-    joint_goal,
-    motion_request,
-    MoveGroupRig,
-    panda_parameters,
-    READY,
-)
+from move_group_rig import joint_goal, motion_request, MoveGroupRig, panda_parameters, READY
 from moveit_msgs.msg import LinkPadding, MoveItErrorCodes, PlanningScene, PlanningSceneComponents
 from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetStateValidity
 import pytest

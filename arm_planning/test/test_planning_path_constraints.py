@@ -21,17 +21,7 @@ from planning_scenes import (
 )
 import pytest
 
-from arm_model import (
-    Array,
-    Box,
-    Cylinder,
-    frozen,
-    ORIGIN,
-    PlacedShape,
-    Pose,
-    RobotModel,
-    Sphere,
-)
+from arm_model import Array, Box, Cylinder, frozen, ORIGIN, PlacedShape, Pose, RobotModel, Sphere
 from arm_planning import (
     JointGoal,
     MotionRequest,

@@ -9,15 +9,7 @@ import numpy as np
 from planning_scenes import distances, with_box, with_random_boxes
 import pytest
 
-from arm_model import (
-    CollisionObject,
-    frozen,
-    ORIGIN,
-    Pose,
-    RobotModel,
-    RobotState,
-    Sphere,
-)
+from arm_model import CollisionObject, frozen, ORIGIN, Pose, RobotModel, RobotState, Sphere
 from arm_planning import ValidityCheck
 from arm_trajectory import build_path, GoalPoint, GoalRules, TrajectoryGoal
 

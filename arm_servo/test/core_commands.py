@@ -10,19 +10,21 @@ import math
 import numpy as np
 
 from arm_model import Array, Pose
-from arm_servo import Execution, MotionCore
-from arm_servo.core.commands import by_joint
-from arm_servo.core.requests import (
+from arm_servo import (
     DisplacementRequest,
-    ImmediateRequest,
+    Execution,
     JogRequest,
-    MotionRequest,
+    JointCommand,
+    MotionCore,
     PauseRequest,
+    PoseCommand,
     SpeedRequest,
     StopRequest,
     TargetRequest,
+    TwistCommand,
 )
-from arm_servo.jog.servo_source import JointCommand, PoseCommand, TwistCommand
+from arm_servo.core.commands import by_joint
+from arm_servo.core.requests import ImmediateRequest, MotionRequest
 from arm_trajectory import TrajectoryGoal
 
 TIMEOUT = 0.1  # time for which a jog counts in [s]

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from arm_servo import Outcome
+from arm_servo import DisplacementRequest, JogRequest, JointCommand, Outcome, TwistCommand
 from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.core.requests import DisplacementRequest, JogRequest
-from arm_servo.jog.servo_source import JointCommand, TwistCommand
 
 
 class InlineWorker(Executor):

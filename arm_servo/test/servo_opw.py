@@ -63,11 +63,7 @@ def _positions(arm: Opw, centre: Array) -> list[tuple[float, float, float]]:
     found = []
     for theta1, s, tilt in (
         (first - beside, math.hypot(nx, z - c1), math.atan2(nx, z - c1)),
-        (
-            first + beside - PI,
-            math.hypot(nx + 2 * a1, z - c1),
-            -math.atan2(nx + 2 * a1, z - c1),
-        ),
+        (first + beside - PI, math.hypot(nx + 2 * a1, z - c1), -math.atan2(nx + 2 * a1, z - c1)),
     ):
         reach = (s * s + c2 * c2 - k * k) / (2 * s * c2)
         bend = (s * s - c2 * c2 - k * k) / (2 * c2 * k)

@@ -12,7 +12,7 @@ import pytest
 from servo_opw import inverse, OPW
 from servo_runs import run
 
-from arm_servo.jog.servo_source import PoseCommand
+from arm_servo import PoseCommand
 
 pytestmark = pytest.mark.slow
 

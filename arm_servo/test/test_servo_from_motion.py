@@ -51,10 +51,7 @@ def goal(core: MotionCore, rng: np.random.Generator, kind: str) -> TrajectoryGoa
         'one point': [GoalPoint(2.0, tuple(there))],
         'with time to spare': [GoalPoint(8.0, tuple(there))],
         'there and back': [GoalPoint(1.5, tuple(there)), GoalPoint(3.0, tuple(here))],
-        'planned': [
-            GoalPoint(0.0, tuple(here), still),
-            GoalPoint(2.5, tuple(there), still),
-        ],
+        'planned': [GoalPoint(0.0, tuple(here), still), GoalPoint(2.5, tuple(there), still)],
     }[kind]
     return TrajectoryGoal(limits.names, points)
 

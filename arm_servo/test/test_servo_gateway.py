@@ -19,22 +19,24 @@ from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
 from arm_model import CommandError
-from arm_servo import MotionCore, NotReadyError, Source
+from arm_servo import (
+    DisplacementRequest,
+    JogRequest,
+    JointCommand,
+    MotionCore,
+    NotReadyError,
+    PauseRequest,
+    Source,
+    SpeedRequest,
+    StopRequest,
+)
 from arm_servo.core.commands import by_joint
 from arm_servo.core.gateway import start_worker
 from arm_servo.core.motion_queue import MAX_ATTEMPTS, MAX_QUEUED_MOTIONS, MotionCommand
 from arm_servo.core.preparation import CommandBasis, Prepared
-from arm_servo.core.requests import (
-    DisplacementRequest,
-    JogRequest,
-    PauseRequest,
-    SpeedRequest,
-    StopRequest,
-)
 from arm_servo.core.safety_filter import SafetyFilter
 from arm_servo.core.single_target import SingleTarget
 from arm_servo.core.snapshot import MAX_CYCLE_AGE
-from arm_servo.jog.servo_source import JointCommand
 from arm_trajectory import GoalCode, GoalError, GoalPoint, StateMovedError, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

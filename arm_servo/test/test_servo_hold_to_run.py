@@ -13,11 +13,9 @@ import pytest
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import Refusal, RefusalCause
-from arm_servo import NotReadyError, Source
+from arm_servo import JogRequest, JointCommand, NotReadyError, Source
 from arm_servo.core.commands import by_joint
 from arm_servo.core.hold_to_run import BEGIN_MARGIN, GONE_AFTER, HoldToRun
-from arm_servo.core.requests import JogRequest
-from arm_servo.jog.servo_source import JointCommand
 
 PAUSES = st.floats(0.0, GONE_AFTER - 0.1)
 

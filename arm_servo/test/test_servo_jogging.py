@@ -14,8 +14,7 @@ import pytest
 from servo_runs import PERIOD, Run, run
 
 from arm_model import Array, RobotModel, RobotState
-from arm_servo import Cause, Limiter
-from arm_servo.jog.servo_source import JointCommand, PoseCommand, TwistCommand
+from arm_servo import Cause, JointCommand, Limiter, PoseCommand, TwistCommand
 
 pytestmark = pytest.mark.slow
 

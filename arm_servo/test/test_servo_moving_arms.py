@@ -24,12 +24,10 @@ from arm_model import (
     RobotModel,
     RobotState,
 )
-from arm_servo import JogRequest, MotionCore, Outcome, SetPoint
+from arm_servo import JogRequest, JointCommand, MotionCore, Outcome, SetPoint, TargetRequest
 from arm_servo.core.commands import by_joint
 from arm_servo.core.moving_arms import MovingArms
-from arm_servo.core.requests import TargetRequest
 from arm_servo.core.safety_filter import SafetyFilter
-from arm_servo.jog.servo_source import JointCommand
 from arm_trajectory import GoalCode, GoalPoint, OnlineTrajectoryGenerator, TrajectoryGoal
 
 PERIOD = 0.01

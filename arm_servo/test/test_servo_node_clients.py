@@ -11,9 +11,7 @@ from geometry_msgs.msg import TwistStamped
 import numpy as np
 from servo_drives import Drives
 
-from arm_servo import Source
-from arm_servo.core.requests import JogRequest
-from arm_servo.jog.servo_source import TwistCommand
+from arm_servo import JogRequest, Source, TwistCommand
 from arm_servo.ros.refusals import Refusals
 from arm_servo.ros.servo.modes import CommandKind
 from arm_servo.ros.servo.node import Servo

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from arm_model import Array, CommandError, Pose
-from arm_servo import MotionCore, ServoSettings
-from arm_servo.core.requests import JogRequest
-from arm_servo.jog.servo_source import PoseCommand
+from arm_servo import JogRequest, MotionCore, PoseCommand, ServoSettings
 from arm_servo.ros.servo.command_converter import CommandConverter
 from arm_servo.ros.servo.parameters import Scales, ServoParameters, Units
 

@@ -20,8 +20,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from servo_drives import Drives
 
-from arm_servo.core.requests import JogRequest
-from arm_servo.jog.servo_source import PoseCommand
+from arm_servo import JogRequest, PoseCommand
 from arm_servo.ros.servo.node import Servo
 from arm_servo.ros.servo.parameters import declare_servo, PREFIX
 

@@ -13,9 +13,8 @@ from servo_commands import outcome
 from servo_drives import Drives, PERIOD
 
 from arm_canopen import CanopenError, Refusal, RefusalCause
-from arm_servo import MotionCore, NotReadyError, Phase, Source
+from arm_servo import MotionCore, NotReadyError, Phase, Source, SpeedRequest
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.core.requests import SpeedRequest
 from arm_servo.io.drive_reasons import why_not
 from arm_servo.io.drive_source import NOT_ATTACHED
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal

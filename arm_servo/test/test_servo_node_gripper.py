@@ -13,8 +13,7 @@ import pytest
 from servo_drives import Drives, PERIOD
 
 from arm_model import CommandError
-from arm_servo.core.requests import PauseRequest, SpeedRequest, TargetRequest
-from arm_servo.exceptions import NotReadyError
+from arm_servo import NotReadyError, PauseRequest, SpeedRequest, TargetRequest
 from arm_servo.ros.gripper import controller
 from arm_servo.ros.gripper.controller import GripperController
 from arm_servo.ros.gripper.interfaces import ParallelGripper, SingleGripper

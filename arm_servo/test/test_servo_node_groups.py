@@ -15,8 +15,8 @@ from servo_drives import Drives, PERIOD
 from servo_scenes import Listener
 
 from arm_model import CommandError, RobotModel
+from arm_servo import TargetRequest
 from arm_servo.core.motion_queue import MotionCommand
-from arm_servo.core.requests import TargetRequest
 from arm_trajectory import GoalCode, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,8 @@ from servo_commands import jog, move_by, twist
 from servo_drives import Drives, PERIOD
 
 from arm_model import ArmError
-from arm_servo.core.requests import ImmediateRequest, PauseRequest, SpeedRequest, StopRequest
+from arm_servo import PauseRequest, SpeedRequest, StopRequest
+from arm_servo.core.requests import ImmediateRequest
 from arm_servo.core.set_point import MOTIONS
 from arm_trajectory import GoalPoint, TrajectoryGoal
 

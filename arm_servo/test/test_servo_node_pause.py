@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 from servo_drives import Drives
 
-from arm_servo import Source
-from arm_servo.core.requests import PauseRequest, SpeedRequest
+from arm_servo import PauseRequest, Source, SpeedRequest
 from arm_servo.core.snapshot import Snapshot
 from arm_servo.ros.trajectory.pause import words_of_pause, words_of_resume
 
@@ -23,11 +22,7 @@ IDLE = Snapshot(1.0, None, None, '')
         (IDLE, 'nothing is under way', 'was not paused'),
         (replace(IDLE, paused=True), 'already', 'nothing is under way'),
         (replace(IDLE, source=Source.JOG), 'the jog ends', 'was not paused'),
-        (
-            replace(IDLE, source=Source.TARGET, paused=True),
-            'already',
-            'the single target goes on',
-        ),
+        (replace(IDLE, source=Source.TARGET, paused=True), 'already', 'the single target goes on'),
         (replace(IDLE, paused=True, speed=0.0), 'already', 'the speed override is 0'),
     ],
 )

@@ -20,12 +20,12 @@ from arm_servo import (
     Limiter,
     MotionCore,
     MotionReport,
+    PauseRequest,
     ServoSettings,
     Source,
     VelocityBoundsSettings,
 )
 from arm_servo.core.gateway import CommandGateway
-from arm_servo.core.requests import PauseRequest
 from arm_servo.ros.servo.status import code_of, status_of, StatusCode
 
 

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from arm_model import Array, CommandError
-from arm_servo import CoreSettings, MotionCore, Phase, Source
-from arm_servo.core.requests import DisplacementRequest
+from arm_servo import CoreSettings, DisplacementRequest, MotionCore, Phase, Source
 from arm_trajectory import GoalCode, GoalError, GoalPoint, TrajectoryGoal
 
 pytestmark = pytest.mark.slow

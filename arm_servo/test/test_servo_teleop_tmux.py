@@ -73,9 +73,7 @@ def test_jogging_with_real_key_presses(pane: Pane, servo: ServoListener) -> None
 
     pane.press('R', '6')
     servo.client.spin_until(
-        lambda: [list(each.velocities) for each in servo.jogs][-3:] == [[0.0]] * 3,
-        TIMEOUT,
-        'rest',
+        lambda: [list(each.velocities) for each in servo.jogs][-3:] == [[0.0]] * 3, TIMEOUT, 'rest'
     )
     assert list(servo.jogs[0].joint_names) == ['joint_6_t']
     assert list(servo.jogs[0].velocities) == pytest.approx([-0.05])

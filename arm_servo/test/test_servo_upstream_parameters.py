@@ -87,7 +87,7 @@ SERVO_HUMBLE: dict[str, Any] = {
         'low_latency_mode': False,
         'num_outgoing_halt_msgs_to_publish': 4,
         'joint_limit_margin': 0.1,
-    },
+    }
 }
 
 CONTROL: dict[str, Any] = {
@@ -268,9 +268,7 @@ def test_upstream_parameters_are_accepted(nodes: dict[str, dict[str, Any]]) -> N
 
 @pytest.mark.parametrize('offers', [Offers(trajectories=False), Offers()])
 def test_nodes_begin_with_upstream_parameters(
-    offers: Offers,
-    tmp_path: Path,
-    isolation: Isolation,
+    offers: Offers, tmp_path: Path, isolation: Isolation
 ) -> None:
     """The nodes themselves, with everything at once from a file, and name what has no effect."""
     urdf, srdf = texts('panda')

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from arm_model import RobotState
-from arm_trajectory import JointTolerance, merge_tolerances, Path
+from arm_trajectory import JointTolerance, merge_tolerances, Path, Timing
 from arm_trajectory.paths.path import cubic, linear, quintic
 from arm_trajectory.paths.rounding import rounded
-from arm_trajectory.paths.time_scaling import Timing
 
 pytestmark = pytest.mark.slow
 
