@@ -381,6 +381,7 @@ def test_services_of_kinematics_refuse_alike(rig: MoveGroupRig) -> None:
     for request, code, words in (
         (ik(group_name=''), CODE.INVALID_GROUP_NAME, 'group'),
         (ik(ik_link_name='moon'), CODE.INVALID_LINK_NAME, 'moon'),
+        (ik(ik_link_names=['a', 'b']), CODE.INVALID_LINK_NAME, '2 ik_link_names'),
         (nowhere, CODE.INVALID_GOAL_CONSTRAINTS, 'finite|nan'),
         (far, CODE.NO_IK_SOLUTION, 'reach'),
         (lost, CODE.FRAME_TRANSFORM_FAILURE, 'moon'),
@@ -397,7 +398,9 @@ def test_services_of_kinematics_refuse_alike(rig: MoveGroupRig) -> None:
         ({'group_name': ''}, CODE.INVALID_GROUP_NAME, 'group'),
         ({'link_name': 'moon'}, CODE.INVALID_LINK_NAME, 'moon'),
         ({'max_step': 0.0}, CODE.INVALID_GOAL_CONSTRAINTS, 'max_step'),
+        ({'waypoints': []}, CODE.INVALID_GOAL_CONSTRAINTS, 'no way-points'),
         ({'waypoints': [pose_at(NAN)]}, CODE.INVALID_GOAL_CONSTRAINTS, 'finite|nan'),
+        ({'max_velocity_scaling_factor': 2.0}, CODE.FAILURE, 'is 2'),
     ):
         given: dict[str, Any] = {
             'group_name': 'panda_arm', 'max_step': 0.01, 'waypoints': [down(0.4, 0.1, 0.5)]

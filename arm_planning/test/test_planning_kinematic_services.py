@@ -144,27 +144,6 @@ def test_solutions_heed_constraints(
     assert words in str(reason)
 
 
-@pytest.mark.parametrize(
-    ('change', 'code'),
-    [
-        ({'group_name': 'legs'}, PlanningCode.INVALID_GROUP_NAME),
-        ({'ik_link_name': 'moon'}, PlanningCode.INVALID_LINK_NAME),
-        ({'ik_link_names': ['a', 'b']}, PlanningCode.INVALID_LINK_NAME),
-        (
-            {'pose_stamped': PoseStamped(pose=pose_at(float('nan'), 0.0, 0.0))},
-            PlanningCode.INVALID_GOAL_CONSTRAINTS,
-        ),
-        ({'pose_stamped': PoseStamped(pose=pose_at(9.0, 0.0, 0.0))}, PlanningCode.NO_IK_SOLUTION),
-    ],
-)
-def test_what_is_no_pose_is_refused(change: dict[str, Any], code: PlanningCode) -> None:
-    """With MoveIt's codes."""
-    request = ik_request(TIP)
-    for name, value in change.items():
-        setattr(request, name, value)
-    assert refused(KINEMATICS.ik, request).code is code
-
-
 def path_request(*poses: Pose, **fields: Any) -> GetCartesianPath.Request:
     """Return a request through poses of the tip."""
     request = GetCartesianPath.Request(group_name='panda_arm', max_step=0.01, **fields)
@@ -246,22 +225,3 @@ def test_a_path_to_where_the_arm_is_stands_still() -> None:
     assert response.fraction == 1.0
     _, tip = places_of(response)
     assert tip == pytest.approx(np.array([TIP.position] * len(tip)), abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ('change', 'code'),
-    [
-        ({'group_name': 'legs'}, PlanningCode.INVALID_GROUP_NAME),
-        ({'link_name': 'moon'}, PlanningCode.INVALID_LINK_NAME),
-        ({'max_step': 0.0}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
-        ({'waypoints': []}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
-        ({'max_velocity_scaling_factor': 2.0}, PlanningCode.FAILURE),
-        ({'waypoints': [pose_at(0.0, float('inf'), 0.0)]}, PlanningCode.INVALID_GOAL_CONSTRAINTS),
-    ],
-)
-def test_what_is_no_path_is_refused(change: dict[str, Any], code: PlanningCode) -> None:
-    """With MoveIt's codes."""
-    request = path_request(moved(0.0, 0.1, 0.0))
-    for name, value in change.items():
-        setattr(request, name, value)
-    assert refused(KINEMATICS.cartesian_path, request).code is code
