@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 import threading
 
-from input_devices import HAT, InjectedDevice, InjectedDevices, STICK
+from input_devices import InjectedDevice, InjectedDevices, xbox_pad
 from isolation import Isolation
 from model_robots import texts
 import pytest
@@ -19,15 +19,14 @@ from arm_servo.teleop.servo_gamepad import ServoGamepad
 from operator_input.ros import serve_teleop
 
 pytestmark = pytest.mark.scenario
-ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
+ABS_X, ABS_Y, ABS_HAT0Y = 0, 1, 0x11
 EAST, LEFT_SHOULDER, RIGHT_SHOULDER, START = 0x131, 0x136, 0x137, 0x13B
 
 
 @pytest.fixture
 def pad() -> InjectedDevice:
     """Make an Xbox pad."""
-    axes = dict.fromkeys((ABS_X, ABS_Y, ABS_RX, ABS_RY), STICK) | {ABS_HAT0Y: HAT}
-    return InjectedDevice('Xbox Wireless Controller', range(0x130, 0x13F), axes, vendor=0x045E)
+    return xbox_pad()
 
 
 @pytest.fixture

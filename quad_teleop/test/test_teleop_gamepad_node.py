@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import subprocess
 import threading
 
-from input_devices import HAT, InjectedDevice, InjectedDevices, STICK
+from input_devices import InjectedDevice, InjectedDevices, xbox_pad
 from isolation import Isolation
 from processes import executable
 import pytest
@@ -19,7 +19,7 @@ from operator_input.ros import serve_teleop
 from quad_teleop.nodes.teleop_gamepad import TeleopGamepad
 
 pytestmark = pytest.mark.scenario
-ABS_X, ABS_Y, ABS_RX, ABS_RY, ABS_HAT0Y = 0, 1, 3, 4, 0x11
+ABS_Y, ABS_HAT0Y = 1, 0x11
 SOUTH, LEFT_SHOULDER, RIGHT_SHOULDER, SELECT = 0x130, 0x136, 0x137, 0x13A
 FORWARD = (0.15, 0.0, 0.0)
 
@@ -27,8 +27,7 @@ FORWARD = (0.15, 0.0, 0.0)
 @pytest.fixture
 def pad() -> InjectedDevice:
     """Make an Xbox pad."""
-    axes = dict.fromkeys((ABS_X, ABS_Y, ABS_RX, ABS_RY), STICK) | {ABS_HAT0Y: HAT}
-    return InjectedDevice('Xbox Wireless Controller', range(0x130, 0x13F), axes, vendor=0x045E)
+    return xbox_pad()
 
 
 @pytest.fixture

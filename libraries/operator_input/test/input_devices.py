@@ -104,6 +104,12 @@ class InjectedDevice(InputDevice):
         self.is_closed = True
 
 
+def xbox_pad() -> InjectedDevice:
+    """Make a pad with two sticks and a d-pad, as the driver xpad offers it."""
+    axes = dict.fromkeys((0, 1, 3, 4), STICK) | dict.fromkeys((0x10, 0x11), HAT)
+    return InjectedDevice('Xbox Wireless Controller', range(0x130, 0x13F), axes, vendor=0x045E)
+
+
 class InjectedDevices(InputDevices):
     """The machine's devices; a test plugs them in and out."""
 

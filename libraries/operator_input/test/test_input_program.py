@@ -12,7 +12,7 @@ import threading
 import time
 from typing import Any
 
-from input_devices import InjectedDevice, InjectedDevices, STICK
+from input_devices import InjectedDevice, InjectedDevices, xbox_pad
 from input_terminal import ScriptedTerminal
 import pytest
 
@@ -35,7 +35,6 @@ from operator_input.gamepad import Axis, Button, Deadman, Gamepad, GamepadState,
 TIMEOUT = 10.0  # [s]
 PERIOD = 0.01  # [s]
 ABS_Y, LEFT_SHOULDER, SOUTH = 1, 0x136, 0x130
-STICKS = (0, ABS_Y, 3, 4)
 
 
 class Record:
@@ -221,16 +220,6 @@ def with_pad(
             TeleopProgram(gamepad, mapping, stop).run()
 
     return run
-
-
-def xbox_pad() -> InjectedDevice:
-    """Return a pad with two sticks."""
-    return InjectedDevice(
-        'Xbox Wireless Controller',
-        range(0x130, 0x13F),
-        dict.fromkeys(STICKS, STICK),
-        vendor=0x045E,
-    )
 
 
 @pytest.mark.parametrize(
