@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 import difflib
 import fcntl
@@ -36,23 +37,12 @@ def can_interfaces() -> dict[str, CanInterface]:
     found = {}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         for _, name in socket.if_nameindex():
-            try:
-                interface = _inspect(probe, name)
-            except OSError:
-                continue  # it went away while we looked
-            if interface is not None:
-                found[name] = interface
+            with suppress(OSError):  # it went away meanwhile
+                if _request(probe, _SIOCGIFHWADDR, name, '=H') == _ARPHRD_CAN:
+                    is_up = bool(_request(probe, _SIOCGIFFLAGS, name, '=H') & _IFF_UP)
+                    queue_length = _request(probe, _SIOCGIFTXQLEN, name, '=i')
+                    found[name] = CanInterface(name, is_up, queue_length)
     return found
-
-
-def _inspect(probe: socket.socket, name: str) -> CanInterface | None:
-    if _request(probe, _SIOCGIFHWADDR, name, '=H') != _ARPHRD_CAN:
-        return None
-    return CanInterface(
-        name,
-        is_up=bool(_request(probe, _SIOCGIFFLAGS, name, '=H') & _IFF_UP),
-        queue_length=_request(probe, _SIOCGIFTXQLEN, name, '=i'),
-    )
 
 
 def _request(probe: socket.socket, request: int, name: str, layout: str) -> int:

@@ -31,7 +31,6 @@ from typing import TypeVar
 
 from arm_canopen.config.findings import Findings, RefusedError
 from arm_canopen.config.read.document import (
-    DocumentKind,
     Item,
     read_document,
     Scalar,
@@ -46,7 +45,7 @@ from ..fault import Fault, FaultInjection, FAULTS
 from .scenario import Event, Step
 from .text import parse_fault, suggestion
 
-KIND = DocumentKind('scenario', "begin with 'steps:' and a list below it")
+BEGINNING = "begin with 'steps:' and a list below it"
 TOP_KEYS = ('seed', 'steps')
 STEP_KEYS = ('after', 'when', 'device', 'fault', 'end')
 EVENT_KEYS = ('device', 'nmt', 'drive', 'position_above', 'position_below')
@@ -74,7 +73,7 @@ def load_scenario(
         ConfigError: It is wrong; the message lists every error with its place and remedy.
     """
     findings = Findings()
-    document = read_document(path, findings, KIND)
+    document = read_document(path, findings, 'scenario', BEGINNING)
     steps = _Reader(devices, drives, findings).read(document)
     findings.raise_errors()
     return steps
@@ -98,7 +97,7 @@ class _Reader:
         steps = document.entries.get('steps')
         if not isinstance(steps, YamlList):
             place = steps.place if steps is not None else document.place
-            self._findings.error(place, "no list 'steps'", KIND.beginning)
+            self._findings.error(place, "no list 'steps'", BEGINNING)
             return ()
         read = [self._step(item) for item in steps.items]
         return tuple(step for step in read if step is not None)

@@ -7,7 +7,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 
 from arm_canopen.can import open_bus
 from arm_canopen.config.model import BusConfig, NodeConfig
@@ -32,15 +31,6 @@ from .target import find_target, Target, warn_of_master
 
 FROM_EDS = ('device_type', 'vendor_id', 'product_code')
 """The identity that the EDS has; the rest is in bus.yml."""
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """An object that was compared."""
-
-    expected: BootWrite  # what it should hold
-    device: str  # what it holds, in words
-    is_equal: bool  # it is what it should be
 
 
 def add_parser(parsers: SubParsers) -> None:
@@ -72,16 +62,13 @@ def run(options: argparse.Namespace) -> int:
         session = Session(bus, target.bus)
         warn_of_master(session, target)
         objects = _objects(target, _consumers(session, target), defaults=options.defaults)
-        rows = [_compare(session, target, expected) for expected in objects]
-    shown = [row for row in rows if options.all or not row.is_equal]
-    if shown:
-        names = ObjectNames(target.dictionary)
-        print_table(
-            ('', 'object', 'file', 'device', 'source'),
-            [_cells(target, names, row) for row in shown],
-        )
-    different = sum(not row.is_equal for row in rows)
-    print_line(f'{target.name}: {len(rows)} objects compared, {different or "none"} different')
+        rows = [_compared(session, target, expected) for expected in objects]
+    different = [row for row in rows if row[0] != '=']
+    if shown := rows if options.all else different:
+        print_table(('', 'object', 'file', 'device', 'source'), shown)
+    print_line(
+        f'{target.name}: {len(rows)} objects compared, {len(different) or "none"} different'
+    )
     return 1 if different else 0
 
 
@@ -153,23 +140,16 @@ def _read(session: Session, target: Target, index: int, subindex: int) -> bytes:
     return session.read(client, index, subindex, target.timeout)
 
 
-def _compare(session: Session, target: Target, expected: BootWrite) -> Row:
+def _compared(session: Session, target: Target, expected: BootWrite) -> tuple[str, ...]:
+    """Return the row of an object: whether it is equal, what it should hold, and what it holds."""
     try:
         data = _read(session, target, expected.index, expected.subindex)
     except SdoAbortError as error:
-        return Row(expected, abort_text(error.code), is_equal=False)
-    return Row(expected, _text(target, expected, data), expected.fits(data))
-
-
-def _cells(target: Target, names: ObjectNames, row: Row) -> tuple[str, ...]:
-    expected = row.expected
-    return (
-        '=' if row.is_equal else '*',
-        names.title(expected.index, expected.subindex),
-        _text(target, expected, expected.data),
-        row.device,
-        expected.key,
-    )
+        mark, held = '*', abort_text(error.code)
+    else:
+        mark, held = '=' if expected.fits(data) else '*', _text(target, expected, data)
+    title = ObjectNames(target.dictionary).title(expected.index, expected.subindex)
+    return mark, title, _text(target, expected, expected.data), held, expected.key
 
 
 def _text(target: Target, expected: BootWrite, data: bytes) -> str:

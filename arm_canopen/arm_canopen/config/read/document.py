@@ -69,22 +69,14 @@ class YamlMap:
 Item: TypeAlias = Scalar | YamlList | YamlMap
 
 
-@dataclass(frozen=True, slots=True)
-class DocumentKind:
-    """The messages for a kind of file that is wrong as a whole."""
-
-    name: str  # what it is called
-    beginning: str  # what its top level is to look like
-
-
-BUS_YML = DocumentKind(
-    'bus.yml',
-    "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'",
-)
+BEGINNING = "begin with the sections 'options:', 'master:', 'defaults:' and 'nodes:'"
 
 
 def read_document(
-    path: str | os.PathLike[str], findings: Findings, kind: DocumentKind = BUS_YML
+    path: str | os.PathLike[str],
+    findings: Findings,
+    kind: str = 'bus.yml',
+    beginning: str = BEGINNING,
 ) -> YamlMap:
     """Read a YAML file whose top level is a mapping; findings gets duplicate keys and the like.
 
@@ -98,23 +90,23 @@ def read_document(
     findings.error(
         Place(file),
         'the file is empty' if item is None else 'the top level is not a mapping',
-        kind.beginning,
+        beginning,
     )
     findings.raise_errors()
     return YamlMap(Place(file))
 
 
-def _read(file: Path, findings: Findings, kind: DocumentKind) -> Item | None:
+def _read(file: Path, findings: Findings, kind: str) -> Item | None:
     item: Item | None = None
     try:
         root = yaml.compose(_read_text(file), Loader=yaml.SafeLoader)
         if root is not None:
             item = _Converter(file, findings).convert(root, Place(file))
     except OSError as error:
-        remedy = f'correct the path of the {kind.name}'
+        remedy = f'correct the path of the {kind}'
         findings.error(Place(file), f'cannot be read: {error.strerror or error}', remedy)
     except RecursionError:
-        findings.error(Place(file), 'nested too deeply', f'a {kind.name} needs five levels')
+        findings.error(Place(file), 'nested too deeply', f'a {kind} needs five levels')
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = Place(file, mark.line + 1) if mark else Place(file)

@@ -26,7 +26,10 @@ def read_drive(section: YamlMap, values: dict[str, Any], findings: Findings) -> 
     if 'switching_state' in values:
         values['switching_state'] = _switching_state(section, values, findings)
     if 'recovery' in values:
-        values['recovery'] = _policy(section.entries['recovery'], values['recovery'], findings)
+        text, place = values['recovery'], section.entries['recovery'].place
+        if text not in POLICIES:
+            findings.error(place, f'unknown policy {text!r}', f'take {" or ".join(POLICIES)}')
+        values['recovery'] = POLICIES.get(text, RecoveryPolicy.MANUAL)
     return _with_scales(DriveConfig(), section, values, findings)
 
 
@@ -137,12 +140,6 @@ def _with_inverses(values: dict[str, Any]) -> dict[str, Any]:
     )
     added = {key: 1.0 / values[given] for key, given in inverses if given in values}
     return added | values
-
-
-def _policy(item: Item, text: str, findings: Findings) -> RecoveryPolicy:
-    if text not in POLICIES:
-        findings.error(item.place, f'unknown policy {text!r}', f'take {" or ".join(POLICIES)}')
-    return POLICIES.get(text, RecoveryPolicy.MANUAL)
 
 
 def _axis_name(item: Item, findings: Findings) -> str:

@@ -14,7 +14,7 @@ from ..model.pdo_direction import RPDO, TPDO
 from ..read.document import Item, YamlMap
 from .cob_ids import assign_cob_ids
 from .device import DeviceDraft, read_device
-from .device_timing import BusContext, finish_device
+from .device_timing import finish_device
 from .eds_files import EdsFiles
 from .layout import lay_out, Layout
 from .master import build_master
@@ -42,9 +42,15 @@ def resolve_bus(
     unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
     _check_axis_names(unique, findings)
     _check_lifecycle(master, drafts, findings)
-    context = BusContext(options, settings, master)
     nodes = tuple(
-        finish_device(draft, draft.config, context, findings)
+        finish_device(
+            draft,
+            draft.config,
+            master,
+            findings,
+            multiplier=options.heartbeat_multiplier,
+            is_watched=settings.watch_devices,
+        )
         for draft in _with_cob_ids(unique, findings)
         if draft.config is not None
     )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 from ...standard.dictionary import object_address, ObjectDictionary
@@ -16,7 +16,6 @@ from ..model.bus import NodeConfig, PdoConfig
 from ..model.master import MasterConfig
 from ..model.pdo_direction import Direction, RPDO, TPDO
 from ..model.tpdo_freshness import with_event_timer
-from ..sections import MasterSettings, Options
 from ..units import MILLISECONDS
 from .device import DeviceDraft
 from .drive_types import check_drive_types
@@ -26,20 +25,19 @@ CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD,
 """What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""
 
 
-@dataclass(frozen=True, slots=True)
-class BusContext:
-    """What a device meets on its bus."""
-
-    options: Options
-    settings: MasterSettings
-    master: MasterConfig
-
-
 def finish_device(
-    draft: DeviceDraft, config: NodeConfig, context: BusContext, findings: Findings
+    draft: DeviceDraft,
+    config: NodeConfig,
+    master: MasterConfig,
+    findings: Findings,
+    *,
+    multiplier: float,
+    is_watched: bool,
 ) -> NodeConfig:
-    """Complete a device whose PDOs have their final COB-IDs."""
-    master = context.master
+    """Complete a device whose PDOs have their final COB-IDs.
+
+    The master waits multiplier periods for its heartbeat, where it is watched.
+    """
     _check_period(draft, master, findings)
     _check_sync(draft.pdos, master, findings)
     if config.is_drive:
@@ -49,11 +47,11 @@ def finish_device(
     life_time_factor = draft.settings.life_time_factor
     if life_time_factor is None:
         life_time_factor = config.dictionary.number(Index.LIFE_TIME_FACTOR) or 0
-    multiplier = draft.settings.heartbeat_multiplier or context.options.heartbeat_multiplier
+    multiplier = draft.settings.heartbeat_multiplier or multiplier
     return replace(
         config,
         heartbeat_producer=producer,
-        heartbeat_timeout=producer * multiplier if context.settings.watch_devices else 0.0,
+        heartbeat_timeout=producer * multiplier if is_watched else 0.0,
         guard_time=_guard_time(draft, config.dictionary, producer, findings),
         life_time_factor=life_time_factor,
         heartbeat_consumer=_heartbeat_consumer(draft, config.dictionary, master, findings),
