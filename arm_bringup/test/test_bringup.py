@@ -13,7 +13,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import service_manager, TIMEOUT
+from small_processes import TIMEOUT
 
 from arm_bringup import bringup
 from arm_bringup.examples.wave import main as demo
@@ -66,19 +66,6 @@ def test_hardware_is_on_can0_unless_said_otherwise(workspace: SmallWorkspace) ->
     assert 'slaves' not in seen
     assert 'ros2 service call /panda_joint1/init' in seen
     assert '/target' not in seen, 'it is absolute: nothing for an arm that is anywhere'
-
-
-def test_a_master_that_dies_ends_it_with_its_last_words(workspace: SmallWorkspace) -> None:
-    """The exit code is 1, the reason is in the last lines."""
-    words = '[FATAL] [master]: no bus'
-    workspace.install(
-        'arm_canopen', 'master', then="print('[FATAL] [master]: no bus'); sys.exit(3)"
-    )
-    code, output = workspace.run('panda', '--simulate', '--can', 'auto')
-    assert code == 1
-    tail = output.split('bringup')[-1]
-    assert 'master ended with exit code 3' in tail
-    assert words in tail
 
 
 def test_a_master_that_never_gets_ready_ends_it(workspace: SmallWorkspace) -> None:
@@ -200,21 +187,6 @@ def test_help_names_the_robots(workspace: SmallWorkspace) -> None:
     assert code == 0
     for words in ('robots: gp110, panda', '--simulate', '--can', 'can0', 'Ctrl-C'):
         assert words in output
-
-
-def test_systemd_gets_readiness_and_the_stop(
-    workspace: SmallWorkspace,
-) -> None:
-    """``Type=notify`` of a unit waits for the whole bring-up."""
-    with service_manager() as (address, manager):
-        workspace.environment['NOTIFY_SOCKET'] = address
-        with workspace.bringup('panda', '--simulate', '--can', 'auto') as process:
-            read_until(process, 'all is ready')
-            assert manager.recv(100) == b'READY=1'
-            process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=TIMEOUT)
-            assert manager.recv(100) == b'STOPPING=1'
-        assert process.returncode == 0
 
 
 @pytest.mark.parametrize(

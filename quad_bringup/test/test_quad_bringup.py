@@ -12,7 +12,7 @@ import signal
 from isolation import Isolation
 import pytest
 from small_bringup import read_until, SmallWorkspace
-from small_processes import service_manager, TIMEOUT
+from small_processes import TIMEOUT
 
 from quad_bringup import bringup
 
@@ -145,21 +145,6 @@ def test_simulations_in_other_namespaces_run_side_by_side(workspace: SmallWorksp
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=TIMEOUT)
             assert process.returncode == 0
-
-
-def test_systemd_gets_readiness_and_the_stop(
-    workspace: SmallWorkspace,
-) -> None:
-    """``Type=notify`` of a unit waits for the whole bring-up."""
-    with service_manager() as (address, manager):
-        workspace.environment['NOTIFY_SOCKET'] = address
-        with workspace.bringup('--simulate') as process:
-            read_until(process, 'all is ready')
-            assert manager.recv(100) == b'READY=1'
-            process.send_signal(signal.SIGTERM)
-            process.communicate(timeout=TIMEOUT)
-            assert manager.recv(100) == b'STOPPING=1'
-        assert process.returncode == 0
 
 
 @pytest.mark.parametrize('words', [['--simulat'], ['--port', '/dev/ttyAMA0', '--hol']])
