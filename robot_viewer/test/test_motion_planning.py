@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 import time
 from typing import Any
 
@@ -29,20 +30,7 @@ from node_runner import LATCHED
 from node_runner.action_goals import serve_goals
 from robot_viewer.nodes.motion_planning import ANSWER_TIME
 from robot_viewer.nodes.planning_messages import box_message, changed
-from robot_viewer.page.motion_plan import (
-    AddBox,
-    ChooseGoal,
-    ChooseObject,
-    DRAGGED,
-    DragGoal,
-    DragObject,
-    Execute,
-    NO_GOAL,
-    Plan,
-    PlanRequest,
-    RemoveObject,
-    SceneObject,
-)
+from robot_viewer.page.motion_plan import DRAGGED, NO_GOAL, SceneObject
 from robot_viewer.page.plan_panel import PlanPanel
 from robot_viewer.page.robot_page import RobotPage
 
@@ -134,15 +122,17 @@ class Planner(ViewerRig):
         panel = self.viewer.page._plan
         return panel._outcome.content if panel else ''
 
-    def ask(self, request: PlanRequest) -> None:
-        """Ask as a button of the page does."""
-        self.panel._ask(request)
+    def do(self, action: str, *arguments: Any, **options: Any) -> None:
+        """Do it as a button of the page does."""
+        panel = self.panel
+        actor = panel._scene if hasattr(panel._scene, action) else panel._plan
+        panel._order(partial(getattr(actor, action), *arguments, **options))
 
     def plan(self) -> None:
         """Have a motion to the state 'up' planned."""
         count = len(self.move.goals)
-        self.ask(ChooseGoal('up'))
-        self.ask(Plan(0.5))
+        self.do('choose_goal', 'up')
+        self.do('plan', 0.5)
         self.spin_until(lambda: len(self.move.goals) > count, 'a goal')
         self.move.answer(MoveItErrorCodes.SUCCESS, planned_trajectory=_trajectory())
         self.spin_until(lambda: 'takes 2.0 s' in self.said, 'a plan')
@@ -200,15 +190,15 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
     wanted = {each.joint_name: each.position for each in constraints.joint_constraints}
     assert wanted == {'shoulder': 0.5, 'lift': 0.2, 'roll': 0.3}
     assert not planner.execute.goals
-    planner.ask(Execute())
-    planner.ask(Execute())
+    planner.do('execute')
+    planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     assert planner.execute.goals[-1].request.trajectory == _trajectory()
-    planner.ask(Plan(1.0))
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: 'still executing' in planner.said, 'a refusal')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
     planner.spin_until(lambda: 'executed' in planner.said, 'the end')
-    planner.ask(Execute())
+    planner.do('execute')
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
     assert len(planner.execute.goals) == len(planner.move.goals) == 1
 
@@ -216,15 +206,15 @@ def test_what_is_planned_is_executed_once(planner: Planner) -> None:
 def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
     """The end of an execution takes its own goal away, and no other."""
     planner.plan()
-    planner.ask(Execute())
+    planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
-    planner.ask(ChooseGoal(DRAGGED))
+    planner.do('choose_goal', DRAGGED)
     planner.spin_until(lambda: planner.panel._goal.value == DRAGGED, 'another goal')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
     planner.spin_until(lambda: 'executed' in planner.said, 'the end')
     assert planner.panel._goal.value == DRAGGED
     planner.plan()
-    planner.ask(Execute())
+    planner.do('execute')
     planner.spin_until(lambda: len(planner.execute.goals) == 2, 'an execution')
     planner.execute.answer(MoveItErrorCodes.SUCCESS)
     planner.spin_until(lambda: planner.panel._goal.value == NO_GOAL, 'no goal')
@@ -232,15 +222,15 @@ def test_a_goal_that_is_chosen_meanwhile_stays(planner: Planner) -> None:
 
 def test_a_refusal_is_shown_in_its_words(planner: Planner) -> None:
     """And nothing can be executed."""
-    planner.ask(Plan(1.0))
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: 'choose a goal' in planner.said, 'a refusal')
-    planner.ask(ChooseGoal('up'))
-    planner.ask(Plan(1.0))
+    planner.do('choose_goal', 'up')
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: bool(planner.move.goals), 'a goal')
     planner.move.answer(MoveItErrorCodes.GOAL_IN_COLLISION, 'wheel touches <box>')
     words = 'GOAL_IN_COLLISION: wheel touches &lt;box&gt;'
     planner.spin_until(lambda: words in planner.said, 'the words')
-    planner.ask(Execute())
+    planner.do('execute')
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
     assert not planner.execute.goals
 
@@ -248,22 +238,22 @@ def test_a_refusal_is_shown_in_its_words(planner: Planner) -> None:
 def test_stop_cancels_and_forgets(planner: Planner) -> None:
     """An execution, at once or before it was accepted; a plan; one that is being made."""
     planner.plan()
-    planner.ask(Execute())
+    planner.do('execute')
     planner.spin_until(lambda: bool(planner.execute.goals), 'an execution')
     planner.viewer.stop()
     planner.spin_until(lambda: bool(planner.execute.canceled), 'a cancel')
     planner.spin_until(lambda: [each.data for each in planner.events] == ['stop'], 'the event')
     planner.spin_until(lambda: 'PREEMPTED: canceled' in planner.said, 'the end')
     planner.plan()
-    planner.ask(Execute())
+    planner.do('execute')
     planner.viewer.stop()  # in the same turn
     planner.spin_until(lambda: len(planner.execute.canceled) == 2, 'a cancel')
     planner.plan()
     planner.viewer.stop()
-    planner.ask(Execute())  # it came late
+    planner.do('execute')  # it came late
     planner.spin_until(lambda: 'nothing is planned' in planner.said, 'a refusal')
-    planner.ask(ChooseGoal('up'))
-    planner.ask(Plan(1.0))
+    planner.do('choose_goal', 'up')
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: len(planner.move.goals) == 4, 'a goal')
     planner.viewer.stop()
     planner.spin_until(lambda: bool(planner.move.canceled), 'a cancel')
@@ -274,9 +264,9 @@ def test_stop_cancels_and_forgets(planner: Planner) -> None:
 
 def test_a_goal_is_dragged(planner: Planner) -> None:
     """Joints with which the tip is there are the goal; without any, the pose is."""
-    planner.ask(ChooseGoal(DRAGGED))
+    planner.do('choose_goal', DRAGGED)
     for x in (0.3, 0.4, 0.5):
-        planner.ask(DragGoal(Transform((x, 0.0, 0.5))))
+        planner.do('drag_goal', Transform((x, 0.0, 0.5)))
     planner.spin_until(lambda: len(planner.asked) >= 2, 'inverse kinematics')
     assert len(planner.asked) == 2, 'those in between are left out'
     last = planner.asked[-1]
@@ -284,16 +274,16 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
     assert last.pose_stamped.pose.position.x == 0.5
     planning = planner.viewer._planning
     planner.spin_until(lambda: planning._pose is None, 'a solution')
-    planner.ask(Plan(1.0))
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: len(planner.move.goals) == 1, 'a goal')
     (joints,) = planner.move.goals[-1].request.request.goal_constraints
     places = {each.joint_name: each.position for each in joints.joint_constraints}
     assert places == {'shoulder': 0.7, 'lift': 0.8}
     planning._asked = time.monotonic() - ANSWER_TIME  # its answer was lost
     planner.ik_code = MoveItErrorCodes.NO_IK_SOLUTION
-    planner.ask(DragGoal(Transform((9.0, 0.0, 0.5))))
+    planner.do('drag_goal', Transform((9.0, 0.0, 0.5)))
     planner.spin_until(lambda: 'NO_IK_SOLUTION: out of reach' in planner.said, 'the words')
-    planner.ask(Plan(1.0))
+    planner.do('plan', 1.0)
     planner.spin_until(lambda: len(planner.move.goals) == 2, 'a goal')
     (pose,) = planner.move.goals[-1].request.request.goal_constraints
     assert not pose.joint_constraints
@@ -304,19 +294,19 @@ def test_a_goal_is_dragged(planner: Planner) -> None:
 
 def test_boxes_come_move_and_go(planner: Planner) -> None:
     """As move_group has them; one that was added can be dragged at once."""
-    planner.ask(AddBox((0.1, 0.2, 0.4)))
+    planner.do('add_box', (0.1, 0.2, 0.4))
     planner.spin_until(lambda: 'box1' in planner.objects, 'a box')
     assert planner.objects['box1'].pose.translation[2] == pytest.approx(0.2), 'on the ground'
     planner.spin_until(lambda: planner.panel._object.value == 'box1', 'the choice')
     assert planner.panel._object_gizmo is not None
-    planner.ask(DragObject(Transform((1.0, 0.0, 0.0)), is_last=False))
-    planner.ask(DragObject(Transform((2.0, 0.0, 0.0)), is_last=True))
+    planner.do('drag_object', Transform((1.0, 0.0, 0.0)), is_last=False)
+    planner.do('drag_object', Transform((2.0, 0.0, 0.0)), is_last=True)
     planner.spin_until(lambda: 'is moved' in planner.said, 'a move')
     assert planner.objects['box1'].pose.translation[0] == 2.0
-    planner.ask(AddBox((0.1, 0.2, 0.4)))
+    planner.do('add_box', (0.1, 0.2, 0.4))
     planner.spin_until(lambda: planner.panel._object.value == 'box2', 'the choice')
-    planner.ask(ChooseObject('box1'))
-    planner.ask(RemoveObject())
+    planner.do('choose_object', 'box1')
+    planner.do('remove_object')
     planner.spin_until(lambda: set(planner.objects) == {'box2'}, 'the end of it')
     planner.spin_until(lambda: planner.panel._object.options == ('none', 'box2'), 'the list')
     assert planner.panel._object_gizmo is None

@@ -22,18 +22,14 @@ from node_runner import LATCHED
 
 from ..link_poses import link_pose, moved
 from ..page.motion_plan import (
-    ChooseGoal,
-    ChooseGroup,
     DRAGGED,
-    DragGoal,
-    Execute,
     NO_GOAL,
-    Plan,
+    Order,
     plan_groups,
+    PlanActions,
     PlanGroup,
     PlannedMotion,
-    PlanRequest,
-    ShowAgain,
+    SceneActions,
     tip_line,
 )
 from ..page.plan_panel import PlanPanel
@@ -64,7 +60,7 @@ class Page(Protocol):
     """Where it is shown."""
 
     def offer_plan(
-        self, groups: Sequence[str], ask: Callable[[PlanRequest], None]
+        self, groups: Sequence[str], actions: tuple[PlanActions, SceneActions, Order]
     ) -> PlanPanel | None:
         """Offer to plan motions; None as long as there is no robot."""
 
@@ -87,7 +83,7 @@ class MotionPlanning:
         node: Node,
         page: Page,
         positions: Mapping[str, float],
-        order: Callable[[Callable[[], None]], None],
+        order: Order,
     ) -> None:
         """Find no move_group yet."""
         self._node, self._page, self._positions, self._order = node, page, positions, order
@@ -153,33 +149,26 @@ class MotionPlanning:
             self._node.get_logger().error(f'robot_description_semantic: {error}')
             self._semantic = ''
             return
-        ask = lambda request: self._order(lambda: self.take(request))  # noqa: E731
-        self._panel = self._page.offer_plan(list(self._groups), ask)
+        actions = (self, self._scene, self._order_here)
+        self._panel = self._page.offer_plan(list(self._groups), actions)
         if self._panel is not None:
-            self._choose_group(next(iter(self._groups)))
+            self.choose_group(next(iter(self._groups)))
             self._scene.show_on(self._panel, tree.root)
 
     # -- what people do
 
-    def take(self, request: PlanRequest) -> None:
-        """Do what people ask for."""
-        if self._panel is None:
-            return
-        match request:
-            case ChooseGroup(name):
-                self._choose_group(name)
-            case ChooseGoal(name):
-                self._choose_goal(name)
-            case DragGoal(pose):
-                self._drag_goal(pose)
-            case Plan(share):
-                self._plan(share)
-            case Execute():
-                self._execute()
-            case ShowAgain():
-                self._shown_since = time.monotonic() if self._motion else None
-            case _:
-                self._scene.take(request)
+    def _order_here(self, action: Callable[[], None]) -> None:
+        """Have done what people do, unless they did it to a robot that has gone."""
+
+        def act() -> None:
+            if self._panel is not None:
+                action()
+
+        self._order(act)
+
+    def show_again(self) -> None:
+        """Show once more what was planned."""
+        self._shown_since = time.monotonic() if self._motion else None
 
     def stop(self) -> None:
         """End what is executed and planned, also of others; nothing planned stays executable."""
@@ -203,13 +192,15 @@ class MotionPlanning:
         if self._panel is not None and self._tree is not None:
             self._panel.show_ghost(moved(self._tree, self._positions, goals))
 
-    def _choose_group(self, name: str) -> None:
+    def choose_group(self, name: str) -> None:
+        """Plan for another group."""
         self._group = self._groups[name]
         if self._panel is not None:
             self._panel.show_group(self._group)
-        self._choose_goal(NO_GOAL)
+        self.choose_goal(NO_GOAL)
 
-    def _choose_goal(self, name: str) -> None:
+    def choose_goal(self, name: str) -> None:
+        """Go to a state of the SRDF, or to where the goal is dragged."""
         panel, tree = self._panel, self._tree
         if panel is None or tree is None:
             return
@@ -228,7 +219,8 @@ class MotionPlanning:
         panel.place_goal(link_pose(tree, self._group.tip, everywhere))
         panel.show_ghost(everywhere)
 
-    def _drag_goal(self, pose: Transform) -> None:
+    def drag_goal(self, pose: Transform) -> None:
+        """Have the tip at a pose in the root link."""
         self._drop()
         if self._goal != DRAGGED and self._panel is not None:
             self._goal = DRAGGED
@@ -269,7 +261,8 @@ class MotionPlanning:
             self._pose = self._pose if reason else None  # the joints are the goal
             self._say(reason, failed=True)
 
-    def _plan(self, share: float) -> None:
+    def plan(self, share: float) -> None:
+        """Plan, at a share of the greatest velocity and acceleration."""
         links, tree = self._links, self._tree
         goal = self._pose or self._joints
         if links is None or tree is None:
@@ -311,7 +304,8 @@ class MotionPlanning:
             failed=False,
         )
 
-    def _execute(self) -> None:
+    def execute(self) -> None:
+        """Execute what was planned."""
         links = self._links
         if links is None or self._panel is None:
             return
@@ -340,7 +334,7 @@ class MotionPlanning:
         self._execution = None
         reason = why or refusal(result.error_code)
         if not reason and self._executed_goal == (self._goal, self._joints):
-            self._choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
+            self.choose_goal(NO_GOAL)  # unless another one was chosen meanwhile
         self._say(reason or 'executed', failed=bool(reason))
 
     def _drop(self) -> None:

@@ -14,16 +14,7 @@ from urdf_reader import Transform
 
 from node_runner import LATCHED
 
-from ..page.motion_plan import (
-    AddBox,
-    ChooseObject,
-    DragObject,
-    free_name,
-    NO_OBJECT,
-    PlanRequest,
-    RemoveObject,
-    SceneObject,
-)
+from ..page.motion_plan import free_name, NO_OBJECT, SceneObject
 from ..page.plan_panel import PlanPanel
 from .planning_messages import box_message, changed, Message, moved_message, removed_message
 
@@ -62,18 +53,10 @@ class SceneEditor:
         self._show()
         self._ask()
 
-    def take(self, request: PlanRequest) -> None:
-        """Do what people ask for; what is not of the scene is left."""
-        match request:
-            case ChooseObject(name):
-                self._chosen, self._grips = name, False
-                self._show()
-            case DragObject(pose, is_last):
-                self._drag(pose, is_last=is_last)
-            case AddBox(size):
-                self._add_box(size)
-            case RemoveObject():
-                self._remove()
+    def choose_object(self, name: str) -> None:
+        """Choose an object, to be dragged or removed."""
+        self._chosen, self._grips = name, False
+        self._show()
 
     def _ask(self) -> None:
         """Have the whole scene: the topic of MoveIt may have had nothing but a change."""
@@ -105,7 +88,8 @@ class SceneEditor:
         thing = self._objects.get(self._chosen)
         self._panel.choose_object(self._chosen, None if thing and thing.attached else thing)
 
-    def _drag(self, pose: Transform, *, is_last: bool) -> None:
+    def drag_object(self, pose: Transform, *, is_last: bool) -> None:
+        """Move the object that is chosen; the last of several says so."""
         thing = self._objects.get(self._chosen)
         if thing is None or self._panel is None:
             return
@@ -114,13 +98,15 @@ class SceneEditor:
         if is_last:
             self._change(moved_message(thing, pose), f'{thing.name} is moved')
 
-    def _add_box(self, size: tuple[float, float, float]) -> None:
+    def add_box(self, size: tuple[float, float, float]) -> None:
+        """Add a box of a size in [m]."""
         name = free_name(list(self._objects))
         self._chosen = name  # to be dragged as soon as it is there
         place = Transform((AHEAD, 0.0, size[2] / 2.0))
         self._change(box_message(name, size, place, self._root), f'{name} is added')
 
-    def _remove(self) -> None:
+    def remove_object(self) -> None:
+        """Remove the object that is chosen."""
         thing = self._objects.get(self._chosen)
         if thing is not None:
             self._chosen = NO_OBJECT

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What can be planned for, what was planned, and what people ask for; no browser, no ROS."""
+"""What can be planned for, what was planned, and what people do; no browser, no ROS."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from urdf_reader import (
     DescriptionError,
@@ -166,83 +166,46 @@ class SceneObject:
     attached: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ChooseGroup:
-    """Plan for another group."""
+class PlanActions(Protocol):
+    """What people do to plan motions."""
 
-    name: str
+    def choose_group(self, name: str) -> None:
+        """Plan for another group."""
 
+    def choose_goal(self, name: str) -> None:
+        """Go to a state of the SRDF, or to where the goal is dragged."""
 
-@dataclass(frozen=True, slots=True)
-class ChooseGoal:
-    """Go to a state of the SRDF, or to where the goal is dragged."""
+    def drag_goal(self, pose: Transform) -> None:
+        """Have the tip at a pose in the root link."""
 
-    name: str
+    def plan(self, share: float) -> None:
+        """Plan, at a share of the greatest velocity and acceleration."""
 
+    def execute(self) -> None:
+        """Execute what was planned."""
 
-@dataclass(frozen=True, slots=True)
-class DragGoal:
-    """Have the tip at a pose in the root link."""
-
-    pose: Transform
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Plan, at a share of the greatest velocity and acceleration."""
-
-    share: float
+    def show_again(self) -> None:
+        """Show once more what was planned."""
 
 
-@dataclass(frozen=True, slots=True)
-class Execute:
-    """Execute what was planned."""
+class SceneActions(Protocol):
+    """What people do with the objects of the planning scene."""
+
+    def choose_object(self, name: str) -> None:
+        """Choose an object, to be dragged or removed."""
+
+    def drag_object(self, pose: Transform, *, is_last: bool) -> None:
+        """Move the object that is chosen; the last of several says so."""
+
+    def add_box(self, size: tuple[float, float, float]) -> None:
+        """Add a box of a size in [m]."""
+
+    def remove_object(self) -> None:
+        """Remove the object that is chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class ShowAgain:
-    """Show once more what was planned."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChooseObject:
-    """Choose an object, to be dragged or removed."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class DragObject:
-    """Move the object that is chosen; the last of several says so."""
-
-    pose: Transform
-    is_last: bool
-
-
-@dataclass(frozen=True, slots=True)
-class AddBox:
-    """Add a box of a size in [m]."""
-
-    size: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class RemoveObject:
-    """Remove the object that is chosen."""
-
-
-PlanRequest: TypeAlias = (
-    ChooseGroup
-    | ChooseGoal
-    | DragGoal
-    | Plan
-    | Execute
-    | ShowAgain
-    | ChooseObject
-    | DragObject
-    | AddBox
-    | RemoveObject
-)
+Order: TypeAlias = Callable[[Callable[[], None]], None]
+"""Has something done in the thread of the robot."""
 
 
 def free_name(names: Sequence[str]) -> str:

@@ -26,22 +26,14 @@ from viser import (
 
 from ..link_poses import links_beyond
 from .motion_plan import (
-    AddBox,
-    ChooseGoal,
-    ChooseGroup,
-    ChooseObject,
     DRAGGED,
-    DragGoal,
-    DragObject,
-    Execute,
     NO_GOAL,
     NO_OBJECT,
-    Plan,
+    Order,
+    PlanActions,
     PlanGroup,
-    PlanRequest,
-    RemoveObject,
+    SceneActions,
     SceneObject,
-    ShowAgain,
 )
 from .robot_scene import put, RobotScene, Tint
 from .scene_objects import SceneObjects
@@ -60,7 +52,7 @@ DONE, FAILED, PLAIN = '#2f9e44', '#e03131', '#868e96'
 
 
 class PlanPanel:
-    """Asks for what people do, and shows what it is given; it decides nothing."""
+    """Orders what people do, and shows what it is given; it decides nothing."""
 
     def __init__(
         self,
@@ -68,9 +60,10 @@ class PlanPanel:
         robot: RobotScene,
         tree: KinematicTree,
         groups: Sequence[str],
-        ask: Callable[[PlanRequest], None],
+        actions: tuple[PlanActions, SceneActions, Order],
     ) -> None:
-        self._server, self._robot, self._tree, self._ask = server, robot, tree, ask
+        self._server, self._robot, self._tree = server, robot, tree
+        self._plan, self._scene, self._order = plan, scene, _ = actions
         self._path = robot.path_of(tree.root)
         self._ghost: RobotScene | None = None
         self._links: frozenset[str] = frozenset()
@@ -81,19 +74,19 @@ class PlanPanel:
         gui = server.gui
         self._folder = gui.add_folder(None)
         with self._folder:
-            self._group = self._dropdown('Group', groups, ChooseGroup)
-            self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), ChooseGoal)
+            self._group = self._dropdown('Group', groups, plan.choose_group)
+            self._goal = self._dropdown('Goal', (NO_GOAL, DRAGGED), plan.choose_goal)
             speed = add_speed(gui)
-            self._button('Plan', lambda: Plan(speed()))
-            self._execute = self._button('Execute', Execute, WANTED)
-            self._again = self._button('Show again', ShowAgain)
+            self._button('Plan', lambda: plan.plan(speed()))
+            self._execute = self._button('Execute', plan.execute, WANTED)
+            self._again = self._button('Show again', plan.show_again)
             self._outcome: GuiHtmlHandle = gui.add_html('')
-            self._object = self._dropdown('Object', (NO_OBJECT,), ChooseObject)
-            self._remove = self._button('Remove it', RemoveObject)
+            self._object = self._dropdown('Object', (NO_OBJECT,), scene.choose_object)
+            self._remove = self._button('Remove it', scene.remove_object)
             self._size = gui.add_vector3(
                 'Size [m]', BOX_SIZE, min=(0.01, 0.01, 0.01), max=(3.0, 3.0, 3.0), step=0.01
             )
-            self._button('Add a box', self._box)
+            self._button('Add a box', self._add_box)
         self.allow(execute=False)
         self.choose_object(NO_OBJECT, None)
 
@@ -203,15 +196,16 @@ class PlanPanel:
     # -- what people do, in threads of the page
 
     async def _goal_dragged(self, event: TransformControlsEvent) -> None:
-        self._ask(DragGoal(_pose_of(event.target)))
+        self._order(partial(self._plan.drag_goal, _pose_of(event.target)))
 
     async def _object_dragged(self, event: TransformControlsEvent) -> None:
         if event.phase != 'start':
-            self._ask(DragObject(_pose_of(event.target), event.phase == 'end'))
+            pose, is_last = _pose_of(event.target), event.phase == 'end'
+            self._order(partial(self._scene.drag_object, pose, is_last=is_last))
 
-    def _box(self) -> PlanRequest:
+    def _add_box(self) -> None:
         x, y, z = self._size.value
-        return AddBox((x, y, z))
+        self._scene.add_box((x, y, z))
 
     def _gizmo(
         self,
@@ -224,23 +218,23 @@ class PlanPanel:
         return gizmo
 
     def _dropdown(
-        self, label: str, options: Sequence[str], request: Callable[[str], PlanRequest]
+        self, label: str, options: Sequence[str], choose: Callable[[str], None]
     ) -> GuiDropdownHandle[str]:
         dropdown: GuiDropdownHandle[str] = self._server.gui.add_dropdown(label, tuple(options))
-        dropdown.on_update(partial(self._chosen, request))
+        dropdown.on_update(partial(self._chosen, choose))
         return dropdown
 
     def _chosen(
-        self, request: Callable[[str], PlanRequest], event: GuiEvent[GuiDropdownHandle[str]]
+        self, choose: Callable[[str], None], event: GuiEvent[GuiDropdownHandle[str]]
     ) -> None:
         if event.client_id is not None:  # or it was set here
-            self._ask(request(event.target.value))
+            self._order(partial(choose, event.target.value))
 
     def _button(
-        self, label: str, request: Callable[[], PlanRequest], color: Color = NEUTRAL
+        self, label: str, press: Callable[[], None], color: Color = NEUTRAL
     ) -> GuiButtonHandle:
         button = self._server.gui.add_button(label, color=color)
-        button.on_click(lambda _: self._ask(request()))
+        button.on_click(lambda _: self._order(press))
         return button
 
 

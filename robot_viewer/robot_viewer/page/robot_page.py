@@ -38,7 +38,7 @@ from .first_motion_panel import FirstMotionActions, FirstMotionPanel
 from .gate import Gate
 from .jog_panel import JogActions, Jogged, JogPanel
 from .log import Log
-from .motion_plan import PlanRequest
+from .motion_plan import Order, PlanActions, SceneActions
 from .overlay import Overlay, StopAnswer
 from .plan_panel import PlanPanel
 from .robot_scene import Ground, RobotScene, start_position, travel
@@ -345,7 +345,7 @@ class RobotPage:
             self._plots.show(history, now)
 
     def offer_plan(
-        self, groups: Sequence[str], ask: Callable[[PlanRequest], None]
+        self, groups: Sequence[str], actions: tuple[PlanActions, SceneActions, Order]
     ) -> PlanPanel | None:
         """Offer to plan motions, for the robot that is shown now.
 
@@ -355,7 +355,7 @@ class RobotPage:
         if self._scene is None or self._tree is None:
             return None
         with self._tab('Plan'):
-            self._plan = PlanPanel(self._server, self._scene, self._tree, groups, ask)
+            self._plan = PlanPanel(self._server, self._scene, self._tree, groups, actions)
         return self._plan
 
     def offer_body(self) -> BodyPanel | None:
