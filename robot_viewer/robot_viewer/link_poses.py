@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from urdf_reader import (
     about,
@@ -99,45 +99,39 @@ def link_poses(tree: KinematicTree, positions: Mapping[str, float]) -> dict[str,
         positions: Of joints in [rad] or [m]; those that are missing stand at zero.
     """
     poses = {tree.root: Transform()}
-    waiting = list(tree.joints)
-    while waiting:  # a joint may stand before the one that its parent hangs on
-        later: list[Joint] = []
-        for joint in waiting:
-            if joint.parent in poses:
-                place = joint_transform(joint, joint_position(joint, positions, 0.0) or 0.0)
-                poses[joint.child] = compose(poses[joint.parent], place)
-            else:
-                later.append(joint)
-        waiting = later
+    for joint in _parents_first(tree):
+        place = joint_transform(joint, joint_position(joint, positions, 0.0) or 0.0)
+        poses[joint.child] = compose(poses[joint.parent], place)
     return poses
 
 
 def link_paths(tree: KinematicTree, base: str) -> dict[str, str]:
     """Return a path of each link, below that of the link it hangs on; parents come first."""
     paths = {tree.root: f'{base}/{tree.root}'}
-    waiting = list(tree.joints)
-    while waiting:  # a joint may stand before the one that its parent hangs on
-        later: list[Joint] = []
-        for joint in waiting:
-            if joint.parent in paths:
-                paths[joint.child] = f'{paths[joint.parent]}/{joint.child}'
-            else:
-                later.append(joint)
-        waiting = later
+    for joint in _parents_first(tree):
+        paths[joint.child] = f'{paths[joint.parent]}/{joint.child}'
     return paths
 
 
 def links_beyond(tree: KinematicTree, joints: frozenset[str]) -> frozenset[str]:
-    """Return the links that joints move."""
-    moved: set[str] = set()
-    found = True
-    while found:
-        found = False
-        for joint in tree.joints:
-            own = joint.name in joints or (
-                joint.mimic is not None and joint.mimic.source in joints
-            )
-            if joint.child not in moved and (own or joint.parent in moved):
-                moved.add(joint.child)
-                found = True
-    return frozenset(moved)
+    """Return the links that joints move, and those that follow one of them."""
+    beyond: set[str] = set()
+    for joint in _parents_first(tree):
+        follows = joint.mimic is not None and joint.mimic.source in joints
+        if joint.name in joints or follows or joint.parent in beyond:
+            beyond.add(joint.child)
+    return frozenset(beyond)
+
+
+def _parents_first(tree: KinematicTree) -> Iterator[Joint]:
+    """Yield each joint behind the one that its parent hangs on, in whatever order they stand."""
+    known, waiting = {tree.root}, list(tree.joints)
+    while waiting:
+        later: list[Joint] = []
+        for joint in waiting:
+            if joint.parent in known:
+                known.add(joint.child)
+                yield joint
+            else:
+                later.append(joint)
+        waiting = later

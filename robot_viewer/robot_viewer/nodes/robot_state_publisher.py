@@ -10,6 +10,7 @@ import sys
 import time
 
 from geometry_msgs.msg import TransformStamped
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_sensor_data
@@ -21,13 +22,28 @@ from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 from urdf_reader import DescriptionError, JointKind, read_urdf
 
-from node_runner import destroyed_when_refused, LATCHED, notify_ready, ParameterError, run_node
+from node_runner import (
+    destroyed_when_refused,
+    LATCHED,
+    notify_ready,
+    ParameterError,
+    ParameterReader,
+    refuse_misspelt,
+    run_node,
+)
 
 from ..joint_watch import JointWatch
-from ..state_publisher import FrameTransform, MessageProblem, StatePublisher
-from .parameters import check, declare, DESCRIPTION, read_settings
+from ..state_publisher import (
+    FrameTransform,
+    HIGHEST_FREQUENCY,
+    MessageProblem,
+    Settings,
+    StatePublisher,
+)
 
 NAME = 'robot_state_publisher'
+DESCRIPTION = 'robot_description'
+DEFAULTS = Settings()
 TF_DEPTH = 100
 """Queue of /tf, as tf2_ros has it."""
 WATCH_PERIOD = 1.0
@@ -156,6 +172,49 @@ def _start() -> RobotStatePublisher:
     node = RobotStatePublisher(_read_argument(sys.argv))
     notify_ready()
     return node
+
+
+def declare(node: Node, description: str = '') -> None:
+    """Declare all parameters.
+
+    Raises:
+        ParameterError: A value is not usable, or a name is misspelt.
+    """
+    read = ParameterReader(node, fixed=False)
+    read.number(
+        'publish_frequency',
+        DEFAULTS.publish_frequency,
+        (0.0, HIGHEST_FREQUENCY),
+        'greatest rate of each transform in [Hz]; 0: one for every message',
+    )
+    read.text('frame_prefix', DEFAULTS.frame_prefix, 'put in front of each frame name, as it is')
+    read.flag(
+        'ignore_timestamp',
+        'publish at each message, whatever its stamp is',
+        default=DEFAULTS.ignore_timestamp,
+    )
+    read.text(DESCRIPTION, description, 'URDF as XML text; may be changed while it runs')
+    refuse_misspelt(node)
+
+
+def read_settings(node: Node) -> Settings:
+    """Read all but the description."""
+    return Settings(
+        node.get_parameter('publish_frequency').value,
+        node.get_parameter('frame_prefix').value,
+        node.get_parameter('ignore_timestamp').value,
+    )
+
+
+def check(parameters: Iterable[Parameter]) -> SetParametersResult:
+    """Refuse a description that cannot be used; ranges are rclpy's to check."""
+    for parameter in parameters:
+        if parameter.name == DESCRIPTION:
+            try:
+                read_urdf(str(parameter.value or ''))
+            except DescriptionError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+    return SetParametersResult(successful=True)
 
 
 def main() -> int:
