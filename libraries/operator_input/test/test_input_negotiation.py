@@ -13,7 +13,6 @@ from operator_input.terminal import (
     PROBE_PERIOD,
     PROBE_TIMEOUT,
     PUSH,
-    QUERY,
     Stage,
     TerminalDialogue,
 )
@@ -25,29 +24,6 @@ ALL = Kitty(31)
 def flags(value: Kitty | int) -> Report:
     """Answer the question for the flags."""
     return Report(ReportKind.KITTY_FLAGS, Kitty(value))
-
-
-def test_terminal_with_the_protocol() -> None:
-    """It is switched on after the first answer, confirmed by the second, and taken back."""
-    dialogue = TerminalDialogue()
-    assert dialogue.start() == QUERY
-    assert dialogue.take(flags(0)) == PUSH + QUERY
-    assert dialogue.take(ATTRIBUTES) == ''
-    stages = [dialogue.stage]
-    assert dialogue.take(flags(ALL)) == ''
-    assert [*stages, dialogue.stage] == [Stage.PUSHED, Stage.ACTIVE]
-    assert dialogue.take(ATTRIBUTES) == ''
-    assert not dialogue.is_waiting
-    assert dialogue.stop() == POP
-
-
-def test_terminal_without_the_protocol() -> None:
-    """Nothing is switched on, nothing is taken back."""
-    dialogue = TerminalDialogue()
-    dialogue.start()
-    assert dialogue.take(ATTRIBUTES) == ''
-    assert dialogue.stage is Stage.ABSENT
-    assert dialogue.stop() == ''
 
 
 @pytest.mark.parametrize('got', [Kitty.DISAMBIGUATE, Kitty.EVENT_TYPES, Kitty.ALL_KEYS])
@@ -95,14 +71,3 @@ def test_silent_terminal_is_lost() -> None:
     assert not dialogue.probe(10.0 + PROBE_PERIOD / 2)
     assert not dialogue.is_lost(10.0 + PROBE_TIMEOUT)
     assert dialogue.is_lost(10.1 + PROBE_TIMEOUT)
-
-
-def test_sign_of_life_resets_the_timeout() -> None:
-    """Any byte from the terminal counts."""
-    dialogue = TerminalDialogue()
-    now = 10.0
-    for _ in range(100):
-        assert dialogue.probe(now) == PROBE
-        dialogue.received()
-        now += PROBE_PERIOD
-        assert not dialogue.is_lost(now)
