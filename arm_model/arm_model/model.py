@@ -9,6 +9,7 @@ import copy
 from itertools import combinations
 import math
 from pathlib import Path
+import threading
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,21 @@ from .scene.planning_scene import PlanningScene
 MIN_REACH = 0.01  # reach of a group that is shorter, such as a finger that slides, in [m]
 
 
+class _Thread(threading.local):
+    """What one thread has computed last in a scene."""
+
+    def __init__(self, scene: PlanningScene) -> None:
+        self.data: Native = scene.kinematics.native.createData()
+        self.at = b''  # the positions of that
+        self.clearances = Clearances(scene)
+
+
 class RobotModel:
     """An arm: a group of joints, in a chain or a tree, with a base and a tip link.
 
     Poses and Jacobians are expressed in the base link; twists and Jacobian rows are linear before
     angular, taken at the origin of the tip. Positions are plain angles, also of continuous joints.
-    It caches the kinematics of the last position, so it belongs to one loop.
+    Any thread may ask it: each has its own memory of the last position and of distances.
 
     Attributes:
         poses: Named poses of the SRDF, in the order of the joints.
@@ -88,12 +98,10 @@ class RobotModel:
         notes = list(shapes.notes)
         self.limits: JointLimits = merge_limits(self.kinematics.joints, tree, limits, notes)
         self.poses = _poses(self.limits, semantic.poses.get(chosen.name, {}), notes)
-        self._data = self._model.createData()
         self._tip_frame = self.kinematics.frames[self.tip]
         self._base_frame = self.kinematics.frames[self.base]
         if self._model.frames[self._base_frame].parentJoint:
             raise ModelError(f'group {self.group}: its base link {self.base!r} is moved by it')
-        self._at = b''  # positions of the kinematics that are cached
         allowed, contact_notes = AllowedCollisionMatrix.of_srdf(semantic), list[str]()
         self.scene = with_default_collisions(
             PlanningScene(self.kinematics, shapes.by_link, allowed),
@@ -113,7 +121,7 @@ class RobotModel:
             unknown = frozenset().union(*self.moved_by_others.values())
             self.scene = self.scene.with_allowed(self.allowed.with_entries(unknown, True))
         self.notes = tuple(notes)
-        self._clearances = Clearances(self.scene)
+        self._thread = _Thread(self.scene)
         self.reach = self._reach()
 
     @classmethod
@@ -208,7 +216,7 @@ class RobotModel:
         """Return the Jacobian of the tip (6, n), expressed in the base link."""
         self._update(positions)
         world = pin.getFrameJacobian(
-            self._model, self._data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            self._model, self._thread.data, self._tip_frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
         rotation = self._placement(self._base_frame).rotation
         return turned_twists(rotation, self.kinematics.projected(world))
@@ -217,7 +225,7 @@ class RobotModel:
         """Return the least height of a joint or the tip over the base link in [m], along its z."""
         self._update(positions)
         base = self._placement(self._base_frame)
-        places = [self._data.oMi[joint].translation for joint in self._trunk()]
+        places = [self._thread.data.oMi[joint].translation for joint in self._trunk()]
         places.append(self._placement(self._tip_frame).translation)
         return float(min(base.actInv(place)[2] for place in places))
 
@@ -242,8 +250,9 @@ class RobotModel:
             within: Distance of interest in [m]; where it is more, a lower bound is good enough.
         """
         least = LeastClearance(within)
-        for positions in places[self._clearances.provably_clear(places, within) :]:
-            distances = self._clearances.least(positions, within)
+        clearances = self._clearances
+        for positions in places[clearances.provably_clear(places, within) :]:
+            distances = clearances.least(positions, within)
             pair = int(distances.argmin())
             if distances[pair] < least.distance:
                 least = LeastClearance(float(distances[pair]), self.pairs[pair])
@@ -252,10 +261,6 @@ class RobotModel:
     def stays_apart(self, lower: Array, upper: Array, within: float) -> bool:
         """Whether no shapes are as near at any positions between bounds, as far as is known."""
         return self._clearances.apart(lower, upper, within)
-
-    def clearances(self, scene: PlanningScene | None = None) -> Clearances:
-        """Return what measures distances for another thread than the owner's."""
-        return Clearances(self.scene if scene is None else scene)
 
     def use_scene(self, clearances: Clearances) -> None:
         """Measure all distances in another scene from now on; for the loop that owns the model.
@@ -268,7 +273,7 @@ class RobotModel:
             SceneError: The scene is of another group or robot.
         """
         self.check_scene(clearances.scene)
-        self.scene, self._clearances = clearances.scene, clearances
+        self.scene, self._thread.clearances = clearances.scene, clearances
 
     def check_scene(self, scene: PlanningScene) -> None:
         """Make sure that a scene is of this group.
@@ -325,20 +330,26 @@ class RobotModel:
         """Take over kinematics and scene of the same group."""
         self.kinematics, self.scene = kinematics, scene
         self._model = kinematics.native
-        self._data = self._model.createData()
-        self._at = b''  # positions of the kinematics that are cached
-        self._clearances = Clearances(scene)
+        self._thread = _Thread(scene)
+
+    @property
+    def _clearances(self) -> Clearances:
+        """What measures the present scene in this thread."""
+        thread = self._thread
+        if thread.clearances.scene is not self.scene:
+            thread.clearances = Clearances(self.scene)
+        return thread.clearances
 
     def _update(self, positions: Array) -> None:
-        at = positions.tobytes()
-        if at == self._at:
+        thread, at = self._thread, positions.tobytes()
+        if at == thread.at:
             return
         expanded = self.kinematics.expanded(positions)
-        pin.computeJointJacobians(self._model, self._data, expanded)
-        self._at = at
+        pin.computeJointJacobians(self._model, thread.data, expanded)
+        thread.at = at
 
     def _placement(self, frame: int) -> Native:
-        return pin.updateFramePlacement(self._model, self._data, frame)
+        return pin.updateFramePlacement(self._model, self._thread.data, frame)
 
     def _frame(self, link: str | None) -> int:
         self.check_link(link)

@@ -136,9 +136,9 @@ def main() -> None:
             text = with_meshes(urdf, corners, Path(folder))
             models[corners] = timed(text, rest, f'start, meshes of {corners} corners')
             timed(text, rest, '  again')
-    figures('capsules', capsules, capsules.clearances())
+    figures('capsules', capsules, Clearances(capsules.scene))
     for corners, model in models.items():
-        figures(f'hulls of {corners} corners', model, model.clearances())
+        figures(f'hulls of {corners} corners', model, Clearances(model.scene))
     for count in (5, 24):
         figures(f'capsules among {count} boxes', capsules, objects(capsules, count))
 

@@ -10,7 +10,7 @@ from model_robots import chain, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 
-from arm_model import RobotModel
+from arm_model import Clearances, RobotModel
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 """The robots, a chain with sliding joints, and a tree."""
@@ -27,10 +27,10 @@ def test_what_is_known_is_a_lower_bound_and_exact_where_it_matters(
     rng = np.random.default_rng(5)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
     at, within = (lower + upper) / 2.0, 0.05
-    known = model.clearances()
+    known = Clearances(model.scene)
     for _ in range(150):
         at = np.clip(at + stride * rng.uniform(-1.0, 1.0, len(at)), lower, upper)
-        measured = model.clearances().least(at, math.inf)
+        measured = Clearances(model.scene).least(at, math.inf)
         bounds = known.least(at, within)
         assert (bounds <= measured + ROUNDING).all()
         near = measured < within
@@ -42,7 +42,7 @@ def test_no_distance_changes_faster_than_its_bounds_say(model: RobotModel) -> No
     """Gradients anywhere are at most the bounds of their rates."""
     rng = np.random.default_rng(6)
     lower, upper = np.maximum(model.limits.lower, -4.0), np.minimum(model.limits.upper, 4.0)
-    bounds = model.clearances().distance_rate_bounds
+    bounds = Clearances(model.scene).distance_rate_bounds
     for _ in range(100):
         for near in model.nearest(rng.uniform(lower, upper), math.inf, len(model.pairs)):
             assert (np.abs(near.gradient) <= bounds[near.pair] + 1e-9).all()

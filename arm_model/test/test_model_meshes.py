@@ -105,8 +105,8 @@ def test_a_mesh_is_the_shape_that_it_shows(
     rng = np.random.default_rng(1)
     for _ in range(20):
         at = rng.uniform(-2.0, 2.0, 4)
-        exact = box.clearances().least(at, math.inf)
-        assert mesh.clearances().least(at, math.inf) == pytest.approx(exact, abs=1e-5)
+        exact = Clearances(box.scene).least(at, math.inf)
+        assert Clearances(mesh.scene).least(at, math.inf) == pytest.approx(exact, abs=1e-5)
 
 
 @settings(max_examples=25, deadline=None)

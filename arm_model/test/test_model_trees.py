@@ -57,8 +57,8 @@ def test_gradients_of_distances_are_differences(seed: int) -> None:
     every = model.nearest(at, math.inf, len(model.pairs))
     assert len(every) == len(model.pairs)
     steps = STEP * np.eye(len(at))
-    ahead = np.array([model.clearances().least(at + step, math.inf) for step in steps])
-    behind = np.array([model.clearances().least(at - step, math.inf) for step in steps])
+    ahead = np.array([Clearances(model.scene).least(at + step, math.inf) for step in steps])
+    behind = np.array([Clearances(model.scene).least(at - step, math.inf) for step in steps])
     for near in every:
         quotient = (ahead - behind)[:, near.pair] / (2.0 * STEP)
         assert near.gradient == pytest.approx(quotient, abs=1e-3)

@@ -70,7 +70,7 @@ def make_thread(monkeypatch: pytest.MonkeyPatch) -> PlanningThreads:
     node: Any = QuietNode()
     monitor = SceneMonitor(node, RobotGroups(*two_arms_texts()))
     monitor._take_joints(JointState(name=list(STANDING), position=list(STANDING.values())))
-    return PlanningThreads(node, monitor, node, lambda: RobotGroups(*two_arms_texts()))
+    return PlanningThreads(node, monitor, node)
 
 
 def planned(thread: PlanningThreads, *items: Any) -> PlannedMotion:

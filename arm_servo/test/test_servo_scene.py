@@ -16,6 +16,7 @@ from servo_drives import Drives, PERIOD
 from arm_model import (
     Array,
     Box,
+    Clearances,
     CollisionObject,
     CommandError,
     PlanningScene,
@@ -81,7 +82,7 @@ def under_way(drives: Drives, cycles: int) -> MotionCommand:
 def least(scene: PlanningScene, path: list[Array]) -> float:
     """Return the least distance on a path."""
     model = RobotModel(*texts('panda'), table('panda'))
-    model.use_scene(model.clearances(scene))
+    model.use_scene(Clearances(scene))
     return min(model.clearance(positions, 0.2) for positions in path)
 
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 import sys
 import threading
@@ -114,9 +113,8 @@ class MoveGroup(Node):
         semantic.publish(String(data=description.srdf))
         monitor = SceneMonitor(self, robot, prefix)
         self._queries = Background(self, 'queries')
-        queried = _robot(description)
-        StateServices(self, monitor, self._queries, queried)
-        KinematicServices(self, monitor, self._queries, queried, settings)
+        StateServices(self, monitor, self._queries)
+        KinematicServices(self, monitor, self._queries, settings)
         followers = robot.kinematics.mimics
         execution = TrajectoryExecution(self, controllers, monitor.received, limits, followers)
         self._watch = Background(self, 'watch')
@@ -127,7 +125,6 @@ class MoveGroup(Node):
             self,
             monitor,
             self._planning,
-            partial(_robot, description),
             settings=settings,
             cartesian_limits=given.cartesian_limits,
         )

@@ -37,18 +37,17 @@ CANDIDATES = 8
 
 
 class KinematicServices:
-    """Answers in a thread of its own, with a robot of its own."""
+    """Answers in a thread of its own."""
 
     def __init__(
         self,
         node: Node,
         monitor: SceneMonitor,
         background: Background,
-        robot: RobotGroups,
         settings: MoveItSettings | None = None,
     ) -> None:
         self._node, self._monitor = node, monitor
-        self._kinematics = GroupKinematics(robot, settings)
+        self._kinematics = GroupKinematics(monitor.robot, settings)
         background.serve(GetPositionIK, 'compute_ik', self._ik, _refuse)
         background.serve(
             GetCartesianPath, 'compute_cartesian_path', self._cartesian_path, _refuse_path
@@ -78,11 +77,6 @@ class GroupKinematics:
     """Answers of one robot; belongs to one thread."""
 
     def __init__(self, robot: RobotGroups, settings: MoveItSettings | None = None) -> None:
-        """Solve nothing yet.
-
-        Args:
-            robot: The robot, for this thread alone.
-        """
         self._robot, self._settings = robot, settings or MoveItSettings()
         self._solvers: dict[tuple[str, str], tuple[RobotModel, IkSolver]] = {}
 

@@ -81,20 +81,19 @@ class GroupPlanners:
 
 
 class PlanningThreads:
-    """Plans in a thread for each group, with a robot of its own: groups do not wait for others."""
+    """Plans in a thread for each group: groups do not wait for others."""
 
     def __init__(
         self,
         node: Node,
         monitor: SceneMonitor,
         background: Background,
-        robot: Callable[[], RobotGroups],
         *,
         settings: MoveItSettings | None = None,
         cartesian_limits: CartesianLimits | None = None,
     ) -> None:
         self._monitor, self._background, self._settings = monitor, background, settings
-        self._make_robot, self._cartesian_limits = robot, cartesian_limits
+        self._cartesian_limits = cartesian_limits
         self._planners: dict[str, GroupPlanners] = {}
         self._displayed = node.create_publisher(DisplayTrajectory, 'display_planned_path', LATCHED)
         background.serve(
@@ -197,7 +196,7 @@ class PlanningThreads:
     def _planners_in(self, lane: str) -> GroupPlanners:
         """Return the planners of a lane, in its thread."""
         if lane not in self._planners:
-            self._planners[lane] = GroupPlanners(self._make_robot(), self._cartesian_limits)
+            self._planners[lane] = GroupPlanners(self._monitor.robot, self._cartesian_limits)
         return self._planners[lane]
 
     def _plan(

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+import threading
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,17 @@ from arm_model import (
 from ..exceptions import PlanningCode, PlanningError
 
 
+class _Placed(threading.local):
+    """The models that one thread was given last, by group."""
+
+    def __init__(self) -> None:
+        self.models: dict[str, RobotModel] = {}
+
+
 class RobotGroups:
     """The robot as a whole, and a model of each group, made when it is first asked for.
 
-    It belongs to one thread, as the models do; ``kinematics`` and ``scene`` are for any.
+    It is for any thread.
 
     Attributes:
         all_joints: Names of all joints, those that follow others too.
@@ -67,7 +75,8 @@ class RobotGroups:
             [min(max(ranges[name].lower, 0.0), ranges[name].upper) for name in self.joints]
         )
         self._models: dict[str, RobotModel] = {}
-        self._placed: dict[str, RobotModel] = {}
+        self._lock = threading.Lock()  # held while a model is made
+        self._thread = _Placed()
         shapes = self.model(next(iter(joints), self.names[0])).scene.link_shapes
         self.scene = with_default_collisions(
             PlanningScene(self.kinematics, shapes, AllowedCollisionMatrix.of_srdf(semantic)),
@@ -97,21 +106,23 @@ class RobotGroups:
                 PlanningCode.INVALID_GROUP_NAME,
                 f'no group {group!r}; groups: {", ".join(self.names)}',
             )
-        if group not in self._models:
-            try:
-                self._models[group] = RobotModel(
-                    *self._texts, self._limits, group, folder=self._folder
-                )
-            except ModelError as error:
-                raise PlanningError(
-                    PlanningCode.INVALID_GROUP_NAME, f'group {group!r} cannot be moved: {error}'
-                ) from error
-        return self._models[group]
+        with self._lock:
+            if group not in self._models:
+                try:
+                    self._models[group] = RobotModel(
+                        *self._texts, self._limits, group, folder=self._folder
+                    )
+                except ModelError as error:
+                    raise PlanningError(
+                        PlanningCode.INVALID_GROUP_NAME,
+                        f'group {group!r} cannot be moved: {error}',
+                    ) from error
+            return self._models[group]
 
     def model_at(self, group: str, positions: Array) -> RobotModel:
         """Return the model of a group with the joints beside it where they are.
 
-        It is the same one for as long as these stay.
+        It is the same one for a thread for as long as these stay.
 
         Args:
             positions: Positions of all joints of the robot in [rad].
@@ -119,10 +130,11 @@ class RobotGroups:
         Raises:
             PlanningError: There is no such group, or it cannot be moved.
         """
-        before = self._placed.get(group, self.model(group))
+        placed = self._thread.models
+        before = placed.get(group) or self.model(group)
         places = dict(zip(self.joints, positions.tolist(), strict=True))
-        self._placed[group] = before.with_others(places)
-        return self._placed[group]
+        placed[group] = before.with_others(places)
+        return placed[group]
 
     def positions(self, by_joint: Mapping[str, float]) -> Array:
         """Return the positions of all joints; those that are not given stand at 0 or nearby.

@@ -20,19 +20,16 @@ from ..exceptions import PlanningCode, PlanningError
 from .background import Background, error_code
 from .geometry import point_message, pose_message
 from .motion_request import RequestReader
-from .robot_groups import RobotGroups
 from .scene_changes import scene_for
 from .scene_monitor import SceneMonitor
 from .scene_snapshot import SceneSnapshot
 
 
 class StateServices:
-    """Answers in a thread of its own, with a robot of its own."""
+    """Answers in a thread of its own."""
 
-    def __init__(
-        self, node: Node, monitor: SceneMonitor, background: Background, robot: RobotGroups
-    ) -> None:
-        self._node, self._monitor, self._robot = node, monitor, robot
+    def __init__(self, node: Node, monitor: SceneMonitor, background: Background) -> None:
+        self._node, self._monitor, self._robot = node, monitor, monitor.robot
         background.serve(GetPositionFK, 'compute_fk', self._fk, _refuse_fk)
         background.serve(GetStateValidity, 'check_state_validity', self._validity, lambda *_: None)
 
