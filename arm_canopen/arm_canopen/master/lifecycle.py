@@ -76,6 +76,8 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition(7, Verb.SHUTDOWN, _S.ACTIVE, _S.SHUTTING_DOWN, _S.FINALIZED, _S.FINALIZED),
 )
 
+MANAGER = 'lifecycle_manager'
+"""Name of the node that brings the others up and down."""
 Work: TypeAlias = Callable[[Verb], Coroutine[Promise[Any], None, None]]
 
 
@@ -113,6 +115,14 @@ class Managed:
             f'{self.name} is {self.state.label}: transition {wanted} is not possible; '
             f'possible: {offered or "none"}'
         )
+
+    def require_active(self) -> None:
+        """Raise a LifecycleError while it is not active."""
+        if self.state is not LifecycleState.ACTIVE:
+            raise LifecycleError(
+                f'{self.name} is {self.state.label}, not active; activate it, or all with: '
+                f'ros2 lifecycle set /{MANAGER} configure, then activate'
+            )
 
     async def change(self, transition: Transition) -> None:
         """Run a transition to its end.

@@ -10,15 +10,14 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from ..cia402.drive_commands import DriveCommands
-from ..exceptions import BootError, LifecycleError
-from ..master.lifecycle import LifecycleState, Managed, Supervisor, Verb, Work
+from ..exceptions import BootError
+from ..master.lifecycle import Managed, MANAGER, Supervisor, Verb, Work
 from ..master.remote_node import RemoteNode
 from ..master.runner import NetworkThread
 from .device_node import DeviceNode
 from .lifecycle_services import LifecycleServices
 from .output_thread import OutputThread
 
-MANAGER = 'lifecycle_manager'
 BOOT_ATTEMPTS = 3  # boot time-outs that an activation waits, as ros2_canopen does
 
 
@@ -37,15 +36,16 @@ class ManagedBus:
         output: OutputThread,
     ) -> None:
         self._scheduler = thread.network.scheduler
-        self._master = Managed(node.get_name(), _nothing)
-        LifecycleServices(node, self._master, thread, output)
+        master = Managed(node.get_name(), _nothing)
+        self.admit = master.require_active  # lets a request to the master pass
+        LifecycleServices(node, master, thread, output)
         managed = []
         for name, device in devices.items():
             entry = Managed(name, self._work(device.device, axes(device.device)))
-            device.admit = _gate(entry)
+            device.admit = entry.require_active
             LifecycleServices(device, entry, thread, output)
             managed.append(entry)
-        supervisor = Supervisor(self._master, managed, self._scheduler)
+        supervisor = Supervisor(master, managed, self._scheduler)
         # the node ``lifecycle_manager``, in the namespace of the master
         self.manager = Node(MANAGER, namespace=node.get_namespace())
         text = ParameterDescriptor(
@@ -53,10 +53,6 @@ class ManagedBus:
         )
         self.manager.declare_parameter('container_name', '', text)
         LifecycleServices(self.manager, Managed(MANAGER, supervisor.work), thread, output)
-
-    def admit(self) -> None:
-        """Let a request to the master pass."""
-        _gate(self._master)()
 
     def _work(self, device: RemoteNode, axes: Sequence[DriveCommands]) -> Work:
         async def work(verb: Verb) -> None:
@@ -80,14 +76,3 @@ class ManagedBus:
 
 async def _nothing(verb: Verb) -> None:
     """Do no work: the master boots and watches its devices in every state."""
-
-
-def _gate(managed: Managed) -> Callable[[], None]:
-    def admit() -> None:
-        if managed.state is not LifecycleState.ACTIVE:
-            raise LifecycleError(
-                f'{managed.name} is {managed.state.label}, not active; activate it, or all with: '
-                f'ros2 lifecycle set /{MANAGER} configure, then activate'
-            )
-
-    return admit

@@ -33,7 +33,7 @@ from ..config.model import BusConfig
 from ..config.model.checks import check_bus
 from ..exceptions import CanopenError
 from ..library.canopen_master import THREAD_PRIORITY
-from .managed_bus import MANAGER
+from ..master.lifecycle import MANAGER
 from .master_process import MasterProcess
 
 SWITCH_INTERVAL = 0.0005  # [s] how long a busy callback may keep the interpreter from the cycle

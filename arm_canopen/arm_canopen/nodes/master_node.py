@@ -43,9 +43,6 @@ class MasterServices:
     def __init__(self, node: Node, thread: NetworkThread, output: OutputThread) -> None:
         # called for every request; raises CanopenError when none is taken at the moment
         self.admit: Callable[[], None] = lambda: None
-        # called with node id and object index before an SDO write; raises CanopenError when the
-        # driver of that device writes the object itself
-        self.check_owner: Callable[[int, int], None] = lambda node_id, index: None
         self._thread = thread
         for kind, name, begin, respond in (
             (COReadID, '~/sdo_read', self._read, answer_read),
@@ -73,7 +70,9 @@ class MasterServices:
     def _write(self, request: COWriteID.Request) -> Future[None]:
         def write() -> Promise[None]:
             self.admit()
-            self.check_owner(request.nodeid, request.index)
+            for device in self._thread.network.nodes.values():
+                if device.config.node_id == request.nodeid:
+                    device.objects.check_owner(request.index)
             data = bytes_from_raw(_data_type(request.canopen_datatype), request.data)
             client = self._thread.network.sdo_client(_node_id(request.nodeid))
             return client.write(request.index, request.subindex, data, SDO_TIMEOUT)

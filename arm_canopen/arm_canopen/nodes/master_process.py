@@ -79,7 +79,6 @@ class MasterProcess:
         self._joint_states = BusJointStates(node, drives, self._output)
         self._network.on_feedback = self._joint_states.feedback
         services = MasterServices(node, self._thread, self._output)
-        services.check_owner = self._check_owner
         commands = list(self._master.commands.values())
         StopService(node, commands, self._thread, self._output)
         self._diagnostics = DiagnosticsPublisher(node, self._output)
@@ -157,11 +156,6 @@ class MasterProcess:
             Done before the next cycle.
         """
         return self._master.begin_detach(source)
-
-    def _check_owner(self, node_id: int, index: int) -> None:
-        for device in self._network.nodes.values():
-            if device.config.node_id == node_id:
-                device.objects.check_owner(index)
 
     def _report(self, event: Event) -> None:
         self._output.post_stream((event.kind, event.node), partial(self._log_event, event))
