@@ -25,7 +25,6 @@ from ..master.scheduler import Promise
 from ..standard.dictionary import object_address
 from ..standard.nmt import NmtCommand
 from .device_topics import DeviceTopics, node_options
-from .object_services import ObjectServices
 from .output_thread import OutputThread
 
 NMT_SERVICES: dict[str, NmtCommand] = {
@@ -58,7 +57,6 @@ class DeviceNode(Node):
             self._offer_nmt(name, command)
         self.offer(CORead, '~/sdo_read', self._read, partial(answer_read, self))
         self.offer(COWrite, '~/sdo_write', self._write, partial(answer_write, self))
-        ObjectServices(self, thread)
 
     def offer(
         self,

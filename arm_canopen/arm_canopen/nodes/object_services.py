@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 from functools import partial
-from typing import TYPE_CHECKING
 
 from arm_msgs.srv import ReadObject, WriteObject
 
@@ -15,9 +14,7 @@ from ..exceptions import CanopenError, ObjectError
 from ..master.runner import NetworkThread
 from ..standard.dictionary import object_address, ObjectEntry
 from ..standard.object_path import object_path
-
-if TYPE_CHECKING:
-    from .device_node import DeviceNode
+from .device_node import DeviceNode
 
 Transfer = tuple[ObjectEntry, bytes]
 
