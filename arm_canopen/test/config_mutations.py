@@ -9,13 +9,7 @@ MUTATIONS_MAX = 3
 
 
 def mutated(text: str, snippets: Sequence[str], generator: random.Random) -> str:
-    """Return a text with a few random changes.
-
-    Args:
-        text: The text to start from.
-        snippets: What is inserted, beside parts of the text itself.
-        generator: Source of the changes.
-    """
+    """Return a text with a few random changes; snippets are inserted beside its own parts."""
     for _ in range(generator.randint(1, MUTATIONS_MAX)):
         text = _mutate_once(text, snippets, generator)
     return text

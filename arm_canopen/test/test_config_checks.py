@@ -84,21 +84,13 @@ nodes:
 
 
 class Case(NamedTuple):
-    """A bus that is not right.
+    """A bus that is not right."""
 
-    Attributes:
-        old: What of the clean bus is replaced.
-        new: By what; the mark is in the line that has to be named.
-        key: Key path of the problem.
-        message: Pattern of what is said.
-        remedy: Pattern of what is advised.
-    """
-
-    old: str
-    new: str
-    key: str
-    message: str
-    remedy: str
+    old: str  # what of the clean bus is replaced
+    new: str  # by what; the mark is in the line that has to be named
+    key: str  # key path of the problem
+    message: str  # pattern of what is said
+    remedy: str  # pattern of what is advised
 
 
 SYNC = '  sync_period: 10000\n'

@@ -46,17 +46,11 @@ EDS = eds_text((*DRIVE_ROWS, *GUARDING))
 
 
 class KeyRow(NamedTuple):
-    """A row of the page.
+    """A row of the page."""
 
-    Attributes:
-        section: Where the key stands.
-        key: Its name.
-        default: What counts without it, empty when that depends on others.
-    """
-
-    section: str
-    key: str
-    default: str
+    section: str  # where the key stands
+    key: str  # its name
+    default: str  # what counts without it, empty when that depends on others
 
 
 def key_rows() -> list[KeyRow]:

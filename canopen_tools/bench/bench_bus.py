@@ -44,18 +44,12 @@ _ports = itertools.count(29000 + os.getpid() % 900)
 
 @dataclass
 class Peer:
-    """A bus of either library with the same calls.
+    """A bus of either library with the same calls."""
 
-    Attributes:
-        title: What it is.
-        send: Sends one frame of eight bytes.
-        drain: Reads what is there and returns how many frames.
-        lost: Returns how many frames it knows to be lost, None when it cannot know.
-    """
-
-    title: str
-    send: Callable[[], None]
-    drain: Callable[[], int]
+    title: str  # what it is
+    send: Callable[[], None]  # sends one frame of eight bytes
+    drain: Callable[[], int]  # reads what is there and returns how many frames
+    # returns how many frames it knows to be lost, None when it cannot know
     lost: Callable[[], int | None]
 
 

@@ -21,34 +21,23 @@ T = TypeVar('T')
 
 
 class LssNetwork:
-    """A bus that takes some time.
-
-    Attributes:
-        master: The LSS master.
-        host: The devices.
-        delays: How late frames of the devices arrive in [s], one after another; 1 ms after these.
-        received: Frames of the devices, without LSS answers.
-    """
+    """A bus that takes some time."""
 
     def __init__(self, addresses: Iterable[LssAddress], node_ids: Iterable[int] = ()) -> None:
-        """Switch devices on.
-
-        Args:
-            addresses: Their identities.
-            node_ids: Their node ids; without one a device has none.
-        """
+        """Switch devices of these identities on; without a node id one has none."""
+        # how late frames of the devices arrive in [s], one after another; 1 ms after these
         self.delays: list[float] = []
-        self.received: list[Frame] = []
+        self.received: list[Frame] = []  # frames of the devices, without LSS answers
         self._scheduler = Scheduler(1.0)
         self._order = count()
         self._way: list[tuple[float, int, Frame]] = []
-        self.host = DeviceHost(self._answer)
+        self.host = DeviceHost(self._answer)  # the devices
         ids = iter(node_ids)
         for address in addresses:
             values = {(0x1018, part + 1): number for part, number in enumerate(address)}
             self.host.add(next(ids, UNCONFIGURED), with_defaults(drive_dictionary(), values))
         self.host.advance(1.0)
-        self.master = LssMaster(self._scheduler, self._send)
+        self.master = LssMaster(self._scheduler, self._send)  # the LSS master
 
     @property
     def now(self) -> float:

@@ -43,14 +43,7 @@ def sample_node() -> NodeConfig:
 
 
 class Scene:
-    """A bus with one device, booted; its TPDO 2 is as the device has it for good.
-
-    Attributes:
-        config: The bus.
-        node: The device.
-        network: The bus in virtual time.
-        consumers: What the device had in 0x1016 before.
-    """
+    """A bus with one device, booted; its TPDO 2 is as the device has it for good."""
 
     def __init__(self, held: int) -> None:
         """Boot it with something in the first entry of 0x1016."""
@@ -58,12 +51,14 @@ class Scene:
         mapping = node.tpdos[1].mapping
         fixed = {(0x1A01, 0): len(mapping)}
         fixed |= {(0x1A01, number): mapped.word for number, mapped in enumerate(mapping, start=1)}
-        self.node = replace(node, dictionary=with_defaults(node.dictionary, fixed))
+        self.node = replace(node, dictionary=with_defaults(node.dictionary, fixed))  # the device
+        # the bus
         self.config = bus_config(self.node, heartbeat_producer=0.2, heartbeat_timeout=0.6)
         real = with_defaults(self.node.dictionary, {(0x1016, 1): held})
+        # the bus in virtual time
         self.network = VirtualNetwork(self.config, dictionaries={'joint1': real})
         self.store = self.network.devices['joint1'].store
-        self.consumers = {1: held, 2: 0, 3: 0, 4: 0}
+        self.consumers = {1: held, 2: 0, 3: 0, 4: 0}  # what the device had in 0x1016 before
         self.network.boot()
 
     def plan(self) -> list[BootWrite]:

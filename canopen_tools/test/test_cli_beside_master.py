@@ -28,30 +28,22 @@ DEADLINE = 20.0  # [s]
 
 
 class Robot:
-    """The article's master and two of its joints, on a bus of this process.
-
-    Attributes:
-        name: Name of the bus.
-        bus_yml: Its configuration.
-        network: The master.
-        thread: The master's thread.
-        events: What the master reported.
-    """
+    """The article's master and two of its joints, on a bus of this process."""
 
     def __init__(self, folder: Path) -> None:
-        self.name = free_virtual()
+        self.name = free_virtual()  # name of the bus
         shutil.copy(EDS, folder / 'cia402_slave.eds')
         text = ARTICLE_BUS.read_text('utf-8')
-        self.bus_yml = folder / 'bus.yml'
+        self.bus_yml = folder / 'bus.yml'  # its configuration
         self.bus_yml.write_text(text[: text.index('  panda_joint3:')], 'utf-8')
         config = load_bus(self.bus_yml)
-        self.events: list[Event] = []
+        self.events: list[Event] = []  # what the master reported
         self._buses = [open_bus(self.name) for _ in range(2)]
         self._devices = DeviceRunner(self._buses[0])
         for node in config.nodes:
             self._devices.host.add(node.node_id, node.dictionary)
-        self.network = Network(config, self._buses[1].send, self.events.append)
-        self.thread = NetworkThread(self._buses[1], self.network)
+        self.network = Network(config, self._buses[1].send, self.events.append)  # the master
+        self.thread = NetworkThread(self._buses[1], self.network)  # the master's thread
         self._devices.start()
         self.thread.start()
         self._await_boot()

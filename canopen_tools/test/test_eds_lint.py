@@ -34,20 +34,13 @@ GOOD = eds_text(
 
 
 class Case(NamedTuple):
-    """A damaged file.
+    """A damaged file."""
 
-    Attributes:
-        section: Section in which something is replaced.
-        old: What.
-        new: By what.
-        message: Pattern of what is said.
-        line: Text of the line that is named, empty for any; None for that of ``new``.
-    """
-
-    section: str
-    old: str
-    new: str
-    message: str
+    section: str  # section in which something is replaced
+    old: str  # what
+    new: str  # by what
+    message: str  # pattern of what is said
+    # text of the line that is named, empty for any; None for that of ``new``
     line: str | None = None
 
 

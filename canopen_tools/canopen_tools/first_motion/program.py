@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 import signal
 import sys
 
@@ -12,17 +14,20 @@ from arm_canopen import BusConfig, load_bus, NodeConfig
 from arm_canopen.config.model.drive import DriveConfig
 from first_motion import (
     AxisScales,
+    BusEditError,
+    Correction,
     DriveFacts,
+    edited,
     JointKind,
     judge,
     Judgement,
     propose,
+    replace_file,
     too_far,
     too_fast,
     Verdict,
 )
 
-from .correction import apply
 from .dialogue import agrees, ask_seen, choose, FirstMotionError, say
 from .interruptions import Interrupted, interruptions
 from .motion import move, Record, Request
@@ -151,3 +156,32 @@ def _correct(
     apply(correction, request.path, node.name, request.joint, channel)
     say(f'{request.path.resolve()} is changed')
     return True
+
+
+def apply(
+    correction: Correction, path: Path, device: str, joint: str, channel: int | None
+) -> None:
+    """Change keys in a bus.yml; the file is replaced as a whole, or not at all.
+
+    The channel is the place of the axis in ``channels``; None for a device with one axis.
+
+    Raises:
+        FirstMotionError: It has a form in which nothing is changed, or the result would differ.
+        ConfigError: The file could not be read with these keys.
+    """
+    values = correction.values
+
+    def check(new: Path) -> None:
+        for axis in load_bus(new).node(device).axes:
+            is_meant = (axis.name or device) == joint
+            if is_meant and any(getattr(axis, key) != value for key, value in values.items()):
+                raise FirstMotionError(
+                    f'{path}: the keys of {device} are not where they were expected; write by '
+                    f'hand: {", ".join(f"{key}: {value}" for key, value in values.items())}'
+                )
+
+    edit = partial(edited, device=device, values=values, reason=correction.reason, channel=channel)
+    try:
+        replace_file(path, edit, check)
+    except BusEditError as error:
+        raise FirstMotionError(f'{path}: {error}') from error
