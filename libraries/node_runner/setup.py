@@ -33,6 +33,7 @@ setup(
     install_requires=[
         sibling('libraries/black_box'),
         sibling('libraries/dds_network'),
+        sibling('libraries/message_definitions'),
         sibling('libraries/realtime_loop'),
     ],
     extras_require={'test': ['pytest']},  # colcon test runs pytest where it is named

@@ -81,9 +81,6 @@ def restrict_dds(environ: MutableMapping[str, str]) -> Reach:
     Args:
         environ: ``os.environ``, or the environment of a process to start; it is changed.
 
-    Returns:
-        What is open.
-
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.
     """
@@ -98,9 +95,6 @@ def open_dds(environ: MutableMapping[str, str], names: str | None) -> str:
     Args:
         environ: As of :func:`restrict_dds`.
         names: Argument of the option; None without it.
-
-    Returns:
-        What is open, for people.
 
     Raises:
         NetworkChoiceError: As of :func:`selected_reach`.

@@ -31,9 +31,6 @@ def is_own_profile(path: str) -> bool:
 def profile_file(reach: Reach) -> Path:
     """Return the file with a profile; it is written where it is not there.
 
-    Args:
-        reach: What DDS uses besides loopback.
-
     Raises:
         NetworkChoiceError: It cannot be written.
     """

@@ -28,12 +28,7 @@ _UDP = 'UDPv4'
 
 
 def notices(environ: Mapping[str, str], reach: Reach) -> Iterator[str]:
-    """Report what is open, and which of his settings does not open anything.
-
-    Args:
-        environ: The environment before it is changed.
-        reach: What DDS may use.
-    """
+    """Report what is open, and which of his settings does not open anything."""
     if reach.own_transports:
         yield reach.describe()
         return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Definitions of messages and services as recordings and viewers carry them (`ros2msg`)."""
+"""Definitions of messages and services (`ros2msg`), and what their Python classes need."""
 
 from .concatenation import concatenated, nested_type
 from .installed import (
@@ -9,11 +9,13 @@ from .installed import (
     service_definitions,
     ServiceDefinitions,
 )
+from .type_support import load_type_support
 
 __all__ = [
     'DefinitionError',
     'ServiceDefinitions',
     'concatenated',
+    'load_type_support',
     'message_definition',
     'nested_type',
     'service_definitions',

@@ -17,10 +17,6 @@ _SEPARATOR = '=' * 80
 def nested_type(line: str, package: str) -> str | None:
     """The message type of the field that a line declares.
 
-    Args:
-        line: A line of a definition.
-        package: The package whose definition it is.
-
     Returns:
         `package/msg/Name`, or None for constants, primitive types and comments.
     """

@@ -178,9 +178,6 @@ class FastReader:
     def read(self, data: bytes) -> tuple[Any, Sequence[float]]:
         """Read a message.
 
-        Args:
-            data: As a raw subscription gives it.
-
         Returns:
             A message that is right but for its stamp and numbers, the same one as long as these
             alone change; and the numbers, path by path.

@@ -13,8 +13,7 @@ from rclpy.logging import get_logger
 from rclpy.signals import SignalHandlerOptions
 
 from dds_network import restrict_dds
-
-from .type_support import load_type_support
+from message_definitions import load_type_support
 
 
 def init_ros(args: Sequence[str] | None = None, context: Context | None = None) -> None:

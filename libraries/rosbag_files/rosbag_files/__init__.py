@@ -10,7 +10,7 @@ from .metadata import BagFile, BagMetadata, load_metadata, METADATA_FILE, Topic,
 from .qos import OfferedQos, read_qos, UNLIMITED
 from .reader import BagMessage, BagReader
 from .recovery import repair
-from .writer import BagWriter, Compression, Preset, WriterOptions
+from .writer import BagWriter, Preset, WriterOptions
 
 __all__ = [
     'METADATA_FILE',
@@ -21,7 +21,6 @@ __all__ = [
     'BagMetadata',
     'BagReader',
     'BagWriter',
-    'Compression',
     'OfferedQos',
     'Preset',
     'Topic',

@@ -61,9 +61,7 @@ class OfferedQos:
 def read_qos(values: object, where: str) -> OfferedQos:
     """Read a QoS profile of metadata.yaml, or of a file with overrides.
 
-    Args:
-        values: A mapping; what is left out has its default.
-        where: What it belongs to, for messages.
+    What is left out of the mapping has its default; `where` stands in messages.
 
     Raises:
         BagError: A key or a value that no QoS profile has.

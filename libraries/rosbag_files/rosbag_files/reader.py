@@ -1,6 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a recording, also one that was not finished."""
+"""Reads a recording, also one that was not finished.
+
+The reader of rosbags (0.11.9) is no substitute: it reads the files of a split one after the other,
+so that messages come out of order, keeps all of them open, and leaves a topic out, without a word,
+when metadata.yaml knows more QoS profiles of it than a file.
+"""
 
 from __future__ import annotations
 

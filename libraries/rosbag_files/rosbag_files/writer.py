@@ -10,15 +10,14 @@ are missing then; `BagReader` does without, and `repair` adds them.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+import contextlib
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-import shutil
 
 from mcap.writer import CompressionType, Writer
 import yaml
-import zstandard
 
 from .exceptions import BagError
 from .metadata import BagFile, BagMetadata, Topic, TopicCount
@@ -28,14 +27,6 @@ _CHUNK = 768 * 1024  # [byte], as rosbag2 has it
 _LARGE_CHUNK = 4 * 1024 * 1024  # [byte]
 _SEQUENCES = 2**32
 _LIBRARY = 'rosbag_files'
-
-
-class Compression(Enum):
-    """What zstd compresses, after rosbag2's `--compression-mode`."""
-
-    NONE = ''
-    FILE = 'FILE'
-    MESSAGE = 'MESSAGE'
 
 
 class Preset(Enum):
@@ -58,7 +49,6 @@ class WriterOptions:
     Attributes:
         max_size: Size in [byte] from which a new file begins; 0 for no limit.
         max_duration: Duration in [ns] from which a new file begins; 0 for no limit.
-        compression: What is compressed, besides the preset.
         preset: How MCAP files are written.
         distro: The ROS that is recorded.
         custom: What the user writes down with it.
@@ -66,7 +56,6 @@ class WriterOptions:
 
     max_size: int = 0
     max_duration: int = 0
-    compression: Compression = Compression.NONE
     preset: Preset = Preset.NONE
     distro: str = 'jazzy'
     custom: Mapping[str, str] | None = None
@@ -90,16 +79,12 @@ class BagWriter:
         self._topics: dict[str, Topic] = {}
         self._counts: Counter[str] = Counter()
         self._done: list[BagFile] = []
-        compressor = zstandard.ZstdCompressor()
-        by_message = self._options.compression is Compression.MESSAGE
-        self._pack = compressor.compress if by_message else bytes
-        try:
-            folder.mkdir(parents=True)
+        with _errors(folder):
+            try:
+                folder.mkdir(parents=True)
+            except FileExistsError:
+                raise BagError(f"Output folder '{folder}' already exists.") from None
             self._file = self._open()
-        except FileExistsError:
-            raise BagError(f"Output folder '{folder}' already exists.") from None
-        except OSError as error:
-            raise BagError(f"Cannot write to '{folder}': {error.strerror}") from None
 
     def set_topic(self, topic: Topic) -> None:
         """Announce a topic before its first message, or renew what is known of it.
@@ -110,34 +95,26 @@ class BagWriter:
             BagError: It cannot be written.
         """
         if topic.name not in self._topics:
-            try:
+            with _errors(self._file.path):
                 self._file.add_topic(topic)
-            except OSError as error:
-                raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
         self._topics[topic.name] = topic
 
     def write(
         self, name: str, data: bytes, log_time: int, publish_time: int, sequence: int = 0
     ) -> None:
-        """Add a message.
+        """Add a serialized message of a topic that was announced.
 
-        Args:
-            name: A topic that was announced.
-            data: The serialized message.
-            log_time: When it was received in [ns since 1970].
-            publish_time: When it was published in [ns since 1970].
-            sequence: Number that its publisher gave it; MCAP keeps 32 bits of it.
+        It was received at `log_time` and published at `publish_time` in [ns since 1970]; MCAP
+        keeps 32 bits of the number that its publisher gave it.
 
         Raises:
             BagError: It cannot be written.
         """
-        try:
+        with _errors(self._file.path):
             if self._is_full(log_time):
                 self._finish_file()
                 self._file = self._open()
-            self._file.write(name, self._pack(data), log_time, publish_time, sequence % _SEQUENCES)
-        except OSError as error:
-            raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
+            self._file.write(name, data, log_time, publish_time, sequence % _SEQUENCES)
         self._counts[name] += 1
 
     def flush(self) -> None:
@@ -146,10 +123,8 @@ class BagWriter:
         Raises:
             BagError: It cannot be written.
         """
-        try:
+        with _errors(self._file.path):
             self._file.flush()
-        except OSError as error:
-            raise BagError(f"Cannot write to '{self._file.path}': {error.strerror}") from None
 
     def close(self) -> BagMetadata:
         """Finish the last file and write metadata.yaml.
@@ -157,12 +132,10 @@ class BagWriter:
         Raises:
             BagError: It cannot be written.
         """
-        try:
+        with _errors(self.folder):
             self._finish_file()
             metadata = self._metadata(self._done)
             metadata.save(self.folder)
-        except OSError as error:
-            raise BagError(f"Cannot write to '{self.folder}': {error.strerror}") from None
         return metadata
 
     def _is_full(self, log_time: int) -> bool:
@@ -183,23 +156,25 @@ class BagWriter:
         file = self._file
         found = BagFile(file.path.name, file.start, file.duration, file.count)
         file.close(self._metadata([found], file.counts).to_yaml())
-        if self._options.compression is Compression.FILE:
-            found = replace(found, path=_compress(file.path).name)
         self._done.append(found)
 
     def _metadata(
         self, files: list[BagFile], counts: Mapping[str, int] | None = None
     ) -> BagMetadata:
         counts = self._counts if counts is None else counts
-        mode = self._options.compression
+        topics = [TopicCount(topic, counts.get(name, 0)) for name, topic in self._topics.items()]
+        options = self._options
         return BagMetadata(
-            tuple(files),
-            tuple(TopicCount(topic, counts.get(name, 0)) for name, topic in self._topics.items()),
-            '' if mode is Compression.NONE else 'zstd',
-            mode.value,
-            self._options.distro,
-            self._options.custom,
+            tuple(files), tuple(topics), distro=options.distro, custom=options.custom
         )
+
+
+@contextlib.contextmanager
+def _errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise BagError(f"Cannot write to '{path}': {error.strerror}") from None
 
 
 class McapFile:
@@ -286,13 +261,3 @@ class McapFile:
         with self._stream:
             self._mcap.add_metadata('rosbag2', {'serialized_metadata': metadata})
             self._mcap.finish()
-
-
-def _compress(path: Path) -> Path:
-    """Compress a file; the original goes when that is done."""
-    packed = path.with_name(f'{path.name}.zstd')
-    with path.open('rb') as source, packed.open('xb') as sink:
-        zstandard.ZstdCompressor().copy_stream(source, sink)
-    shutil.copymode(path, packed)
-    path.unlink()
-    return packed

@@ -25,7 +25,6 @@ from rosbag_files import (
     BagMessage,
     BagReader,
     BagWriter,
-    Compression,
     METADATA_FILE,
     Preset,
     WriterOptions,
@@ -54,15 +53,14 @@ def by_time(messages: Sequence[BagMessage]) -> list[BagMessage]:
 @settings(deadline=None)
 @given(
     MESSAGES,
-    strategies.sampled_from(Compression),
     strategies.sampled_from(Preset),
     strategies.sampled_from([0, 500]),
 )
 def test_every_message_comes_back(
-    messages: list[BagMessage], compression: Compression, preset: Preset, max_size: int
+    messages: list[BagMessage], preset: Preset, max_size: int
 ) -> None:
     """All bytes, times and numbers, with every way to write them, in one file or several."""
-    options = WriterOptions(max_size=max_size, compression=compression, preset=preset)
+    options = WriterOptions(max_size=max_size, preset=preset)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, 'bag')
         write(path, messages, options)
@@ -74,12 +72,11 @@ def test_every_message_comes_back(
         assert sorted(found, key=key) == sorted(messages, key=key)
 
 
-@pytest.mark.parametrize('compression', list(Compression))
 @pytest.mark.parametrize('preset', [Preset.NONE, Preset.ZSTD_FAST, Preset.ZSTD_SMALL])
-def test_rosbags_reads_it(tmp_path: Path, compression: Compression, preset: Preset) -> None:
+def test_rosbags_reads_it(tmp_path: Path, preset: Preset) -> None:
     """Split in files; topics, types, hashes, QoS and definitions, too."""
     messages = [message(number, (TEXT, COUNT)[number % 2]) for number in range(200)]
-    options = WriterOptions(max_duration=SECOND, compression=compression, preset=preset)
+    options = WriterOptions(max_duration=SECOND, preset=preset)
     write(tmp_path / 'bag', messages, options)
     assert read_by_rosbags(tmp_path / 'bag') == plain(messages)
     with Reader(tmp_path / 'bag') as reader:

@@ -9,13 +9,13 @@ import shutil
 
 from hypothesis import example, given, settings, strategies
 import pytest
-from sample_bag import add, message, plain, read_by_rosbags, write
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from sample_bag import add, message, plain, read_by_rosbags, TEXT, write
 
 from rosbag_files import (
     BagError,
     BagReader,
     BagWriter,
-    Compression,
     METADATA_FILE,
     Preset,
     repair,
@@ -76,12 +76,22 @@ def test_a_file_cut_anywhere(
     assert list(BagReader(tmp_path / 'bag').messages()) == found
 
 
-def test_compressed_messages_are_recognized(tmp_path: Path) -> None:
-    """Nothing but metadata.yaml says that they are."""
-    options = WriterOptions(compression=Compression.MESSAGE)
-    write(tmp_path / 'bag', MESSAGES, options)
-    (tmp_path / 'bag' / METADATA_FILE).unlink()
-    assert list(BagReader(tmp_path / 'bag').messages()) == MESSAGES
+@pytest.mark.parametrize('finished', [True, False])
+@pytest.mark.parametrize('mode', [CompressionMode.MESSAGE, CompressionMode.FILE])
+def test_compressed_by_others(tmp_path: Path, mode: CompressionMode, finished: bool) -> None:
+    """By message or by file; nothing but metadata.yaml says that messages are."""
+    writer = Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        topic = writer.add_connection(TEXT.name, TEXT.type, msgdef=TEXT.definition, rihs01='x')
+        for each in MESSAGES:
+            writer.write(topic, each.log_time, each.data)
+    (file,) = (path for path in (tmp_path / 'bag').iterdir() if path.name != METADATA_FILE)
+    if not finished:
+        file.rename(file.with_name(file.name.replace('bag', 'bag_0')))
+        (tmp_path / 'bag' / METADATA_FILE).unlink()
+    found = BagReader(tmp_path / 'bag').messages()
+    assert [(each.topic, each.log_time, each.data) for each in found] == plain(MESSAGES)
 
 
 def test_a_single_file_is_a_recording(tmp_path: Path) -> None:

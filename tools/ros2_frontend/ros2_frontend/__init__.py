@@ -5,8 +5,18 @@
 Layers, each importing only what stands below it:
 
 * ``verbs``: one module per group of commands; arguments in, text out
-* ``ros``: the only place that touches rclpy: session, graph, discovery, QoS, calls
+* ``ros``: the only place that touches rclpy: session, graph, QoS, calls, recorder, player
+* ``bag``: what ``ros2 bag`` decides and prints; pure
 * ``index``: packages and interface definitions on disk
 * ``messages``: messages to YAML and CSV, YAML to messages; pure
 * ``cli``: the command tree, argument types, errors, suggestions; pure
 """
+
+from pathlib import Path
+import sys
+
+_LIBRARIES = Path(__file__).resolve().parents[3] / 'libraries'
+
+# of this checkout; they need not be built, as `ros2` itself need not be
+for _library in ('dds_network', 'message_definitions', 'rosbag_files'):
+    sys.path.append(str(_LIBRARIES / _library))

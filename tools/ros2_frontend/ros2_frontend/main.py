@@ -17,21 +17,14 @@ import os
 import signal
 import sys
 
-from .cli.commands import COMMANDS
+from .cli.commands import build
 from .cli.interrupts import signals_interrupt
-from .cli.parser import build
 
 _BROKEN_PIPE = 128 + signal.SIGPIPE
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one `ros2` command line.
-
-    Args:
-        argv: The arguments without the program's name; None takes those of the process.
-
-    Returns:
-        The exit code, see the table above.
+    """Run one `ros2` command line and return the exit code, see the table above.
 
     Raises:
         SystemExit: From argparse, for `--help` (0) and for wrong arguments (2).
@@ -52,14 +45,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    line = build(COMMANDS, words)
-    args = line.parser.parse_args(words)
+    parser, help_of, verb = build(words)
+    args = parser.parse_args(words)
     if not args.use_python_default_buffering and hasattr(sys.stdout, 'reconfigure'):
         sys.stdout.reconfigure(line_buffering=True)
-    if line.verb is None:
-        line.help_of.print_help()
+    if verb is None:
+        help_of.print_help()
         return 0
-    return line.verb.main(args) or 0
+    return verb.main(args) or 0
 
 
 def _leave(code: int) -> int:

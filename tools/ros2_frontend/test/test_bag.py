@@ -197,16 +197,14 @@ def test_a_split_recording_with_compression(
     """Several files, which is one recording for a reader."""
     folder = tmp_path / 'bag'
     words = ['--topics', '/numbers', '/loose', '--max-bag-size', '20000']
-    words += ['--compression-mode', 'file', '--compression-format', 'zstd']
+    words += ['--storage-preset-profile', 'zstd_fast']
     with record(env, folder, *words) as recorder:
         recorder.wait_for(RECORDING)
         with source(env, 1000) as publisher:
             publisher.wait_for('published')
             recorder.stop()
-    assert len(list(folder.glob('*.mcap.zstd'))) > 2
+    assert len(list(folder.glob('*.mcap'))) > 2
     assert read(folder)['/numbers'] == list(range(1000))
-    lines = ros2('bag', 'info', '-v', str(folder)).lines
-    assert any('Size Contribution: 7.8 KiB' in line for line in lines)
     assert ros2('bag', 'info', '-t', str(folder)).lines == ['/loose', '/numbers']
 
 
@@ -226,7 +224,7 @@ def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_pat
             publisher.signal(signal.SIGUSR1)
             publisher.wait_for('published', count=2)
             recorder.signal(signal.SIGCONT)
-            recorder.wait_for("messages of '/numbers' were lost")
+            until(lambda: arrived(folder, '/numbers') > 1000, recorder)
             recorder.stop()
     numbers = read(folder)['/numbers']
     # what came before the first one that arrived, and after the last one, is no gap
@@ -241,7 +239,6 @@ def test_messages_that_do_not_arrive_are_counted(env: Mapping[str, str], tmp_pat
     [
         (('record',), 'Need to specify at least one option'),
         (('record', '-e', '['), "'[' is no regular expression"),
-        (('record', '-a', '--compression-mode', 'file'), 'Cannot specify compression mode'),
         (('record', '-a', '-o', '.'), 'already exists'),
         (('info', '/nothing'), "Bag path '/nothing' does not exist!"),
         (('play', '/nothing'), "Bag path '/nothing' does not exist!"),

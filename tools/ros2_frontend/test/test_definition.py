@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from ros2_frontend.index.definition import Comments, expand, strip_comment
+from ros2_frontend.index.definition import expand
 
 FILES = {
     'demo/msg/Outer': '# Top\nInner inner # the inner\n\nother/Leaf[] leaves\nuint8 A=1 # one\n',
@@ -13,14 +13,14 @@ FILES = {
 }
 
 
-def shown(comments: Comments) -> list[str]:
+def shown(comments: bool = True, nested: bool = False) -> list[str]:
     """Expand the outer definition."""
-    return list(expand('demo/msg/Outer', FILES.__getitem__, comments))
+    return list(expand('demo/msg/Outer', FILES.__getitem__, comments, nested))
 
 
 def test_default_hides_comments_of_nested_types() -> None:
     """The interface's own comments and blank lines stay; nested ones go."""
-    assert shown(Comments()) == [
+    assert shown() == [
         '# Top',
         'Inner inner # the inner',
         '\tother/msg/Leaf[<=3] leaf',
@@ -35,7 +35,7 @@ def test_default_hides_comments_of_nested_types() -> None:
 
 def test_all_comments() -> None:
     """Every line of every level, indented by tabs."""
-    assert shown(Comments(top=True, nested=True))[2:5] == [
+    assert shown(nested=True)[2:5] == [
         '\t# Nested',
         '\tother/msg/Leaf[<=3] leaf  # a leaf',
         '\t\t# Leaf',
@@ -44,12 +44,6 @@ def test_all_comments() -> None:
 
 def test_no_comments() -> None:
     """Neither comments nor blank lines."""
-    lines = shown(Comments(top=False, nested=False))
+    lines = shown(comments=False)
     assert lines[0] == 'Inner inner'
     assert not any('#' in line or not line for line in lines)
-
-
-def test_strip_comment() -> None:
-    """What stands before the first #."""
-    assert strip_comment('  bool a # b # c') == 'bool a'
-    assert strip_comment('# all') == ''

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 from sensor_msgs.msg import JointState
 
-from ros2_frontend.verbs.topic_echo import echo, print_lost, Printer
+from ros2_frontend.verbs.topic_echo import echo, print_lost, printer
 
 INFO = {'source_timestamp': 11, 'received_timestamp': 12, 'publication_sequence_number': 3}
 
@@ -18,11 +18,12 @@ INFO = {'source_timestamp': 11, 'received_timestamp': 12, 'publication_sequence_
 def printed(capsys: pytest.CaptureFixture[str], *options: str) -> str:
     """Print one message with the options of a command line."""
     parser = ArgumentParser()
-    echo.add_arguments(parser)
+    for add in echo.arguments:
+        add(parser)
     message = JointState(name=['one', 'two'], position=[0.5, -1.0])
     message.header.stamp.sec = 7
     message.header.frame_id = 'base'
-    Printer(parser.parse_args(['/joint_states', *options])).take(message, INFO)
+    printer(parser.parse_args(['/joint_states', *options]))(message, INFO)
     return capsys.readouterr().out
 
 

@@ -42,7 +42,10 @@ def test_no_path_is_the_message(message: JointState) -> None:
 @pytest.mark.parametrize(
     ('path', 'problem'),
     [
-        ('nam', "Invalid field 'nam': 'JointState' object has no attribute 'nam'\nDid you .*name"),
+        (
+            'nam',
+            "Invalid field 'nam': 'JointState' object has no attribute 'nam'\nIt has: header, nam",
+        ),
         ('header.zzz', "'Header' object has no attribute 'zzz'\nIt has: stamp, frame_id"),
         ('name.[5]', 'Invalid field .* index out of range'),
         ('header.[0]', "'Header' object is not subscriptable"),

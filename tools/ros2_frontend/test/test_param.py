@@ -88,8 +88,6 @@ def test_set_that_is_refused(ros2: Ros2) -> None:
     outcome = ros2('param', 'set', NODE, 'gain', '11.0')
     assert (outcome.code, outcome.out) == (0, '')
     assert outcome.err.startswith('Setting parameter failed: Parameter gain out of range')
-    unknown = ros2('param', 'set', NODE, 'gian', '1.0')
-    assert unknown.err.endswith("Did you mean 'gain'?\n")
 
 
 def test_delete(ros2: Ros2) -> None:
@@ -124,7 +122,7 @@ def test_dump_can_be_loaded(ros2: Ros2, tmp_path: Path) -> None:
     ('words', 'problem'),
     [
         (('get', 'factory/workr', 'gain'), "Node not found\nDid you mean '/factory/worker'?\n"),
-        (('get', NODE, 'gian'), "Parameter not set\nDid you mean 'gain'?\n"),
+        (('get', NODE, 'gian'), 'Parameter not set\n'),
         (('load', NODE, '/no/such/file'), "No such file or directory: '/no/such/file'\n"),
         (('list', NODE, '--filter', '['), "Invalid --filter '[': unterminated"),
         (('dump', '/nobody', '--spin-time', '0.2'), 'Node not found'),

@@ -7,10 +7,11 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from rclpy.parameter import parameter_value_to_python
 
 from ros2_frontend.cli.errors import FieldValueError, FrontendError, UnknownNameError
 from ros2_frontend.messages.parameter_file import dump, values_for
-from ros2_frontend.ros.parameters import parameter, parse_value, value_of
+from ros2_frontend.ros.parameters import parameter, parse_value
 
 PART = st.from_regex(r'[a-z][a-z0-9_]{0,4}', fullmatch=True)
 SCALARS = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False)
@@ -36,7 +37,7 @@ def test_dump_and_load_are_inverse(tree: dict[str, dict[str, object]]) -> None:
 @given(VALUES)
 def test_values_survive_the_message(value: object) -> None:
     """Python value to ParameterValue and back."""
-    assert value_of(parameter('p', value).value) == value
+    assert parameter_value_to_python(parameter('p', value).value) == value
 
 
 def test_dump_is_ros2clis_to_the_letter() -> None:
@@ -100,6 +101,6 @@ def test_what_a_typed_value_means(text: str, value: object) -> None:
 
 def test_mixed_numbers_are_floats_and_mixed_types_are_refused() -> None:
     """[1, 2.5] is an array of doubles; [1, x] is nothing."""
-    assert value_of(parameter('p', [1, 2.5]).value) == [1.0, 2.5]
+    assert parameter_value_to_python(parameter('p', [1, 2.5]).value) == [1.0, 2.5]
     with pytest.raises(FrontendError, match=r"p: no parameter can be \[1, 'x'\]"):
         parameter('p', [1, 'x'])

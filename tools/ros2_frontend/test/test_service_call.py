@@ -11,8 +11,7 @@ import sys
 from frontend_cli import PROGRAM, Ros2
 from processes import RunningProcess
 import pytest
-
-from ros2_frontend.ros.calls import Client
+from rclpy.client import Client
 
 pytestmark = [pytest.mark.scenario, pytest.mark.usefixtures('zoo')]
 
@@ -98,7 +97,7 @@ def test_a_service_of_another_type(ros2: Ros2) -> None:
 
 def test_a_service_that_is_only_discovered(ros2: Ros2, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its name is known before its endpoints are matched, on a slow machine for seconds."""
-    monkeypatch.setattr(Client, 'is_ready', lambda _: False)
+    monkeypatch.setattr(Client, 'service_is_ready', lambda _: False)
     outcome = ros2('service', 'call', '--timeout', '1.2', '/trigger', 'std_srvs/srv/Trigger')
     assert outcome.out == 'waiting for service to become available...\n'
     assert outcome.err.splitlines() == ["Service '/trigger' did not appear within 1.2 s"]

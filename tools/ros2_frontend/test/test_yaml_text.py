@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 import sys
+from typing import Any as Document
 
 from hypothesis import example, given
 from hypothesis import strategies as st
 import pytest
 import yaml
 
-from ros2_frontend.aliases import Document
 from ros2_frontend.messages.yaml_text import to_yaml
 
 pytestmark = pytest.mark.slow

@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings on disk, by the package `rosbag_files` of this checkout.
-
-It need not be built, as `ros2` itself need not be.
-"""
+"""Recordings on disk, and files that belong to them, as a command opens them."""
 
 from __future__ import annotations
 
@@ -12,52 +9,14 @@ import contextlib
 from pathlib import Path
 import sys
 
+from rosbag_files import BagError, BagReader, OfferedQos, read_qos
+
 from ..cli.errors import FrontendError
-
-sys.path.append(str(Path(__file__).resolve().parents[4] / 'libraries' / 'rosbag_files'))
-
-from rosbag_files import (
-    BagError,
-    BagMessage,
-    BagMetadata,
-    BagReader,
-    BagWriter,
-    Compression,
-    OfferedQos,
-    Preset,
-    read_qos,
-    repair,
-    Topic,
-    UNLIMITED,
-    WriterOptions,
-)
-
-__all__ = [
-    'UNLIMITED',
-    'BagError',
-    'BagMessage',
-    'BagMetadata',
-    'BagReader',
-    'BagWriter',
-    'Compression',
-    'OfferedQos',
-    'Preset',
-    'Topic',
-    'WriterOptions',
-    'bag_errors',
-    'load_overrides',
-    'open_bag',
-    'repair',
-]
 
 
 @contextlib.contextmanager
 def bag_errors() -> Iterator[None]:
-    """End the command with the message of a `BagError`.
-
-    Raises:
-        FrontendError: In its place.
-    """
+    """End the command with the message of a `BagError`."""
     try:
         yield
     except BagError as error:
@@ -65,14 +24,7 @@ def bag_errors() -> Iterator[None]:
 
 
 def open_bag(path: str) -> BagReader:
-    """Open a recording; print on stderr when it was not finished.
-
-    Args:
-        path: Its folder, or one of its files.
-
-    Raises:
-        FrontendError: There is none.
-    """
+    """Open a recording, a folder or a file; print on stderr when it was not finished."""
     with bag_errors():
         reader = BagReader(Path(path))
     if not reader.finished and Path(path).is_dir():
@@ -85,10 +37,7 @@ def open_bag(path: str) -> BagReader:
 
 
 def load_overrides(path: str | None) -> dict[str, OfferedQos]:
-    """Read a file with QoS profiles by topic.
-
-    Args:
-        path: The file; None for no overrides.
+    """Read a file with QoS profiles by topic; None for no overrides.
 
     Raises:
         FrontendError: It cannot be read, or has what no QoS profile has.

@@ -4,28 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 import time
 
-from .files import BagMetadata
+from rosbag_files import BagMetadata
 
 _INDENT = 19
 _NANO = 1_000_000_000
 _UNITS = ('B', 'KiB', 'MiB', 'GiB', 'TiB')
 
 
-def info_text(
-    metadata: BagMetadata, size: int, sizes: Mapping[str, int] | None = None, sort: str = 'name'
-) -> str:
-    """The text for a recording.
-
-    Args:
-        metadata: What it has.
-        size: Size of its files in [byte].
-        sizes: Size of the messages of each topic in [byte], for `--verbose`.
-        sort: `name`, `type` or `count`.
-    """
-    end = metadata.start + metadata.duration
+def info_text(metadata: BagMetadata, size: int) -> str:
+    """Return the text for a recording whose files have a size in [byte]."""
+    topics = [
+        f'Topic: {each.topic.name} | Type: {each.topic.type} | Count: {each.count} | '
+        f'Serialization Format: {each.topic.serialization}'
+        for each in sorted(metadata.topics, key=lambda each: each.topic.name)
+    ]
     lines = [
         '',
         _block('Files:', [file.path for file in metadata.files]),
@@ -34,9 +28,9 @@ def info_text(
         _block('ROS Distro:', [metadata.distro]),
         _block('Duration:', [f'{_seconds(metadata.duration)}s']),
         _block('Start:', [_moment(metadata.start)]),
-        _block('End:', [_moment(end)]),
+        _block('End:', [_moment(metadata.start + metadata.duration)]),
         _block('Messages:', [str(metadata.count)]),
-        _block('Topic information:', list(_topics(metadata, sizes, sort))),
+        _block('Topic information:', topics),
         _block('Service:', ['0']),
         'Service information: ',
     ]
@@ -44,11 +38,7 @@ def info_text(
 
 
 def size_text(size: int) -> str:
-    """A size in the unit that suits it.
-
-    Args:
-        size: In [byte].
-    """
+    """Return a size in [byte] in the unit that suits it."""
     value, unit = float(size), 0
     while value >= 1024 and unit < len(_UNITS) - 1:
         value, unit = value / 1024, unit + 1
@@ -57,19 +47,6 @@ def size_text(size: int) -> str:
 
 def _block(title: str, lines: list[str]) -> str:
     return title.ljust(_INDENT) + f'\n{" " * _INDENT}'.join(lines)
-
-
-def _topics(metadata: BagMetadata, sizes: Mapping[str, int] | None, sort: str) -> Iterator[str]:
-    by = {
-        'name': lambda each: each.topic.name,
-        'type': lambda each: (each.topic.type, each.topic.name),
-        'count': lambda each: (each.count, each.topic.name),
-    }
-    for each in sorted(metadata.topics, key=by[sort]):
-        parts = [f'Topic: {each.topic.name}', f'Type: {each.topic.type}', f'Count: {each.count}']
-        if sizes is not None:
-            parts.append(f'Size Contribution: {size_text(sizes.get(each.topic.name, 0))}')
-        yield ' | '.join([*parts, f'Serialization Format: {each.topic.serialization}'])
 
 
 def _seconds(nanoseconds: int) -> str:

@@ -5,71 +5,41 @@
 from __future__ import annotations
 
 from argparse import ArgumentTypeError
+from collections.abc import Callable
+import math
+from typing import TypeVar
 
 from .verb import Argument, argument, exclusive, flag
 
-
-def unsigned_int(text: str) -> int:
-    """An integer of zero or more.
-
-    Args:
-        text: The argument as typed.
-
-    Returns:
-        Its value.
-
-    Raises:
-        ArgumentTypeError: When it is negative or no integer.
-    """
-    if not text.isdecimal():
-        raise ArgumentTypeError('value must be non-negative integer')
-    return int(text)
+N = TypeVar('N', int, float)
 
 
-def positive_int(text: str) -> int:
-    """An integer of one or more.
+def _number(
+    kind: Callable[[str], N], what: str, accepts: Callable[[N], bool]
+) -> Callable[[str], N]:
+    def parse(text: str) -> N:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = kind('-1')
+        if not accepts(value):
+            raise ArgumentTypeError(f'value must be {what}')
+        return value
 
-    Args:
-        text: The argument as typed.
-
-    Returns:
-        Its value.
-
-    Raises:
-        ArgumentTypeError: When it is zero, negative or no integer.
-    """
-    if not text.isdecimal() or not int(text):
-        raise ArgumentTypeError('value must be a positive integer')
-    return int(text)
+    return parse
 
 
-def positive_float(text: str) -> float:
-    """A finite number above zero.
-
-    Args:
-        text: The argument as typed.
-
-    Returns:
-        Its value.
-
-    Raises:
-        ArgumentTypeError: When it is zero, negative, infinite or no number.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value < float('inf'):
-        raise ArgumentTypeError('value must be a positive float')
-    return value
-
+unsigned_int = _number(int, 'non-negative integer', lambda value: value >= 0)
+positive_int = _number(int, 'a positive integer', lambda value: value > 0)
+positive_float = _number(float, 'a positive float', lambda value: 0.0 < value < math.inf)
+unsigned_float = _number(float, 'a non-negative float', lambda value: 0.0 <= value < math.inf)
 
 GRAPH_ARGUMENTS = (
     argument(
         '--spin-time',
         type=positive_float,
         metavar='SPIN_TIME',
-        help='Longest time [s] to wait for discovery (default: until the graph is complete)',
+        help='Time [s] to wait for discovery (default: 0.5, or 3.2 where DDS is open to others)',
     ),
     flag('-s', '--use-sim-time', help='Enable ROS simulation time'),
     flag('--no-daemon', help='Accepted and without effect: there is no daemon'),
@@ -78,13 +48,7 @@ GRAPH_ARGUMENTS = (
 
 
 def content(name: str, help_: str, stdin_help: str) -> Argument:
-    """Declare the values of a message, given as an argument or on standard input.
-
-    Args:
-        name: Name of the argument.
-        help_: Its help.
-        stdin_help: Help of `--stdin`.
-    """
+    """Declare the values of a message, given as an argument or on standard input."""
     return exclusive(
         argument(name, nargs='?', default='{}', help=help_), flag('--stdin', help=stdin_help)
     )

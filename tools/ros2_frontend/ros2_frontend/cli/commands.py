@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The tree of commands, as data.
+"""The tree of commands, as data, and the parser of one command line.
 
 A command names the module and the verb that do it, so that `ros2 --help` imports none of them and
 `ros2 topic list` imports only its own. Summaries are those of ros2cli (Jazzy).
@@ -8,159 +8,191 @@ A command names the module and the verb that do it, so that `ros2 --help` import
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
+from collections.abc import Mapping, Sequence
 import importlib
+from typing import TypeAlias
 
 from .verb import Verb
 
+PROGRAM = 'ros2'
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """A command, or a verb of a group.
-
-    Attributes:
-        summary: One line for the help page.
-        target: `module:verb` below `ros2_frontend.verbs`.
-    """
-
-    summary: str
-    target: str
-
-    def load(self) -> Verb:
-        """Import the module of the verb."""
-        module, _, name = self.target.partition(':')
-        verb: Verb = getattr(importlib.import_module(f'ros2_frontend.verbs.{module}'), name)
-        return verb
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """A command that has verbs.
-
-    Attributes:
-        summary: One line for the help page.
-        verbs: The verbs by name.
-        flags: Switches of the group itself, by option: their help.
-    """
-
-    summary: str
-    verbs: Mapping[str, Command]
-    flags: Mapping[str, str] = field(default_factory=dict)
-
-
-_HIDDEN_TOPICS = {'--include-hidden-topics': 'Consider hidden topics as well'}
-_HIDDEN_SERVICES = {'--include-hidden-services': 'Consider hidden services as well'}
+Command: TypeAlias = tuple[str, str]
+"""One line for the help page, and `module:verb` below `ros2_frontend.verbs`."""
+Group: TypeAlias = tuple[str, Mapping[str, Command]]
+"""One line for the help page, and the verbs by name."""
 
 COMMANDS: Mapping[str, Command | Group] = {
-    'action': Group(
+    'action': (
         'Various action related sub-commands',
         {
-            'info': Command('Print information about an action', 'action:info'),
-            'list': Command('Output a list of action names', 'action:list_names'),
-            'send_goal': Command('Send an action goal', 'send_goal:send_goal'),
-            'type': Command("Print a action's type", 'action:type_of'),
+            'info': ('Print information about an action', 'action:info'),
+            'list': ('Output a list of action names', 'action:list_names'),
+            'send_goal': ('Send an action goal', 'send_goal:send_goal'),
+            'type': ("Print a action's type", 'action:type_of'),
         },
     ),
-    'bag': Group(
+    'bag': (
         'Various rosbag related sub-commands',
         {
-            'info': Command('Print information about a bag to the screen', 'bag_info:info'),
-            'play': Command('Play back ROS data from a bag', 'bag_play:play'),
-            'record': Command('Record ROS data to a bag', 'bag_record:record'),
-            'reindex': Command('Reconstruct metadata file for a bag', 'bag_info:reindex'),
+            'info': ('Print information about a bag to the screen', 'bag_info:info'),
+            'play': ('Play back ROS data from a bag', 'bag_play:play'),
+            'record': ('Record ROS data to a bag', 'bag_record:record'),
+            'reindex': ('Reconstruct metadata file for a bag', 'bag_info:reindex'),
         },
     ),
-    'doctor': Command('Check ROS setup and other potential issues', 'doctor:doctor'),
-    'interface': Group(
+    'doctor': ('Check ROS setup and other potential issues', 'doctor:doctor'),
+    'interface': (
         'Show information about ROS interfaces',
         {
-            'list': Command('List all interface types available', 'interface:list_all'),
-            'package': Command(
+            'list': ('List all interface types available', 'interface:list_all'),
+            'package': (
                 'Output a list of available interface types within one package',
                 'interface:package',
             ),
-            'packages': Command(
-                'Output a list of packages that provide interfaces', 'interface:packages'
+            'packages': (
+                'Output a list of packages that provide interfaces',
+                'interface:packages',
             ),
-            'proto': Command('Output an interface prototype', 'interface:proto'),
-            'show': Command('Output the interface definition', 'interface:show'),
+            'proto': ('Output an interface prototype', 'interface:proto'),
+            'show': ('Output the interface definition', 'interface:show'),
         },
     ),
-    'launch': Command('Not among the wheels of ROS: names what to run instead', 'launch:launch'),
-    'lifecycle': Group(
+    'launch': ('Not among the wheels of ROS: names what to run instead', 'launch:launch'),
+    'lifecycle': (
         'Various lifecycle related sub-commands',
         {
-            'get': Command('Get lifecycle state for one or more nodes', 'lifecycle:get'),
-            'list': Command(
-                'Output a list of available transitions', 'lifecycle:list_transitions'
-            ),
-            'nodes': Command('Output a list of nodes with lifecycle', 'lifecycle:nodes'),
-            'set': Command('Trigger lifecycle state transition', 'lifecycle:set_state'),
+            'get': ('Get lifecycle state for one or more nodes', 'lifecycle:get'),
+            'list': ('Output a list of available transitions', 'lifecycle:list_transitions'),
+            'nodes': ('Output a list of nodes with lifecycle', 'lifecycle:nodes'),
+            'set': ('Trigger lifecycle state transition', 'lifecycle:set_state'),
         },
     ),
-    'node': Group(
+    'node': (
         'Various node related sub-commands',
         {
-            'info': Command('Output information about a node', 'node:info'),
-            'list': Command('Output a list of available nodes', 'node:list_names'),
+            'info': ('Output information about a node', 'node:info'),
+            'list': ('Output a list of available nodes', 'node:list_names'),
         },
     ),
-    'param': Group(
+    'param': (
         'Various param related sub-commands',
         {
-            'delete': Command('Delete parameter', 'param:delete'),
-            'describe': Command(
-                'Show descriptive information about declared parameters', 'param:describe_names'
+            'delete': ('Delete parameter', 'param:delete'),
+            'describe': (
+                'Show descriptive information about declared parameters',
+                'param:describe_names',
             ),
-            'dump': Command(
-                'Show all of the parameters of a node in a YAML file format', 'param:dump_file'
+            'dump': (
+                'Show all of the parameters of a node in a YAML file format',
+                'param:dump_file',
             ),
-            'get': Command('Get parameter', 'param:get'),
-            'list': Command('Output a list of available parameters', 'param:list_all'),
-            'load': Command('Load parameter file for a node', 'param:load'),
-            'set': Command('Set parameter', 'param:set_value'),
+            'get': ('Get parameter', 'param:get'),
+            'list': ('Output a list of available parameters', 'param:list_all'),
+            'load': ('Load parameter file for a node', 'param:load'),
+            'set': ('Set parameter', 'param:set_value'),
         },
     ),
-    'pkg': Group(
+    'pkg': (
         'Various package related sub-commands',
         {
-            'executables': Command(
-                'Output a list of package specific executables', 'pkg:list_executables'
+            'executables': (
+                'Output a list of package specific executables',
+                'pkg:list_executables',
             ),
-            'list': Command('Output a list of available packages', 'pkg:list_names'),
-            'prefix': Command('Output the prefix path of a package', 'pkg:prefix'),
-            'xml': Command('Output the XML of the package manifest or a specific tag', 'pkg:xml'),
+            'list': ('Output a list of available packages', 'pkg:list_names'),
+            'prefix': ('Output the prefix path of a package', 'pkg:prefix'),
+            'xml': ('Output the XML of the package manifest or a specific tag', 'pkg:xml'),
         },
     ),
-    'run': Command('Run a package specific executable', 'run:run'),
-    'service': Group(
+    'run': ('Run a package specific executable', 'run:run'),
+    'service': (
         'Various service related sub-commands',
         {
-            'call': Command('Call a service', 'service_call:call'),
-            'find': Command('Output a list of available services of a given type', 'service:find'),
-            'info': Command('Print information about a service', 'service:info'),
-            'list': Command('Output a list of available services', 'service:list_names'),
-            'type': Command("Output a service's type", 'service:type_of'),
+            'call': ('Call a service', 'service_call:call'),
+            'find': ('Output a list of available services of a given type', 'service:find'),
+            'info': ('Print information about a service', 'service:info'),
+            'list': ('Output a list of available services', 'service:list_names'),
+            'type': ("Output a service's type", 'service:type_of'),
         },
-        _HIDDEN_SERVICES,
     ),
-    'topic': Group(
+    'topic': (
         'Various topic related sub-commands',
         {
-            'bw': Command('Display bandwidth used by topic', 'topic_rate:bw'),
-            'delay': Command(
-                'Display delay of topic from timestamp in header', 'topic_rate:delay'
-            ),
-            'echo': Command('Output messages from a topic', 'topic_echo:echo'),
-            'find': Command('Output a list of available topics of a given type', 'topic:find'),
-            'hz': Command('Print the average receiving rate to screen', 'topic_rate:hz'),
-            'info': Command('Print information about a topic', 'topic:info'),
-            'list': Command('Output a list of available topics', 'topic:list_names'),
-            'pub': Command('Publish a message to a topic', 'topic_pub:pub'),
-            'type': Command("Print a topic's type", 'topic:type_of'),
+            'bw': ('Display bandwidth used by topic', 'topic_rate:bw'),
+            'delay': ('Display delay of topic from timestamp in header', 'topic_rate:delay'),
+            'echo': ('Output messages from a topic', 'topic_echo:echo'),
+            'find': ('Output a list of available topics of a given type', 'topic:find'),
+            'hz': ('Print the average receiving rate to screen', 'topic_rate:hz'),
+            'info': ('Print information about a topic', 'topic:info'),
+            'list': ('Output a list of available topics', 'topic:list_names'),
+            'pub': ('Publish a message to a topic', 'topic_pub:pub'),
+            'type': ("Print a topic's type", 'topic:type_of'),
         },
-        _HIDDEN_TOPICS,
     ),
-    'wtf': Command('Use `wtf` as alias to `doctor`', 'doctor:doctor'),
+    'wtf': ('Use `wtf` as alias to `doctor`', 'doctor:doctor'),
 }
+_WITH_HIDDEN_NAMES = ('service', 'topic')
+
+
+def build(argv: Sequence[str]) -> tuple[ArgumentParser, ArgumentParser, Verb | None]:
+    """Make the parser for one command line; only the named command has its arguments.
+
+    Returns:
+        The root parser; the parser whose help is shown when no verb is named; the verb that the
+        arguments name, None for `ros2` or `ros2 topic` alone.
+    """
+    words = [word for word in argv if not word.startswith('-')][:2]
+    root = ArgumentParser(
+        prog=PROGRAM,
+        description=f'{PROGRAM} is an extensible command-line tool for ROS 2.',
+        formatter_class=RawDescriptionHelpFormatter,
+    )
+    root.add_argument(
+        '--use-python-default-buffering',
+        action='store_true',
+        help='Do not force line buffering in stdout and instead use the python default '
+        'buffering, which might be affected by PYTHONUNBUFFERED/-u and depends on whatever '
+        'stdout is interactive or not',
+    )
+    parser, level, name = root, COMMANDS, PROGRAM
+    for word in words:
+        parsers = _add_commands(parser, name, level)
+        if word not in level:
+            return root, parser, None
+        _, target = level[word]
+        parser = parsers[word]
+        if isinstance(target, str):
+            module, _, attribute = target.partition(':')
+            loaded = importlib.import_module(f'ros2_frontend.verbs.{module}')
+            verb: Verb = getattr(loaded, attribute)
+            for add in verb.arguments:
+                add(parser)
+            return root, parser, verb
+        if word in _WITH_HIDDEN_NAMES:
+            help_ = f'Consider hidden {word}s as well'
+            parser.add_argument(f'--include-hidden-{word}s', action='store_true', help=help_)
+        level, name = target, f'{PROGRAM} {word}'
+    _add_commands(parser, name, level)
+    return root, parser, None
+
+
+def _add_commands(
+    parser: ArgumentParser, cli_name: str, commands: Mapping[str, Command | Group]
+) -> dict[str, ArgumentParser]:
+    """Add sub-parsers and the list of them that the help page shows."""
+    width = max(map(len, commands))
+    listing = '\n'.join(f'{name.ljust(width)}  {text}' for name, (text, _) in commands.items())
+    # not required: without a verb the group's help is shown, with exit code 0
+    subparsers = parser.add_subparsers(
+        title='Commands',
+        description=listing,
+        metavar=f'Call `{cli_name} <command> -h` for more detailed usage.',
+        required=False,
+    )
+    return {
+        name: subparsers.add_parser(
+            name, description=text, formatter_class=RawDescriptionHelpFormatter
+        )
+        for name, (text, _) in commands.items()
+    }

@@ -5,62 +5,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
-import sys
 
-# a package of this checkout; it need not be built, as `ros2` itself need not be
-sys.path.append(str(Path(__file__).resolve().parents[4] / 'libraries' / 'message_definitions'))
-
-from message_definitions import concatenated, nested_type
-
-__all__ = ['Comments', 'concatenated', 'expand', 'strip_comment']
-
-
-@dataclass(frozen=True, slots=True)
-class Comments:
-    """Which comments (and blank lines) to show.
-
-    Attributes:
-        top: Those of the interface itself.
-        nested: Those of the types of its fields.
-    """
-
-    top: bool = True
-    nested: bool = False
+from message_definitions import nested_type
 
 
 def expand(
-    name: str, read: Callable[[str], str], comments: Comments, depth: int = 0
+    name: str, read: Callable[[str], str], comments: bool, nested_comments: bool, depth: int = 0
 ) -> Iterator[str]:
-    """The lines of a definition, each field of a message type followed by that type's lines.
+    """Yield the lines of `package/kind/Name`, each field of a message type followed by its lines.
 
     Args:
-        name: `package/kind/Name`.
+        name: The type.
         read: Gives the definition's text for such a name.
-        comments: Which comments to show.
+        comments: Whether to show comments and blank lines of the type itself.
+        nested_comments: Whether to show those of the types of its fields.
         depth: How deep the definition stands; one tab each.
-
-    Yields:
-        Lines without line feed.
     """
-    shown = comments.nested if depth else comments.top
+    shown = nested_comments if depth else comments
     for line in read(name).splitlines():
-        text = line.rstrip() if shown else strip_comment(line)
+        # rosidl, too, starts a comment at the first #
+        text = line.rstrip() if shown else line.partition('#')[0].strip()
         if text or shown:
             yield '\t' * depth + text if text else ''
         nested = nested_type(line, name.partition('/')[0])
         if nested is not None:
-            yield from expand(nested, read, comments, depth + 1)
-
-
-def strip_comment(line: str) -> str:
-    """A line of a definition without its comment.
-
-    Args:
-        line: The line.
-
-    Returns:
-        What stands before the first `#`, which is where rosidl starts the comment, too.
-    """
-    return line.partition('#')[0].strip()
+            yield from expand(nested, read, comments, nested_comments, depth + 1)

@@ -24,80 +24,52 @@ class Kind(Enum):
     ACTION = 'action'
 
 
-# the files that a package lists; the generated .idl stand beside their sources
-_SUFFIXES = {Kind.MESSAGE: '.msg', Kind.SERVICE: '.srv', Kind.ACTION: '.action'}
-
-
-def interface_packages() -> list[str]:
-    """The packages that define interfaces.
-
-    Returns:
-        Their names, sorted.
-    """
-    from ament_index_python import get_resources
-
-    return sorted(get_resources(_RESOURCE))
-
-
 def interfaces_of(package: str, kinds: Iterable[Kind] = Kind) -> list[str]:
-    """The interfaces of one package.
+    """Return the interfaces of one package, e.g. `std_msgs/msg/String`, sorted.
 
-    Args:
-        package: Its name.
-        kinds: The wanted kinds.
-
-    Returns:
-        Names such as `std_msgs/msg/String`, sorted. Those that the generators derive from a
-        service or an action are left out.
+    Those that the generators derive from a service or an action are left out.
 
     Raises:
-        UnknownNameError: When the package defines none; it names the nearest.
+        UnknownNameError: The package defines none; it names the nearest.
     """
-    from ament_index_python import get_resource
+    from ament_index_python import get_resource, get_resources
 
     try:
         listing, _ = get_resource(_RESOURCE, package)
     except (LookupError, ValueError):
-        near = hint(package, interface_packages())
+        near = hint(package, get_resources(_RESOURCE))
         raise UnknownNameError(f"Unknown package '{package}'{near}") from None
     folders = {kind.value for kind in kinds}
+    # the files that a package lists; the generated .idl stand beside their sources
+    suffixes = {'.idl', *(f'.{kind.value}' for kind in Kind)}
     files = [Path(line) for line in listing.splitlines() if line.strip()]
-    names = {
-        f'{file.parent}/{file.stem}'
-        for file in files
-        if str(file.parent) in folders and file.suffix in {'.idl', *_SUFFIXES.values()}
-    }
-    return sorted(f'{package}/{name}' for name in names)
+    return sorted(
+        {
+            f'{package}/{file.parent}/{file.stem}'
+            for file in files
+            if str(file.parent) in folders and file.suffix in suffixes
+        }
+    )
 
 
 def all_interfaces(kinds: Iterable[Kind] = Kind) -> Mapping[str, list[str]]:
-    """The interfaces of all packages.
+    """Return the names of all interfaces by package, both sorted; no package without any."""
+    from ament_index_python import get_resources
 
-    Args:
-        kinds: The wanted kinds.
-
-    Returns:
-        The names by package, both sorted; packages without any are left out.
-    """
     wanted = tuple(kinds)
-    by_package = {name: interfaces_of(name, wanted) for name in interface_packages()}
+    by_package = {name: interfaces_of(name, wanted) for name in sorted(get_resources(_RESOURCE))}
     return {package: names for package, names in by_package.items() if names}
 
 
+def _near(name: str, kinds: Iterable[Kind] = Kind) -> str:
+    return hint(name, [each for names in all_interfaces(kinds).values() for each in names])
+
+
 def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
-    """Import the Python class of an interface.
-
-    Args:
-        name: `package/kind/Name`, or `package/Name`.
-        kind: The wanted kind.
-        refusal: Message of ros2cli when the type is not good, e.g. `The passed message type is
-            invalid`.
-
-    Returns:
-        The generated class.
+    """Import the Python class of `package/kind/Name`, or `package/Name`.
 
     Raises:
-        BadTypeError: When it cannot be imported; it names the nearest types.
+        BadTypeError: It cannot be imported; after the refusal of ros2cli, it names the nearest.
     """
     parts = name.split('/')
     if len(parts) == 2:
@@ -106,45 +78,29 @@ def class_of(name: str, kind: Kind, refusal: str) -> InterfaceClass:
         package, folder, base = parts
         found = getattr(importlib.import_module(f'{package}.{folder}'), base)
     except (AttributeError, ImportError, ValueError):
-        raise BadTypeError(refusal + _near(name, kind)) from None
+        raise BadTypeError(refusal + _near(name, [kind])) from None
     if folder != kind.value:
         raise BadTypeError(f'{refusal}: {name} is no {kind.name.lower()}')
     return found
 
 
-def _near(name: str, kind: Kind) -> str:
-    known = [entry for names in all_interfaces([kind]).values() for entry in names]
-    return hint(name, known)
-
-
 def definition_path(name: str) -> Path:
-    """The file that defines an interface.
-
-    Args:
-        name: `package/kind/Name`.
-
-    Returns:
-        Its `.msg`, `.srv` or `.action` file, or the `.idl` where it was written in that.
+    """Return the file that defines `package/kind/Name`: `.idl` only where it was written in that.
 
     Raises:
-        UnknownNameError: When the name is malformed or not installed; it names the nearest.
+        UnknownNameError: The name is malformed or not installed; it names the nearest.
     """
+    from ament_index_python import get_package_share_directory
+
     parts = name.split('/')
     if len(parts) != 3:
-        known = [entry for names in all_interfaces().values() for entry in names]
         raise UnknownNameError(
-            f"Invalid name '{name}'. Expected three parts separated by '/'{hint(name, known)}"
+            f"Invalid name '{name}'. Expected three parts separated by '/'{_near(name)}"
         )
     package, folder, base = parts
     known = interfaces_of(package)
     if name not in known:
         raise UnknownNameError(f"Could not find the interface '{name}'{hint(name, known)}")
-    return _source_file(package, Kind(folder), base)
-
-
-def _source_file(package: str, kind: Kind, base: str) -> Path:
-    from ament_index_python import get_package_share_directory
-
-    folder = Path(get_package_share_directory(package), kind.value)
-    source = folder / f'{base}{_SUFFIXES[kind]}'
-    return source if source.is_file() else folder / f'{base}.idl'
+    share = Path(get_package_share_directory(package), folder)
+    source = share / f'{base}.{folder}'
+    return source if source.is_file() else share / f'{base}.idl'

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 import os
 from pathlib import Path
 import sys
@@ -14,14 +14,10 @@ from ..cli.suggest import hint
 
 
 def package_prefixes() -> Mapping[str, str]:
-    """All packages that are installed.
-
-    Returns:
-        The prefix path of each package by its name, sorted by name; the first prefix in
-        `AMENT_PREFIX_PATH` that has a package counts.
+    """Return the prefix path of each installed package by its name, sorted.
 
     Raises:
-        FrontendError: When the environment is not set up.
+        FrontendError: The environment is not set up.
     """
     from ament_index_python.packages import get_packages_with_prefixes
 
@@ -33,18 +29,11 @@ def package_prefixes() -> Mapping[str, str]:
 
 
 def prefix_of(package: str, message: str = "Package '{0}' not found") -> Path:
-    """Where a package is installed.
-
-    Args:
-        package: Its name.
-        message: The error when it is not there; `{0}` stands for the name.
-
-    Returns:
-        Its prefix path.
+    """Return the prefix path of a package.
 
     Raises:
-        UnknownNameError: When there is none of that name; it names the nearest, or what makes
-            one of this workspace known.
+        UnknownNameError: There is none of that name; it names the nearest, or what makes one of
+            this workspace known. The message may hold `{0}` for the name.
     """
     prefixes = package_prefixes()
     if package not in prefixes:
@@ -64,24 +53,9 @@ def _remedy(package: str, workspace: Path) -> str:
 
 
 def executables(package: str) -> list[Path]:
-    """The executables of a package, as `ros2 run` finds them: files in `lib/<package>`.
-
-    Args:
-        package: Its name.
-
-    Returns:
-        Their paths, sorted.
-
-    Raises:
-        UnknownNameError: When there is no such package.
-    """
-    return sorted(_executable_files(prefix_of(package) / 'lib' / package))
-
-
-def _executable_files(folder: Path) -> Iterator[Path]:
-    for base, folders, files in os.walk(folder):
+    """Return the executables of a package, as `ros2 run` finds them: files in `lib/<package>`."""
+    found: list[Path] = []
+    for base, folders, files in os.walk(prefix_of(package) / 'lib' / package):
         folders[:] = [name for name in folders if not name.startswith('.')]
-        for name in files:
-            path = Path(base, name)
-            if os.access(path, os.X_OK):
-                yield path
+        found += [Path(base, name) for name in files if os.access(Path(base, name), os.X_OK)]
+    return sorted(found)

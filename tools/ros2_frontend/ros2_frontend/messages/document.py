@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass
+from typing import Any
 
-from ..aliases import Document, Message, Slot, Value
+from ..aliases import Message
 
 _ELLIPSIS = '...'
 _SCALARS = (bool, int, float)
@@ -36,16 +37,8 @@ class Abbreviation:
 FULL = Abbreviation()
 
 
-def to_document(message: Message, abbreviation: Abbreviation = FULL) -> dict[str, Document]:
-    """Turn a message into nested plain data.
-
-    Args:
-        message: Message message, request, response, goal, result or feedback.
-        abbreviation: What to leave out.
-
-    Returns:
-        The fields by name, in the order of their definition.
-    """
+def to_document(message: Message, abbreviation: Abbreviation = FULL) -> dict[str, Any]:
+    """Turn a message into nested plain data, in the order of its definition."""
     fields = message.get_fields_and_field_types()
     return {
         name: _plain(getattr(message, name), slot, abbreviation)
@@ -53,7 +46,7 @@ def to_document(message: Message, abbreviation: Abbreviation = FULL) -> dict[str
     }
 
 
-def _plain(value: Value, slot: Slot, cut: Abbreviation) -> Document:
+def _plain(value: Any, slot: Any, cut: Abbreviation) -> Any:  # noqa: ANN401  # of any type
     if type(value) in _SCALARS:  # numpy's double is a float, too, but not for YAML
         return value
     if isinstance(value, str):
@@ -63,16 +56,12 @@ def _plain(value: Value, slot: Slot, cut: Abbreviation) -> Document:
     if is_array(value):
         if cut.no_arrays:
             return describe_array(value, slot)
-        return _elements(value, cut)
+        shown = value if cut.length is None else value[: cut.length]
+        rest = [_ELLIPSIS] if len(shown) < len(value) else []
+        return [*(_plain(each, None, cut) for each in shown), *rest]
     if hasattr(value, 'SLOT_TYPES'):
         return to_document(value, cut)
     return value.item()  # a numpy scalar
-
-
-def _elements(values: Value, cut: Abbreviation) -> list[Document]:
-    shown = values if cut.length is None else values[: cut.length]
-    rest = [_ELLIPSIS] if len(shown) < len(values) else []
-    return [*(_plain(value, None, cut) for value in shown), *rest]
 
 
 def _shorten(text: str, length: int | None) -> str:
@@ -80,39 +69,17 @@ def _shorten(text: str, length: int | None) -> str:
 
 
 def is_array(value: object) -> bool:
-    """Whether a field's value is an array: a list, `array.array` or numpy array.
-
-    Args:
-        value: The value.
-
-    Returns:
-        False for text, bytes, numbers (numpy's too) and messages.
-    """
+    """Whether a field's value is a list, `array.array` or numpy array; text and bytes are none."""
     return isinstance(value, list | tuple | array) or getattr(value, 'ndim', 0) > 0
 
 
 def describe_text(value: str) -> str:
-    """The stand-in for a text that is left out.
-
-    Args:
-        value: The text.
-
-    Returns:
-        Its length in words.
-    """
+    """Return the stand-in for a text that is left out."""
     return f'<string length: <{len(value)}>>'
 
 
-def describe_array(value: Value, slot: Slot) -> str:
-    """The stand-in for an array that is left out.
-
-    Args:
-        value: The array.
-        slot: Its type, an entry of the message's `SLOT_TYPES`.
-
-    Returns:
-        Its type and length in words.
-    """
+def describe_array(value: Any, slot: Any) -> str:  # noqa: ANN401  # of any type
+    """Return the stand-in for an array that is left out; the slot is of its `SLOT_TYPES`."""
     element = _type_name(slot.value_type)
     if hasattr(slot, 'size'):
         return f'<array type: {element}[{slot.size}]>'
@@ -120,7 +87,7 @@ def describe_array(value: Value, slot: Slot) -> str:
     return f'<sequence type: {element}{bound}, length: {len(value)}>'
 
 
-def _type_name(value_type: Slot) -> str:
+def _type_name(value_type: Any) -> str:  # noqa: ANN401  # of rosidl_parser
     if hasattr(value_type, 'typename'):
         return str(value_type.typename)
     if hasattr(value_type, 'namespaced_name'):

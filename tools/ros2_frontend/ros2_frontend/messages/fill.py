@@ -1,28 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From YAML values to a message, with errors that name the field and what it takes.
+"""From YAML values to a message; the generated classes refuse what does not fit.
 
-The generated classes check nothing unless `ROS_PYTHON_CHECK_FIELDS=1`; a wrong type would end in
-a crash when the message is sent. So every value is converted by the field's declared type here.
-Unlike ros2cli, which calls the Python type on whatever comes, nothing is guessed that loses
-something: `3.7` is no integer and `'false'` no bool.
+Their checks are off unless asked for, and a wrong type would end in a crash when the message is
+sent. Unlike ros2cli, which calls the Python type on whatever comes, nothing is converted that
+loses something: `3.7` is no integer and `'false'` no bool.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 import importlib
+from typing import Any
 
-from ..aliases import Message, Slot, Value
+from ..aliases import Message
 from ..cli.errors import FieldValueError
 from ..cli.suggest import hint
 from .from_text import parse_mapping
-from .primitive import to_primitive
 
 _HEADER = ('std_msgs', 'msg', 'Header')
 _TIME = ('builtin_interfaces', 'msg', 'Time')
+_FLOATS = ('float', 'double', 'long double')
 
 
 @dataclass(slots=True)
@@ -49,18 +49,29 @@ class Filler:
             FieldValueError: When a field does not exist or cannot take its value.
         """
         values = {} if values is None else values
-        if not isinstance(values, Mapping):
+        kind, fields = type(message).__name__, message.get_fields_and_field_types()
+        listed = ', '.join(f'{name} ({type_})' for name, type_ in fields.items())
+        known = f'\n{kind} has ' + (f'the fields: {listed}' if fields else 'no fields')
+        at = f'{path}: ' if path else ''
+        if not isinstance(values, dict):
             raise FieldValueError(
-                f"{_at(path)}Value '{values}' is expected to be a dictionary "
-                f'but is a {type(values).__name__}{_fields(message)}'
+                f"{at}Value '{values}' is expected to be a dictionary "
+                f'but is a {type(values).__name__}{known}'
             )
-        slots = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
+        slots = dict(zip(fields, message.SLOT_TYPES, strict=True))
+        message._check_fields = True  # noqa: SLF001  # the variable would count at import only
         for name, value in values.items():
             if name not in slots:
-                raise FieldValueError(_no_field(message, name, slots, path))
-            self._set(message, name, slots[name], value, f'{path}.{name}' if path else name)
+                near = hint(str(name), slots)
+                raise FieldValueError(
+                    f"{at}'{kind}' object has no attribute '{name}'{known}{near}"
+                )
+            try:
+                self._set(message, name, slots[name], value, f'{path}.{name}' if path else name)
+            except AssertionError as error:
+                raise FieldValueError(f'{at}{error}, not {value!r}') from None
 
-    def _set(self, message: Message, name: str, slot: Slot, value: object, path: str) -> None:
+    def _set(self, message: Message, name: str, slot: Any, value: object, path: str) -> None:  # noqa: ANN401
         type_name = _namespaced(slot)
         if self.expand_now and type_name == _HEADER and value == 'auto':
             self.stamps.append(partial(setattr, getattr(message, name), 'stamp'))
@@ -68,78 +79,60 @@ class Filler:
             self.stamps.append(partial(setattr, message, name))
         elif type_name:
             self.fill(getattr(message, name), value, path)
-        elif hasattr(slot, 'value_type'):
-            setattr(message, name, self._elements(slot, value, path))
+        elif hasattr(slot, 'value_type') and isinstance(value, list | tuple | bytes):
+            element = partial(self._element, slot.value_type)
+            elements = [element(each, f'{path}[{index}]') for index, each in enumerate(value)]
+            setattr(message, name, elements)
         else:
-            setattr(message, name, to_primitive(slot, value, path))
+            setattr(message, name, _converted(slot, value))
 
-    def _elements(self, slot: Slot, value: object, path: str) -> list[Value]:
-        values = list(value) if isinstance(value, list | tuple | bytes) else None
-        if values is None:
-            raise FieldValueError(f"{_at(path)}'{value}' is no sequence; write [ ... ]")
-        _check_length(slot, len(values), path)
-        return [
-            self._element(slot.value_type, element, f'{path}[{index}]')
-            for index, element in enumerate(values)
-        ]
-
-    def _element(self, value_type: Slot, value: object, path: str) -> Value:
-        type_name = _namespaced(value_type)
-        if not type_name:
-            return to_primitive(value_type, value, path)
-        package, kind, name = type_name
-        message = getattr(importlib.import_module(f'{package}.{kind}'), name)()
+    def _element(self, type_: Any, value: object, path: str) -> object:  # noqa: ANN401
+        name = _namespaced(type_)
+        if not name:
+            return _converted(type_, value)
+        message = getattr(importlib.import_module('.'.join(name[:2])), name[2])()
         self.fill(message, value, path)
         return message
 
 
-def _namespaced(slot: Slot) -> tuple[str, ...]:
+def _namespaced(slot: Any) -> tuple[str, ...]:  # noqa: ANN401  # of rosidl_parser
     return tuple(slot.namespaced_name()) if hasattr(slot, 'namespaced_name') else ()
 
 
-def _check_length(slot: Slot, length: int, path: str) -> None:
-    size = getattr(slot, 'size', None)
-    if size is not None and length != size:
-        raise FieldValueError(f'{_at(path)}needs exactly {size} elements, not {length}')
-    bound = getattr(slot, 'maximum_size', None)
-    if bound is not None and length > bound:
-        raise FieldValueError(f'{_at(path)}takes at most {bound} elements, not {length}')
-
-
-def _no_field(message: Message, name: object, slots: Mapping[str, Slot], path: str) -> str:
-    kind = type(message).__name__
-    text = f"{_at(path)}'{kind}' object has no attribute '{name}'{_fields(message)}"
-    return text + hint(str(name), slots)
-
-
-def _fields(message: Message) -> str:
-    fields = message.get_fields_and_field_types()
-    if not fields:
-        return f'\n{type(message).__name__} has no fields'
-    listed = ', '.join(f'{name} ({type_})' for name, type_ in fields.items())
-    return f'\n{type(message).__name__} has the fields: {listed}'
-
-
-def _at(path: str) -> str:
-    return f'{path}: ' if path else ''
+def _converted(slot: Any, value: object) -> object:  # noqa: ANN401  # of rosidl_parser
+    """Convert what YAML reads as another type, where nothing is lost; else leave it as it is."""
+    kind = getattr(slot, 'typename', None)
+    if kind is None:
+        if isinstance(value, bytes):
+            return value.decode('latin-1')
+        return (
+            value
+            if isinstance(value, dict | list | tuple)
+            else str('' if value is None else value)
+        )
+    if isinstance(value, str) and kind not in {'boolean', 'octet'}:
+        try:  # YAML 1.1 takes `1e3` (no point) for text
+            value = int(value) if value.strip().lstrip('+-').isdecimal() else float(value)
+        except ValueError:
+            return value
+    if kind == 'boolean' and value in (0, 1):
+        return bool(value)
+    if kind == 'octet' and isinstance(value, int) and 0 <= value <= 255:
+        return bytes([value])
+    if kind in _FLOATS and type(value) is int:
+        return float(value)
+    if isinstance(value, float) and value.is_integer() and kind not in _FLOATS:
+        return int(value)
+    return value
 
 
 def filled(
     message: Message, text: str, filler: Filler | None = None, *, what: str = 'field'
 ) -> Message:
-    """Fill a message with values that a user typed.
-
-    Args:
-        message: The message; it is changed.
-        text: The values as YAML.
-        filler: Fills it; None for a plain one.
-        what: What could not be populated, in ros2cli's words for the error.
-
-    Returns:
-        The same message.
+    """Fill a message with values that a user typed as YAML, and return it.
 
     Raises:
-        FieldValueError: The values do not fit the message.
+        FieldValueError: The values do not fit; `what` could not be populated, as ros2cli says.
     """
     values = parse_mapping(text)
     try:

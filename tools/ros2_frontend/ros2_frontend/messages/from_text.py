@@ -4,45 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
-from ..aliases import Document
 from ..cli.errors import FieldValueError
 
 
-def parse_yaml(text: str) -> Document:
-    """Read YAML.
-
-    Args:
-        text: For example `{ target: 10.0 }`.
-
-    Returns:
-        The data; None for an empty text.
+def parse_mapping(text: str) -> dict[str, Any]:
+    """Read YAML that gives values by name, e.g. `{ target: 10.0 }`; an empty text is none.
 
     Raises:
-        FieldValueError: When it is no YAML, with the place.
+        FieldValueError: It is no YAML, or something else. `target:10.0` is the usual slip.
     """
     import yaml
 
     try:
-        return yaml.safe_load(text)
+        values = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise FieldValueError(f"The passed value is not valid YAML: '{text}'\n{error}") from None
-
-
-def parse_mapping(text: str) -> Mapping[str, Document]:
-    """Read YAML that gives values by name.
-
-    Args:
-        text: For example `{ target: 10.0 }`; an empty text is an empty mapping.
-
-    Returns:
-        The mapping.
-
-    Raises:
-        FieldValueError: When it is something else. `target:10.0` is the usual slip.
-    """
-    values = parse_yaml(text)
     if values is None:
         return {}
     if not isinstance(values, dict):

@@ -20,15 +20,7 @@ _SEPARATOR = '.'
 
 
 def dump(node: str, values: Mapping[str, object]) -> str:
-    """Write a parameter file for one node.
-
-    Args:
-        node: The node's full name.
-        values: The parameters' values by name; a point in a name starts a level.
-
-    Returns:
-        YAML, keys sorted.
-    """
+    """Write a parameter file for one node, keys sorted; a point in a name starts a level."""
     import yaml
 
     tree: dict[str, Any] = {}
@@ -43,19 +35,14 @@ def dump(node: str, values: Mapping[str, object]) -> str:
 
 
 def values_for(node: str, text: str, *, use_wildcard: bool = True) -> dict[str, object]:
-    """Read the parameters of one node in a parameter file.
+    """Read the parameters of one node, and perhaps those for all (`/**`), in a parameter file.
 
-    Args:
-        node: The node's full name.
-        text: The file's content.
-        use_wildcard: Whether those for all nodes (`/**`) counts, too.
-
-    Returns:
-        The values by parameter name. What names the node goes before what is for all nodes.
+    What names the node goes before what is for all nodes. (rclpy's reader takes a quoted '5' for
+    a number.)
 
     Raises:
-        UnknownNameError: When the file has nothing for the node.
-        FieldValueError: When it is no parameter file.
+        UnknownNameError: The file has nothing for the node.
+        FieldValueError: It is no parameter file.
     """
     sections = parse_mapping(text)
     wanted = [*([_ALL_NODES] if use_wildcard else []), node.lstrip('/'), node]

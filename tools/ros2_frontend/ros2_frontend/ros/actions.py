@@ -6,46 +6,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..aliases import NamesAndTypes, Node
+from ..aliases import Handle, NamesAndTypes
 from .graph import Graph
 
 
 def action_names(graph: Graph) -> NamesAndTypes:
-    """The actions and their types, sorted by name.
-
-    Args:
-        graph: The graph.
-
-    Returns:
-        Name and types of each.
-    """
+    """Return the actions and their types, sorted by name."""
     from rclpy.action.graph import get_action_names_and_types
 
     return sorted(get_action_names_and_types(graph.session.node))
 
 
 def offered_actions(graph: Graph) -> set[str]:
-    """The actions that some node offers; `action_names` names those that are only used, too.
-
-    Args:
-        graph: The graph with the nodes.
-
-    Returns:
-        Their names.
-    """
+    """Return the actions that have a server; `action_names` has those with clients alone, too."""
     return {name for name, _ in action_names(graph) if clients_and_servers(graph, name)[1]}
 
 
 def clients_and_servers(graph: Graph, action: str) -> tuple[NamesAndTypes, NamesAndTypes]:
-    """The nodes that use and that offer an action.
-
-    Args:
-        graph: The graph with the nodes.
-        action: The action's absolute name.
-
-    Returns:
-        Names of the nodes with the types they use the action with: clients, then servers.
-    """
+    """Return the nodes that use and that offer an action, with the types they use it with."""
     from rclpy.action.graph import (
         get_action_client_names_and_types_by_node,
         get_action_server_names_and_types_by_node,
@@ -58,7 +36,7 @@ def clients_and_servers(graph: Graph, action: str) -> tuple[NamesAndTypes, Names
 
 
 def _nodes_with(
-    query: Callable[[Node, str, str], NamesAndTypes], graph: Graph, action: str
+    query: Callable[[Handle, str, str], NamesAndTypes], graph: Graph, action: str
 ) -> NamesAndTypes:
     from rclpy.node import NodeNameNonExistentError
 

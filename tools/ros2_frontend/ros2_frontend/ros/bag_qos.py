@@ -7,50 +7,47 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..aliases import QosProfile
-from ..bag.files import OfferedQos, UNLIMITED
+from rosbag_files import OfferedQos, UNLIMITED
+
+from ..aliases import Handle
 
 RECORD_DEPTH = 10_000
 """Messages of a topic that may wait for the recorder: ten seconds at 1 kHz."""
 
 PLAY_DEPTH = 10
 
+_POLICIES = ('history', 'reliability', 'durability', 'liveliness')
+_DURATIONS = ('deadline', 'lifespan', 'liveliness_lease_duration')
 _COMMON = ('reliability', 'durability', 'deadline', 'lifespan')
 
 
-def offered(profile: QosProfile) -> OfferedQos:
+def offered(profile: Handle) -> OfferedQos:
     """Write down what a publisher offers."""
+    policies = {name: getattr(profile, name).name.lower() for name in _POLICIES}
+    durations = {name: getattr(profile, name).nanoseconds for name in _DURATIONS}
+    conventions = profile.avoid_ros_namespace_conventions
     return OfferedQos(
-        profile.history.name.lower(),
-        profile.depth,
-        profile.reliability.name.lower(),
-        profile.durability.name.lower(),
-        profile.deadline.nanoseconds,
-        profile.lifespan.nanoseconds,
-        profile.liveliness.name.lower(),
-        profile.liveliness_lease_duration.nanoseconds,
-        profile.avoid_ros_namespace_conventions,
+        depth=profile.depth, avoid_ros_namespace_conventions=conventions, **policies, **durations
     )
 
 
-def to_profile(qos: OfferedQos) -> QosProfile:
+def to_profile(qos: OfferedQos) -> Handle:
     """Make a profile of rclpy."""
     from rclpy import qos as rclpy_qos
     from rclpy.duration import Duration
 
+    policies = {
+        name: getattr(rclpy_qos, f'{name.capitalize()}Policy')[getattr(qos, name).upper()]
+        for name in _POLICIES
+    }
     durations = {
         name: Duration(nanoseconds=getattr(qos, name))
-        for name in ('deadline', 'lifespan', 'liveliness_lease_duration')
+        for name in _DURATIONS
         if getattr(qos, name) != UNLIMITED
     }
+    conventions = qos.avoid_ros_namespace_conventions
     return rclpy_qos.QoSProfile(
-        history=rclpy_qos.HistoryPolicy[qos.history.upper()],
-        depth=qos.depth,
-        reliability=rclpy_qos.ReliabilityPolicy[qos.reliability.upper()],
-        durability=rclpy_qos.DurabilityPolicy[qos.durability.upper()],
-        liveliness=rclpy_qos.LivelinessPolicy[qos.liveliness.upper()],
-        avoid_ros_namespace_conventions=qos.avoid_ros_namespace_conventions,
-        **durations,
+        depth=qos.depth, avoid_ros_namespace_conventions=conventions, **policies, **durations
     )
 
 

@@ -1,86 +1,75 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS graph as one node sees it."""
+"""The ROS graph as one node sees it, and waiting for it.
+
+There is no daemon: each command joins the graph anew, and waits as long as ros2cli without its
+daemon does. Then all nodes of this host are known, because their profile (`dds_network`) makes
+them announce themselves often. A command that wants a name goes on as soon as the name is there,
+and waits a little longer for one that is not.
+"""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Iterator
 import contextlib
 import math
+import os
 import time
 from typing import TypeVar
 
-from ..aliases import Endpoint, NamesAndTypes
+from dds_network import is_this_host
+
+from ..aliases import Handle, NamesAndTypes
 from ..cli.arguments import GRAPH_ARGUMENTS
 from ..cli.verb import Argument, Verb
-from .discovery import wait, WaitLimits
-from .names import is_hidden, NodeName
+from ..names import is_hidden, NodeName
 from .session import open_session, Session
 
 T = TypeVar('T')
 
+_SPIN_TIME = 0.5  # [s] as ros2cli
+_NAME_TIME = 1.5  # [s] until a name is missing: on a machine that is too busy, discovery is late
+_OPEN_SPIN_TIME = (
+    3.2  # [s]; with Fast DDS's own profile, participants announce themselves every 3 s
+)
+_POLL = 0.01  # [s]; one look costs below 1 ms with 30 topics
+_MAX_POLL = 0.25  # [s]
+_POLL_SHARE = 0.02  # of the time waited so far: a wait of minutes shall not burn a core
+
 
 class Graph:
-    """What is in the ROS graph, and waiting for it.
+    """What is in the ROS graph.
 
     Attributes:
-        session: The session that looks.
-        domain_id: The ROS domain.
+        session: The session that looks; its node is part of the graph.
     """
 
     def __init__(self, session: Session, spin_time: float | None = None) -> None:
-        """Look at the graph through a session.
-
-        Args:
-            session: The session; its node is part of the graph.
-            spin_time: Longest time [s] to wait for discovery; None decides by the graph.
-        """
+        """Start to look; discovery takes `spin_time` in [s], None for the default."""
         self.session = session
         self._node = session.node
-        self._spin_time = spin_time
-        self.domain_id: int = session.node.context.get_domain_id()
+        fast = spin_time is None and is_this_host(os.environ)
+        longest = _OPEN_SPIN_TIME if spin_time is None else spin_time
+        begin = time.monotonic()
+        self._complete = begin + (_SPIN_TIME if fast else longest)
+        self._missing = begin + (_NAME_TIME if fast else longest)
 
     def nodes(self, hidden: bool = False) -> list[NodeName]:
-        """The nodes, as often as they occur.
-
-        Args:
-            hidden: Whether to include hidden ones.
-
-        Returns:
-            Their names, in no order.
-        """
+        """Return the nodes, as often as they occur, in no order."""
         names = [NodeName.of(*pair) for pair in self._node.get_node_names_and_namespaces()]
         return [name for name in names if hidden or not name.hidden]
 
     def topics(self, hidden: bool = False) -> NamesAndTypes:
-        """The topics and their types, sorted by name.
-
-        Args:
-            hidden: Whether to include hidden ones.
-
-        Returns:
-            Name and types of each.
-        """
+        """Return the topics and their types, sorted by name."""
         return _visible(self._node.get_topic_names_and_types(), hidden)
 
     def services(self, hidden: bool = False) -> NamesAndTypes:
-        """The services and their types, sorted by name.
-
-        Args:
-            hidden: Whether to include hidden ones.
-
-        Returns:
-            Name and types of each.
-        """
+        """Return the services and their types, sorted by name; those with clients alone, too."""
         return _visible(self._node.get_service_names_and_types(), hidden)
 
     def offered_services(self) -> dict[str, list[str]]:
-        """The services that some node offers; `services` names those that are only called, too.
-
-        Returns:
-            The types by name.
-        """
+        """Return the types of the services that some node offers, by name."""
         from rclpy.node import NodeNameNonExistentError
 
         found: dict[str, list[str]] = {}
@@ -90,89 +79,48 @@ class Graph:
                 found.update(query(node.name, node.namespace))
         return found
 
-    def publishers(self, topic: str) -> list[Endpoint]:
-        """The publishers of a topic.
-
-        Args:
-            topic: Its absolute name.
-
-        Returns:
-            An `rclpy.topic_endpoint_info.TopicEndpointInfo` for each.
-        """
+    def publishers(self, topic: str) -> list[Handle]:
+        """Return a `TopicEndpointInfo` for each publisher of a topic."""
         return list(self._node.get_publishers_info_by_topic(topic))
 
-    def subscriptions(self, topic: str) -> list[Endpoint]:
-        """The subscriptions of a topic.
-
-        Args:
-            topic: Its absolute name.
-
-        Returns:
-            An `rclpy.topic_endpoint_info.TopicEndpointInfo` for each.
-        """
+    def subscriptions(self, topic: str) -> list[Handle]:
+        """Return a `TopicEndpointInfo` for each subscription of a topic."""
         return list(self._node.get_subscriptions_info_by_topic(topic))
 
-    def view(self) -> Hashable:
-        """All names and types together, to see whether something changed."""
-        pairs = [*self.topics(hidden=True), *self.services(hidden=True)]
-        return (
-            tuple(sorted(self.nodes(hidden=True))),
-            tuple((name, *types) for name, types in pairs),
-        )
+    def settle(self, meanwhile: Callable[[], None] = lambda: None) -> None:
+        """Wait until the time for discovery has passed; a little longer where no other node is."""
+        _wait(meanwhile, self._complete)
+        self.wait_for(lambda: len(self._node.get_node_names()) > 1 or None)
 
-    def settle(self) -> None:
-        """Wait until the view is complete."""
-        wait(lambda: None, self, WaitLimits.for_lists(self._spin_time))
-
-    def wait_for(self, look: Callable[[], T | None], limit: float = math.inf) -> T | None:
-        """Wait until something is there.
-
-        Args:
-            look: Answers what was looked for, or None as long as it is not there.
-            limit: Longest time [s], besides what the graph decides.
-
-        Returns:
-            What `look` found; None when the view is complete without it.
-        """
-        return wait(look, self, WaitLimits.for_names(self._spin_time).at_most(limit))
+    def wait_for(self, look: Callable[[], T | None], timeout: float = math.inf) -> T | None:
+        """Return what `look` finds; None when it is missing for sure, or after `timeout` [s]."""
+        return _wait(look, min(self._missing, time.monotonic() + timeout))
 
     def wait_until(self, look: Callable[[], T | None], timeout: float | None = None) -> T | None:
-        """Wait until something is there, however long it takes.
+        """Return what `look` finds, however long it takes; None only after `timeout` [s]."""
+        return _wait(look, time.monotonic() + (math.inf if timeout is None else timeout))
 
-        Args:
-            look: Answers what was looked for, or None as long as it is not there.
-            timeout: Longest time [s]; None waits without limit.
 
-        Returns:
-            What `look` found; None only after `timeout`.
-        """
-        deadline = time.monotonic() + (math.inf if timeout is None else timeout)
-        found = look()
-        while found is None and (left := deadline - time.monotonic()) > 0.0:
-            found = self.wait_for(look, left)
-        return found
+def _wait(look: Callable[[], T | None], deadline: float) -> T | None:
+    begin = time.monotonic()
+    while (found := look()) is None and (now := time.monotonic()) < deadline:
+        time.sleep(min(max(_POLL, _POLL_SHARE * (now - begin)), _MAX_POLL, deadline - now))
+    return found
+
+
+def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:
+    return [(name, types) for name, types in sorted(pairs) if hidden or not is_hidden(name)]
 
 
 @contextlib.contextmanager
 def open_graph(args: Namespace) -> Iterator[Graph]:
-    """Join the ROS graph for one command, and look at it.
-
-    Args:
-        args: Parsed `GRAPH_ARGUMENTS`.
-
-    Yields:
-        The graph; the node that looks at it is gone afterwards.
-    """
+    """Join the ROS graph for one command with parsed `GRAPH_ARGUMENTS`, and look at it."""
     with open_session(args) as session:
         yield Graph(session, args.spin_time)
 
 
 def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], int | None]], Verb]:
-    """Make a verb of a function that looks at the ROS graph.
-
-    Args:
-        *arguments: Its arguments behind those of the graph.
-    """
+    """Make a verb of a function that looks at the ROS graph; it gets `GRAPH_ARGUMENTS`, too."""
 
     def declare(run: Callable[[Graph, Namespace], int | None]) -> Verb:
         def main(args: Namespace) -> int | None:
@@ -182,7 +130,3 @@ def graph_verb(*arguments: Argument) -> Callable[[Callable[[Graph, Namespace], i
         return Verb((*GRAPH_ARGUMENTS, *arguments), main)
 
     return declare
-
-
-def _visible(pairs: NamesAndTypes, hidden: bool) -> NamesAndTypes:
-    return [(name, types) for name, types in sorted(pairs) if hidden or not is_hidden(name)]

@@ -1,19 +1,23 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of other nodes, through their parameter services."""
+"""Parameters of other nodes, by their services.
+
+rclpy's own client makes endpoints of six services for each call; its reader of files takes the
+text '5' for a number, and its reader of values lets a mapping crash the call.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
-from ..aliases import Message, Value
+from ..aliases import Message
 from ..cli.errors import FieldValueError
+from ..names import NodeName
 from .calls import call
-from .names import NodeName
-from .session import Session
+from .graph import Graph
 
-# rcl_interfaces/msg/ParameterType: constant -> field of ParameterValue, words of `param describe`,
-# words of `param get`
+# rcl_interfaces/msg/ParameterType -> field of ParameterValue, type in words, what `get` prints
 _TYPES: Mapping[int, tuple[str, str, str]] = {
     0: ('', 'not set', 'Parameter not set.'),
     1: ('bool_value', 'boolean', 'Boolean value is:'),
@@ -26,51 +30,17 @@ _TYPES: Mapping[int, tuple[str, str, str]] = {
     8: ('double_array_value', 'double array', 'Double values are:'),
     9: ('string_array_value', 'string array', 'String values are:'),
 }
-
-# the same constants -> Python type, and whether it is a list of these; an empty list counts as
-# the first kind of list, as in rclpy
-_PYTHON_TYPES: Mapping[int, tuple[type, bool]] = {
-    1: (bool, False),
-    2: (int, False),
-    3: (float, False),
-    4: (str, False),
-    6: (bool, True),
-    7: (int, True),
-    8: (float, True),
-    9: (str, True),
-}
-
 TYPE_NAMES: Mapping[int, str] = {number: names[1] for number, names in _TYPES.items()}
-LABELS: Mapping[int, str] = {number: names[2] for number, names in _TYPES.items()}
 
 
-def value_of(value: Message, *, raw: bool = False) -> Value:
-    """The Python value of a parameter.
-
-    Args:
-        value: A `rcl_interfaces/msg/ParameterValue`.
-        raw: Whether arrays stay as the message keeps them; else they become lists.
-
-    Returns:
-        A bool, number, text or array; None when it is not set.
-    """
-    field = _TYPES[value.type][0]
-    if not field:
-        return None
-    found = getattr(value, field)
-    return found if raw or isinstance(found, bool | int | float | str) else list(found)
+def labelled(value: Message) -> tuple[str, Any]:
+    """Return what `get` prints before a `ParameterValue`, and its value as the message has it."""
+    field, _, label = _TYPES[value.type]
+    return label, getattr(value, field) if field else None
 
 
 def parse_value(text: str) -> object:
-    """The value that a user means.
-
-    Args:
-        text: What the user typed; YAML, or else a text.
-
-    Returns:
-        A bool, number, text or list. What is no parameter value in YAML (a mapping, an empty
-        text) stays a text.
-    """
+    """Return the value that a user means: YAML, or else a text, as a mapping or a date is."""
     import yaml
 
     try:
@@ -81,112 +51,45 @@ def parse_value(text: str) -> object:
 
 
 def parameter(name: str, value: object) -> Message:
-    """A parameter to be set.
+    """Make the `rcl_interfaces/msg/Parameter` that sets a parameter; None deletes it.
 
-    Args:
-        name: The parameter's name.
-        value: A bool, number, text or list of one of these; None deletes the parameter. A list
-            of integers and floating-point numbers counts as one of the latter.
-
-    Returns:
-        A `rcl_interfaces/msg/Parameter`.
+    A list of integers and floating-point numbers counts as one of the latter.
 
     Raises:
-        FieldValueError: When no parameter can have the value.
+        FieldValueError: No parameter can have the value.
     """
-    from rcl_interfaces.msg import Parameter, ParameterValue
+    from rclpy.parameter import Parameter
 
-    message = ParameterValue()
     if isinstance(value, list) and any(isinstance(element, float) for element in value):
-        value = [float(e) if type(e) is int else e for e in value]
-    for number, type_ in _PYTHON_TYPES.items():
-        if _is_of(value, *type_):
-            message.type = number
-            setattr(message, _TYPES[number][0], value)
-            return Parameter(name=name, value=message)
-    if value is None:
-        return Parameter(name=name, value=message)
-    raise FieldValueError(f'{name}: no parameter can be {value!r}')
+        value = [float(each) if type(each) is int else each for each in value]
+    type_ = Parameter.Type.BOOL_ARRAY if value == [] else None
+    try:
+        return Parameter(name, type_, value).to_parameter_msg()
+    except (TypeError, ValueError):
+        raise FieldValueError(f'{name}: no parameter can be {value!r}') from None
 
 
-def _is_of(value: object, element: type, is_list: bool) -> bool:
-    if is_list:
-        return isinstance(value, list) and all(type(entry) is element for entry in value)
-    return type(value) is element
+def _call(service: str, graph: Graph, node: NodeName, **fields: object) -> Message:
+    words = ''.join(word.capitalize() for word in service.split('_'))
+    return call(graph, f'rcl_interfaces/srv/{words}', f'{node.full_name}/{service}', **fields)
 
 
-def list_names(session: Session, node: NodeName, prefixes: Sequence[str] = ()) -> list[str]:
-    """The names of a node's parameters.
-
-    Args:
-        session: The session whose node calls.
-        node: The node.
-        prefixes: Only those below one of these; all when empty.
-
-    Returns:
-        The names, sorted.
-
-    Raises:
-        NoAnswerError: When the node does not answer.
-    """
-    service = f'{node.full_name}/list_parameters'
-    type_ = 'rcl_interfaces/srv/ListParameters'
-    response = call(session, type_, service, prefixes=list(prefixes))
+def list_names(graph: Graph, node: NodeName, prefixes: Sequence[str] = ()) -> list[str]:
+    """Return the names of a node's parameters, sorted; only those below one of the prefixes."""
+    response = _call('list_parameters', graph, node, prefixes=list(prefixes))
     return sorted(response.result.names)
 
 
-def get_values(session: Session, node: NodeName, names: Iterable[str]) -> list[Message]:
-    """The values of some parameters of a node.
-
-    Args:
-        session: The session whose node calls.
-        node: The node.
-        names: The parameters' names.
-
-    Returns:
-        A `rcl_interfaces/msg/ParameterValue` for each, or none at all when one is not declared.
-
-    Raises:
-        NoAnswerError: When the node does not answer.
-    """
-    service = f'{node.full_name}/get_parameters'
-    response = call(session, 'rcl_interfaces/srv/GetParameters', service, names=list(names))
-    return list(response.values)
+def get_values(graph: Graph, node: NodeName, names: Iterable[str]) -> list[Message]:
+    """Return a `ParameterValue` for each name, or none at all when one is not declared."""
+    return list(_call('get_parameters', graph, node, names=list(names)).values)
 
 
-def set_values(session: Session, node: NodeName, parameters: Iterable[Message]) -> list[Message]:
-    """Set some parameters of a node, each by itself.
-
-    Args:
-        session: The session whose node calls.
-        node: The node.
-        parameters: `rcl_interfaces/msg/Parameter`.
-
-    Returns:
-        A `rcl_interfaces/msg/SetParametersResult` for each.
-
-    Raises:
-        NoAnswerError: When the node does not answer.
-    """
-    service = f'{node.full_name}/set_parameters'
-    type_ = 'rcl_interfaces/srv/SetParameters'
-    return list(call(session, type_, service, parameters=list(parameters)).results)
+def set_values(graph: Graph, node: NodeName, parameters: Iterable[Message]) -> list[Message]:
+    """Set each `Parameter` by itself; return a `SetParametersResult` for each."""
+    return list(_call('set_parameters', graph, node, parameters=list(parameters)).results)
 
 
-def describe(session: Session, node: NodeName, names: Iterable[str]) -> list[Message]:
-    """The descriptions of some parameters of a node.
-
-    Args:
-        session: The session whose node calls.
-        node: The node.
-        names: The parameters' names.
-
-    Returns:
-        A `rcl_interfaces/msg/ParameterDescriptor` for each.
-
-    Raises:
-        NoAnswerError: When the node does not answer.
-    """
-    service = f'{node.full_name}/describe_parameters'
-    type_ = 'rcl_interfaces/srv/DescribeParameters'
-    return list(call(session, type_, service, names=list(names)).descriptors)
+def describe(graph: Graph, node: NodeName, names: Iterable[str]) -> list[Message]:
+    """Return a `ParameterDescriptor` for each name."""
+    return list(_call('describe_parameters', graph, node, names=list(names)).descriptors)

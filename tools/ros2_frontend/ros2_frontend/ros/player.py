@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 import time
 
+from rosbag_files import BagMessage, OfferedQos, Topic
+
 from ..aliases import Handle
-from ..bag.files import BagMessage, OfferedQos, Topic
 from ..cli.errors import FrontendError
 from ..index.interfaces import class_of, Kind
 from .bag_qos import for_playing, overridden, PLAY_DEPTH, to_profile
@@ -73,15 +74,7 @@ class Player:
         overrides: Mapping[str, OfferedQos],
         remaps: Mapping[str, str],
     ) -> None:
-        """Make the publishers.
-
-        Args:
-            session: Its node publishes.
-            topics: What is played.
-            clock: Which moment is due.
-            overrides: QoS to publish with, by recorded topic.
-            remaps: Other names to publish under, by recorded topic.
-        """
+        """Make the publishers of topics, with QoS and names by recorded topic where given."""
         self.clock = clock
         self._node = session.node
         self._publishers: dict[str, Handle] = {}
@@ -97,16 +90,9 @@ class Player:
         end: int | None,
         poll: Callable[[], int],
     ) -> int:
-        """Publish messages at their times.
+        """Publish messages at their times from `start` to `end` in [ns]; return how many.
 
-        Args:
-            messages: In their order.
-            start: Moment of the recording at which to begin in [ns].
-            end: Moment after which to end in [ns]; None for the last message.
-            poll: Called at least every 20 ms; returns 1 to play the next message out of turn.
-
-        Returns:
-            How many were published.
+        `poll` is called at least every 20 ms; it returns 1 to play the next message out of turn.
         """
         self.clock.start(start)
         count = 0
@@ -119,18 +105,6 @@ class Player:
                 publisher.publish(message.data)
                 count += 1
         return count
-
-    def wait_for_acknowledgements(self, timeout: float) -> bool:
-        """Wait until reliable subscriptions have everything.
-
-        Args:
-            timeout: Longest time for each topic [s]; 0 for no limit.
-        """
-        from rclpy.duration import Duration
-
-        longest = Duration(seconds=timeout) if timeout else Duration(nanoseconds=-1)
-        acknowledged = [each.wait_for_all_acked(longest) for each in self._publishers.values()]
-        return all(acknowledged)
 
     def _await(self, moment: int, poll: Callable[[], int]) -> None:
         while True:

@@ -9,49 +9,28 @@ does not serve such subscriptions. What waits in DDS has the time at which it ar
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+import itertools
 import threading
 import time
 
+from message_definitions import concatenated
+from rosbag_files import BagError, BagWriter, OfferedQos, Topic
+
 from ..aliases import Handle
-from ..bag.files import BagError, BagWriter, OfferedQos, Topic
-from ..bag.losses import LossCounter
-from ..bag.selection import TopicFilter
+from ..bag.selection import Accepts
 from ..cli.errors import FrontendError
-from ..index.definition import concatenated
 from ..index.interfaces import class_of, definition_path, Kind
 from .bag_qos import for_recording, is_compatible, offered, overridden, RECORD_DEPTH, to_profile
 from .graph import Graph
 
+_NANO = 1_000_000_000
 _TAKE_PERIOD = 0.02  # [s]
 _FLUSH_PERIOD = 1.0  # [s]; what a SIGKILL may cost
-
-
-@dataclass(frozen=True, slots=True)
-class RecordOptions:
-    """What to record.
-
-    Attributes:
-        wanted: Which topics.
-        unpublished: Whether to subscribe to topics that nobody publishes.
-        leaves: Whether to subscribe to topics to which nobody else subscribes.
-        discovery: Whether to record topics that appear later.
-        polling: Time between two looks at the graph [s].
-        max_cache: Bytes that may wait to be written; messages beyond are dropped, and counted.
-        overrides: QoS to subscribe with, by topic.
-        sim_time: Whether to stamp with /clock, and to record nothing before it.
-    """
-
-    wanted: TopicFilter
-    unpublished: bool = False
-    leaves: bool = True
-    discovery: bool = True
-    polling: float = 0.1
-    max_cache: int = 100 * 1024 * 1024
-    overrides: Mapping[str, OfferedQos] = field(default_factory=dict)
-    sim_time: bool = False
 
 
 class Recorder:
@@ -61,24 +40,36 @@ class Recorder:
         paused: Whether messages are dropped at the moment, because the user wants that.
     """
 
-    def __init__(self, graph: Graph, writer: BagWriter, options: RecordOptions) -> None:
+    def __init__(
+        self,
+        graph: Graph,
+        writer: BagWriter,
+        wanted: Accepts,
+        overrides: Mapping[str, OfferedQos],
+        args: Namespace,
+    ) -> None:
         """Subscribe to nothing yet.
 
         Args:
-            graph: The graph; its node subscribes.
+            graph: Its node subscribes.
             writer: Where messages go.
-            options: What to record.
+            wanted: Which topics.
+            overrides: QoS to subscribe with, by topic.
+            args: Parsed arguments of `ros2 bag record`.
         """
         self.paused = False
         self._graph = graph
         self._node = graph.session.node
         self._log = self._node.get_logger()
-        self._options = options
+        self._wanted = wanted
+        self._overrides = overrides
+        self._args = args
         self._topics: dict[str, _Subscribed] = {}
         self._ignored: set[str] = set()
-        self._queue = _WriterThread(writer, options.max_cache)
+        self._queue = _WriterThread(writer, args.max_cache_size)
         self._next_look = 0.0
-        self._clock = _SimClock(self._node) if options.sim_time else None
+        self._sim_time: int | None = None  # [ns]; None before the first /clock
+        self._clock = self._subscribe_clock() if args.sim_time else None
 
     def run(self, poll: Callable[[], None]) -> None:
         """Record until an exception, which is how Ctrl-C arrives.
@@ -89,11 +80,10 @@ class Recorder:
         Raises:
             FrontendError: The recording cannot be written.
         """
-        # a participant that is slow to be discovered is asked to announce itself meanwhile
-        self._graph.wait_for(self._settle)
+        self._graph.settle(lambda: self._round(discovery=True))
         self._log.info('All requested topics are subscribed. Recording...')
         while True:
-            self._round(self._options.discovery)
+            self._round(discovery=not self._args.no_discovery)
             poll()
             time.sleep(_TAKE_PERIOD)
 
@@ -108,9 +98,7 @@ class Recorder:
             self._confirm()
         finally:
             self._queue.close()
-        lost = {
-            name: each.counter.lost for name, each in self._topics.items() if each.counter.lost
-        }
+        lost = {name: each.lost for name, each in self._topics.items() if each.lost}
         for title, counts in (
             ('never arrived at the recorder', lost),
             ('dropped, because the disk is too slow (--max-cache-size)', self._queue.dropped),
@@ -127,14 +115,11 @@ class Recorder:
         """How many messages of each topic were written."""
         return self._queue.written
 
-    def _settle(self) -> None:
-        self._round(discovery=True)
-
     def _round(self, discovery: bool) -> None:
         self._queue.check()
         now = time.monotonic()
         if now >= self._next_look:
-            self._next_look = now + self._options.polling
+            self._next_look = now + self._args.polling_interval / 1000.0
             if discovery:
                 self._subscribe_new()
             self._confirm()
@@ -142,20 +127,12 @@ class Recorder:
 
     def _subscribe_new(self) -> None:
         for name, types in self._graph.topics(hidden=True):
-            if name in self._topics or name in self._ignored:
-                continue
-            if not self._options.wanted.accepts(name, types[0]):
+            if name in self._topics or name in self._ignored or not self._wanted(name, types[0]):
                 continue
             if len(types) > 1:
                 self._ignore(name, f"Topic '{name}' has more than one type: {', '.join(types)}")
-            elif self._is_due(name):
+            elif self._args.include_unpublished_topics or self._graph.publishers(name):
                 self._subscribe(name, types[0])
-
-    def _is_due(self, name: str) -> bool:
-        options = self._options
-        if not options.unpublished and not self._graph.publishers(name):
-            return False
-        return options.leaves or bool(self._graph.subscriptions(name))
 
     def _subscribe(self, name: str, type_: str) -> None:
         try:
@@ -165,16 +142,24 @@ class Recorder:
             return
         endpoints = self._graph.publishers(name)
         profiles = tuple(offered(each.qos_profile) for each in endpoints)
-        override = self._options.overrides.get(name)
+        override = self._overrides.get(name)
         qos = for_recording(profiles) if override is None else overridden(override, RECORD_DEPTH)
         handle = self._node.create_subscription(
             message_class, name, _not_called, to_profile(qos), raw=True
         )
         hashes = [str(each.topic_type_hash) for each in endpoints]
         topic = Topic(name, type_, self._definition(type_), hashes[0] if hashes else '', profiles)
-        self._topics[name] = _Subscribed(topic, handle, message_class, qos)
+        self._topics[name] = _Subscribed(topic, handle, qos)
         self._queue.set_topic(topic)
         self._log.info(f"Subscribed to topic '{name}'")
+
+    def _subscribe_clock(self) -> Handle:
+        from rclpy.qos import qos_profile_sensor_data
+        from rosgraph_msgs.msg import Clock
+
+        return self._node.create_subscription(
+            Clock, '/clock', _not_called, qos_profile_sensor_data
+        )
 
     def _definition(self, type_: str) -> str:
         try:
@@ -191,13 +176,11 @@ class Recorder:
         """Compare the publishers with those of the last look."""
         for name, each in self._topics.items():
             endpoints = self._graph.publishers(name)
-            found = each.counter.confirm({bytes(end.endpoint_gid) for end in endpoints})
-            if found:
-                self._log.warning(f"{found} messages of '{name}' were lost")
+            each.confirm({bytes(end.endpoint_gid) for end in endpoints})
             profiles = tuple(offered(end.qos_profile) for end in endpoints)
             new = tuple(qos for qos in profiles if qos not in each.topic.qos)
             if new:
-                each.add_profiles(new)
+                each.topic = replace(each.topic, qos=each.topic.qos + new)
                 self._queue.set_topic(each.topic)
                 if not all(is_compatible(each.requested, qos) for qos in new):
                     self._log.warning(
@@ -207,10 +190,12 @@ class Recorder:
 
     def _take(self) -> None:
         if self._clock is not None:
-            self._clock.take()
+            for clock, _ in _taken(self._clock, raw=False):
+                self._sim_time = clock.clock.sec * _NANO + clock.clock.nanosec
         for name, each in self._topics.items():
             count = 0
-            for data, info in each.take():
+            # not more than the queue holds, so that others have their turn
+            for data, info in itertools.islice(_taken(each.handle), max(each.requested.depth, 1)):
                 count += 1
                 self._receive(name, each, data, info)
             each.overflowed = each.overflowed or count >= each.requested.depth > 0
@@ -219,11 +204,11 @@ class Recorder:
         self, name: str, each: _Subscribed, data: bytes, info: Mapping[str, int | None]
     ) -> None:
         sequence = info['publication_sequence_number']
-        each.counter.receive(sequence)
+        each.receive(sequence)
         if self.paused:
             return
         received = info['received_timestamp'] or time.time_ns()
-        log_time = received if self._clock is None else self._clock.now
+        log_time = received if self._clock is None else self._sim_time
         if log_time is not None:
             published = info['source_timestamp'] or received
             self._queue.write(name, data, log_time, published, sequence or 0)
@@ -231,57 +216,44 @@ class Recorder:
 
 @dataclass(slots=True)
 class _Subscribed:
-    """A topic that is recorded."""
+    """A topic that is recorded, and how many of its messages were lost on their way.
 
-    topic: Topic
-    subscription: Handle
-    message_class: Handle
-    requested: OfferedQos
-    counter: LossCounter = field(default_factory=LossCounter)
-    overflowed: bool = False
-
-    def take(self) -> Iterator[tuple[bytes, Mapping[str, int | None]]]:
-        """Yield what waits; not more than the queue holds, so that others have their turn."""
-        handle = self.subscription.handle
-        with handle:
-            for _ in range(max(self.requested.depth, 1)):
-                taken = handle.take_message(self.message_class, True)
-                if taken is None:
-                    return
-                yield taken
-
-    def add_profiles(self, profiles: tuple[OfferedQos, ...]) -> None:
-        """Note what more publishers offer."""
-        topic = self.topic
-        self.topic = Topic(
-            topic.name, topic.type, topic.definition, topic.type_hash, topic.qos + profiles
-        )
-
-
-class _SimClock:
-    """The time of /clock.
-
-    Attributes:
-        now: In [ns]; None before the first message.
+    A message does not say who published it. So its number is compared with that of the last one
+    only as long as the same single publisher is in the graph before and after.
     """
 
-    def __init__(self, node: Handle) -> None:
-        from rclpy.qos import qos_profile_sensor_data
-        from rosgraph_msgs.msg import Clock
+    topic: Topic
+    handle: Handle
+    requested: OfferedQos
+    overflowed: bool = False
+    lost: int = 0
+    last: int | None = None
+    gap: int = 0
+    publishers: AbstractSet[bytes] = frozenset()
 
-        self.now: int | None = None
-        self._class = Clock
-        self._subscription = node.create_subscription(
-            Clock, '/clock', _not_called, qos_profile_sensor_data
-        )
+    def receive(self, sequence: int | None) -> None:
+        """Take the number of a message; None where the middleware has none."""
+        if sequence is not None and self.last is not None:
+            self.gap += max(sequence - self.last - 1, 0)
+        self.last = sequence
 
-    def take(self) -> None:
-        """Read what has arrived."""
-        handle = self._subscription.handle
-        with handle:
-            while (taken := handle.take_message(self._class, False)) is not None:
-                clock = taken[0].clock
-                self.now = clock.sec * 1_000_000_000 + clock.nanosec
+    def confirm(self, publishers: AbstractSet[bytes]) -> None:
+        """Count what was missing since the last time, by who publishes now."""
+        if len(publishers) == 1 and publishers == self.publishers:
+            self.lost += self.gap
+        else:
+            self.last = None
+        self.gap, self.publishers = 0, publishers
+
+
+def _taken(
+    subscription: Handle, raw: bool = True
+) -> Iterator[tuple[Handle, Mapping[str, int | None]]]:
+    """Yield what waits, with its times and number."""
+    handle = subscription.handle
+    with handle:
+        while (taken := handle.take_message(subscription.msg_type, raw)) is not None:
+            yield taken
 
 
 class _WriterThread:

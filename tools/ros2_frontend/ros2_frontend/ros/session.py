@@ -16,10 +16,12 @@ import contextlib
 import os
 import time
 
-from ..aliases import Handle, Node
+from dds_network import NETWORK_VARIABLE, NetworkChoiceError, restrict_dds
+from message_definitions import load_type_support
+
+from ..aliases import Handle
 from ..cli.errors import FrontendError
 from ..cli.interrupts import deferred_interrupts
-from .dds import restrict
 
 NODE_PREFIX = '_ros2cli'  # a leading underscore hides a node from `ros2 node list`
 
@@ -34,29 +36,17 @@ class Session:
         node: The node.
     """
 
-    def __init__(self, node: Node, executor: Handle) -> None:
+    def __init__(self, node: Handle, executor: Handle) -> None:
         self.node = node
         self._executor = executor
 
     def spin_once(self, timeout: float = _LONGEST_WAIT) -> None:
-        """Wait for one callback and run it.
-
-        Args:
-            timeout: Longest wait [s].
-        """
+        """Wait for one callback, at most `timeout` [s], and run it."""
         with deferred_interrupts():
             self._executor.spin_once(timeout_sec=min(timeout, _LONGEST_WAIT))
 
     def spin_until(self, done: Callable[[], bool], timeout: float | None = None) -> bool:
-        """Serve callbacks until a condition holds.
-
-        Args:
-            done: The condition; it is looked at after every callback.
-            timeout: Longest time [s]; None waits without limit.
-
-        Returns:
-            Whether the condition holds.
-        """
+        """Serve callbacks until a condition holds; return False when `timeout` [s] passes."""
         deadline = None if timeout is None else time.monotonic() + timeout
         while not done():
             left = _LONGEST_WAIT if deadline is None else deadline - time.monotonic()
@@ -77,14 +67,12 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
 
     Args:
         args: Parsed arguments; `use_sim_time` is looked at.
-        node_name: Name of the node; None makes a hidden one.
-
-    Yields:
-        The session; the node is gone from the graph afterwards.
+        node_name: Name of the node; None makes a hidden one. It is gone from the graph afterwards.
 
     Raises:
-        FrontendError: When the node's name, or another that the session uses, is malformed.
+        FrontendError: The node's name, or another that the session uses, is malformed.
     """
+    load_type_support()
     import rclpy
     from rclpy.context import Context
     from rclpy.exceptions import NameValidationException
@@ -94,7 +82,10 @@ def open_session(args: Namespace, node_name: str | None = None) -> Iterator[Sess
     from rclpy.signals import SignalHandlerOptions
     from rclpy.validate_node_name import validate_node_name
 
-    restrict(os.environ)
+    try:
+        restrict_dds(os.environ)
+    except NetworkChoiceError as error:
+        raise FrontendError(f'{NETWORK_VARIABLE}: {error}') from None
     context = Context()
     # no log file per command
     rclpy.init(  # noqa: TID251  # restricted above

@@ -7,15 +7,15 @@ from __future__ import annotations
 from argparse import Namespace
 
 from ..cli.verb import flag
+from ..names import absolute
 from ..ros.actions import action_names, clients_and_servers
 from ..ros.graph import Graph, graph_verb
-from ..ros.names import absolute
 from .names import Names
 
 ACTIONS = Names('action', lambda graph, _: action_names(graph))
 
 
-@graph_verb(ACTIONS.types_flag, ACTIONS.count_flag)
+@graph_verb(*ACTIONS.list_arguments(hidden=False))
 def list_names(graph: Graph, args: Namespace) -> None:
     """Print the actions."""
     ACTIONS.print_list(graph, args)
@@ -23,7 +23,7 @@ def list_names(graph: Graph, args: Namespace) -> None:
 
 @graph_verb(
     ACTIONS.name_argument('get info', '/fibonacci'),
-    ACTIONS.types_flag,
+    ACTIONS.types_flag(),
     flag('-c', '--count', help='Only display the number of action clients and action servers'),
 )
 def info(graph: Graph, args: Namespace) -> None:

@@ -5,37 +5,24 @@
 from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import contextlib
-from dataclasses import dataclass
-import math
 import threading
 import time
 
-from ..aliases import Handle
-from ..bag.files import bag_errors, BagReader, load_overrides, open_bag
+from ..bag.files import bag_errors, load_overrides, open_bag
 from ..bag.selection import topic_filter
-from ..cli.arguments import positive_float, unsigned_int
+from ..cli.arguments import positive_float, unsigned_float
 from ..cli.errors import FrontendError
 from ..cli.keyboard import has_keyboard, keys
 from ..cli.verb import argument, flag, verb
+from ..names import absolute
 from ..ros.graph import Graph
-from ..ros.names import absolute
 from ..ros.player import PlayClock, Player
 from ..ros.session import open_session, Session
 
 _NANO = 1_000_000_000
 _RIGHT = '\x1b[C'  # the key as a terminal sends it
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise ArgumentTypeError(f'{text!r} is no number of seconds')
-    return value
 
 
 def _remap(text: str) -> tuple[str, str]:
@@ -74,9 +61,12 @@ _COURSE = (
         '-r', '--rate', type=positive_float, default=1.0, help='Rate at which to play (default: 1)'
     ),
     flag('-l', '--loop', help='Start again at the end, until Ctrl-C.'),
-    argument('-d', '--delay', type=_seconds, default=0.0, help='Time [s] before each play.'),
+    argument('-d', '--delay', type=unsigned_float, default=0.0, help='Time [s] before each play.'),
     argument(
-        '--start-offset', type=_seconds, default=0.0, help='Moment [s] of the bag to start from.'
+        '--start-offset',
+        type=unsigned_float,
+        default=0.0,
+        help='Moment [s] of the bag to start from.',
     ),
     argument('--playback-duration', type=float, default=-1.0, help='Time [s] of the bag to play.'),
     argument(
@@ -89,14 +79,6 @@ _COURSE = (
     ),
     flag('-p', '--start-paused', help='Start in a paused state; SPACE resumes.'),
     flag('--disable-keyboard-controls', help='Leave the keyboard alone.'),
-    argument(
-        '--wait-for-all-acked',
-        type=unsigned_int,
-        metavar='MS',
-        help='Longest time [ms] to wait at the end until all subscriptions have everything; 0 for '
-        'no limit.',
-    ),
-    argument('--read-ahead-queue-size', type=unsigned_int, help='Accepted and without effect.'),
 )
 
 
@@ -107,92 +89,57 @@ _COURSE = (
     *_COURSE,
 )
 def play(args: Namespace) -> None:
-    """Publish what was recorded.
-
-    Raises:
-        FrontendError: When there is no recording, or nothing in it is chosen.
-    """
+    """Publish what was recorded."""
     reader = open_bag(args.bag_path)
-    wanted = topic_filter(args, not (args.topics or args.regex), hidden=True)
+    accepts = topic_filter(args, not (args.topics or args.regex), hidden=True)
+    recorded = reader.metadata
     chosen = [
         each.topic
-        for each in reader.metadata.topics
-        if each.count and wanted.accepts(each.topic.name, each.topic.type)
+        for each in recorded.topics
+        if each.count and accepts(each.topic.name, each.topic.type)
     ]
     if not chosen:
         raise FrontendError(f"'{args.bag_path}' has no messages of the chosen topics")
-    names = {topic.name for topic in chosen}
+    start = recorded.start + round(args.start_offset * _NANO)
+    duration = args.playback_duration
+    end = start + round(duration * _NANO) if duration >= 0.0 else None
     clock = PlayClock(args.rate, args.start_paused)
     overrides = load_overrides(args.qos_profile_overrides_path)
     with open_session(args, 'rosbag2_player') as session, contextlib.ExitStack() as stack:
         player = Player(session, chosen, clock, overrides, dict(args.remap))
         typed = stack.enter_context(keys(not args.disable_keyboard_controls))
-        keyboard = _Keyboard(clock, typed, session.node.get_logger())
-        for line in _introduction(args, reader, len(chosen)):
-            keyboard.log.info(line)
+        report = session.node.get_logger().info
+        topics = f"{len(chosen)} of {len(recorded.topics)} topics of '{args.bag_path}'"
+        report(f'Playing {topics}, {recorded.duration / _NANO:.1f} s')
+        report(f'Set rate to {args.rate:g}')
+        if has_keyboard() and not args.disable_keyboard_controls:
+            report('Press SPACE for Pause/Resume')
+            report('Press CURSOR_RIGHT for Play Next Message')
+        report(f'Playback until timestamp: {-1 if end is None else end}')
         Graph(session).settle()  # who is there already receives the first message, too
         if args.clock:
-            clock.step(reader.metadata.start + round(args.start_offset * _NANO))
+            clock.step(start)
             stack.enter_context(_publishing_clock(session, clock, args.clock))
+        names, steps = {topic.name for topic in chosen}, 0
+
+        def poll() -> int:
+            """SPACE pauses and resumes; return 1 for each right arrow, which plays a message."""
+            nonlocal steps
+            if text := typed():
+                steps += text.count(_RIGHT) if clock.paused else 0
+                if text.count(' ') % 2:
+                    clock.toggle()
+                    steps = 0
+                    report('Pausing play.' if clock.paused else 'Resuming play.')
+            step, steps = min(steps, 1), max(steps - 1, 0)
+            return step
+
         with contextlib.suppress(KeyboardInterrupt), bag_errors():
-            _play_rounds(player, reader, names, args, keyboard.poll)
-
-
-def _introduction(args: Namespace, reader: BagReader, chosen: int) -> Iterator[str]:
-    """Yield what is played and by which keys it is controlled, in the words of rosbag2."""
-    recorded = reader.metadata
-    topics = f"{chosen} of {len(recorded.topics)} topics of '{args.bag_path}'"
-    yield f'Playing {topics}, {recorded.duration / _NANO:.1f} s'
-    yield f'Set rate to {args.rate:g}'
-    if has_keyboard() and not args.disable_keyboard_controls:
-        yield 'Press SPACE for Pause/Resume'
-        yield 'Press CURSOR_RIGHT for Play Next Message'
-    end = _end(args, recorded.start + round(args.start_offset * _NANO))
-    yield f'Playback until timestamp: {-1 if end is None else end}'
-
-
-def _end(args: Namespace, start: int) -> int | None:
-    """Return the time at which a play that begins at a time ends in [ns]; None for no end."""
-    duration = args.playback_duration
-    return start + round(duration * _NANO) if duration >= 0.0 else None
-
-
-def _play_rounds(
-    player: Player, reader: BagReader, names: set[str], args: Namespace, poll: Callable[[], int]
-) -> None:
-    start = reader.metadata.start + round(args.start_offset * _NANO)
-    end = _end(args, start)
-    while True:
-        time.sleep(args.delay)
-        count = player.play(reader.messages(names, start), start, end, poll)
-        if not args.loop or not count:
-            break
-    if args.wait_for_all_acked is not None:
-        player.wait_for_acknowledgements(args.wait_for_all_acked / 1000.0)
-
-
-@dataclass(slots=True)
-class _Keyboard:
-    """SPACE pauses and resumes, the right arrow plays the next message."""
-
-    clock: PlayClock
-    typed: Callable[[], str]
-    log: Handle
-    steps: int = 0
-
-    def poll(self) -> int:
-        """Return 1 for each message that is played by a key."""
-        text = self.typed()
-        if text:
-            self.steps += text.count(_RIGHT) if self.clock.paused else 0
-            if text.count(' ') % 2:
-                self.clock.toggle()
-                self.steps = 0
-                self.log.info('Pausing play.' if self.clock.paused else 'Resuming play.')
-        if not self.steps:
-            return 0
-        self.steps -= 1
-        return 1
+            while True:
+                time.sleep(args.delay)
+                count = player.play(reader.messages(names, start), start, end, poll)
+                if not args.loop or not count:
+                    break
 
 
 @contextlib.contextmanager

@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentTypeError, Namespace
+from argparse import Namespace
+import contextlib
 from pathlib import Path
 import sys
 import time
 
-from ..bag.files import bag_errors, BagWriter, Compression, load_overrides, Preset, WriterOptions
+from rosbag_files import BagWriter, Preset, WriterOptions
+
+from ..bag.files import bag_errors, load_overrides
 from ..bag.selection import topic_filter
 from ..cli.arguments import unsigned_int
 from ..cli.errors import FrontendError
@@ -17,17 +20,10 @@ from ..cli.interrupts import deferred_interrupts
 from ..cli.keyboard import keys
 from ..cli.verb import argument, flag, verb
 from ..ros.graph import Graph
-from ..ros.recorder import Recorder, RecordOptions
+from ..ros.recorder import Recorder
 from ..ros.session import open_session
 
 _NANO = 1_000_000_000
-
-
-def _key_value(text: str) -> tuple[str, str]:
-    key, equals, value = text.partition('=')
-    if not key or not equals:
-        raise ArgumentTypeError(f'{text!r} is not KEY=VALUE')
-    return key, value
 
 
 _OUTPUT = (
@@ -81,7 +77,6 @@ _TOPICS = (
         metavar='MS',
         help='Time [ms] between two looks for new topics (default: 100)',
     ),
-    flag('--ignore-leaf-topics', help='Ignore topics without a subscription.'),
     argument(
         '--qos-profile-overrides-path',
         metavar='FILE',
@@ -120,21 +115,6 @@ _FILES = (
         help='How MCAP is written; zstd_fast and zstd_small compress chunks, which every reader '
         'of MCAP understands',
     ),
-    argument(
-        '--compression-mode',
-        default='none',
-        choices=[each.name.lower() for each in Compression],
-        help='What zstd compresses (default: none)',
-    ),
-    argument('--compression-format', default='', choices=['', 'zstd'], help='zstd'),
-    argument(
-        '--custom-data',
-        type=_key_value,
-        metavar='KEY=VALUE',
-        nargs='*',
-        default=[],
-        help='Data to write into metadata.yaml.',
-    ),
 )
 _BEHAVIOUR = (
     flag('--start-paused', help='Start the recorder in a paused state; SPACE resumes.'),
@@ -150,17 +130,24 @@ _BEHAVIOUR = (
 
 @verb(*_OUTPUT, *_TOPICS, *_FILES, *_BEHAVIOUR)
 def record(args: Namespace) -> None:
-    """Record until Ctrl-C or SIGTERM.
-
-    Raises:
-        FrontendError: When nothing is chosen, or the recording cannot be written.
-    """
-    options = _record_options(args)
+    """Record until Ctrl-C or SIGTERM."""
+    if args.topic_names:
+        print("Positional argument 'topics' is deprecated. Use --topics instead.", file=sys.stderr)
+    args.topics = [*args.topic_names, *args.topics]
+    everything = args.all or args.all_topics
+    if not (everything or args.topics or args.topic_types or args.regex):
+        raise FrontendError(
+            'Need to specify at least one option out of --all, --all-topics, --topics, '
+            '--topic-types or --regex'
+        )
+    wanted = topic_filter(args, everything, args.include_hidden_topics)
+    overrides = load_overrides(args.qos_profile_overrides_path)
     folder = Path(args.output or time.strftime('rosbag2_%Y_%m_%d-%H_%M_%S'))
     with open_session(args, args.node_name) as session:
         with bag_errors():
-            writer = BagWriter(folder, _writer_options(args))
-        recorder = Recorder(Graph(session), writer, options)
+            duration, preset = args.max_bag_duration * _NANO, Preset(args.storage_preset_profile)
+            writer = BagWriter(folder, WriterOptions(args.max_bag_size, duration, preset))
+        recorder = Recorder(Graph(session), writer, wanted, overrides, args)
         recorder.paused = args.start_paused
         log = session.node.get_logger()
         with keys(not args.disable_keyboard_controls) as typed:
@@ -172,54 +159,11 @@ def record(args: Namespace) -> None:
 
             try:
                 log.info('Press SPACE for pausing/resuming')
-                recorder.run(poll)
-            except KeyboardInterrupt:  # the one way to end a recording
-                pass
+                with contextlib.suppress(KeyboardInterrupt):  # the one way to end a recording
+                    recorder.run(poll)
             finally:
-                _stop(recorder)
+                # once more, while the files are being finished, ends nothing
+                with contextlib.suppress(KeyboardInterrupt), deferred_interrupts():
+                    recorder.stop()
         total = sum(recorder.counts.values())
         session.node.get_logger().info(f"Recording stopped: {total} messages in '{folder}'")
-
-
-def _stop(recorder: Recorder) -> None:
-    try:
-        with deferred_interrupts():
-            recorder.stop()
-    except KeyboardInterrupt:  # once more, while the files were being finished
-        pass
-
-
-def _record_options(args: Namespace) -> RecordOptions:
-    if args.topic_names:
-        print("Positional argument 'topics' is deprecated. Use --topics instead.", file=sys.stderr)
-    args.topics = [*args.topic_names, *args.topics]
-    everything = args.all or args.all_topics
-    if not (everything or args.topics or args.topic_types or args.regex):
-        raise FrontendError(
-            'Need to specify at least one option out of --all, --all-topics, --topics, '
-            '--topic-types or --regex'
-        )
-    if args.compression_mode != 'none' and not args.compression_format:
-        raise FrontendError(
-            'Invalid choice: Cannot specify compression mode without a compression format.'
-        )
-    return RecordOptions(
-        topic_filter(args, everything, args.include_hidden_topics),
-        args.include_unpublished_topics,
-        not args.ignore_leaf_topics,
-        not args.no_discovery,
-        args.polling_interval / 1000.0,
-        args.max_cache_size,
-        load_overrides(args.qos_profile_overrides_path),
-        args.sim_time,
-    )
-
-
-def _writer_options(args: Namespace) -> WriterOptions:
-    return WriterOptions(
-        args.max_bag_size,
-        args.max_bag_duration * _NANO,
-        Compression[args.compression_mode.upper()],
-        Preset(args.storage_preset_profile),
-        custom=dict(args.custom_data),
-    )

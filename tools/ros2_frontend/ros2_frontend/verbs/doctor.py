@@ -1,34 +1,37 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""`ros2 doctor`, also as `ros2 wtf`."""
+"""`ros2 doctor` (`ros2 wtf`): environment, topics without a partner, QoS that does not fit."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 import os
+from pathlib import Path
+import platform
+import re
 import sys
 
+from ..aliases import Handle
 from ..cli.verb import flag
-from ..health.environment import check_environment, report_environment, report_platform
-from ..health.findings import error, Finding, Report, Severity
-from ..health.network import check_network, read_interfaces, report_network
-from ..health.topics import (
-    check_qos,
-    check_topics,
-    read_topics,
-    report_qos,
-    report_topics,
-    Topic,
-)
-from ..ros.discovery import take_census
 from ..ros.graph import Graph, graph_verb
-from ..ros.participants import read_ports
+
+Finding = tuple[bool, str]
+"""Whether it is an error, not a warning; what may be wrong, and what to do about it."""
+Rows = list[tuple[str, object]]
+
+_ALWAYS_THERE = ('/parameter_events', '/rosout')
+_LEADING_WORD = re.compile(r'^(?:warning|error): ', re.IGNORECASE)
+# https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html: above 101 the ports
+# meet the ephemeral ones of Linux, above 232 they do not exist
+_SAFE_DOMAIN = 101
+_LAST_DOMAIN = 232
+_RANGES = ('LOCALHOST', 'OFF', 'SUBNET', 'SYSTEM_DEFAULT')
+_SHOWN = re.compile(r'ROS_(?!VERSION|PYTHON)|DDS_NETWORK|RMW_|FAST(?:RT|D)DS|AMENT_PREFIX_PATH')
 
 
 @graph_verb(
     flag('--report', '-r', help='Print all reports.'),
-    flag('--report-failed', '-rf', help='Print reports of failed checks only.'),
     flag(
         '--include-warnings',
         '-iw',
@@ -41,76 +44,125 @@ from ..ros.participants import read_ports
     ),
 )
 def doctor(graph: Graph, args: Namespace) -> None:
-    """Look at everything and print what may be wrong; exit code 0, as ros2cli."""
+    """Print what may be wrong, or all tables; exit code 0, as ros2cli."""
     graph.settle()
-    topics = read_topics(graph)
-    reports = _reports(graph, topics)
     if args.report:
-        wanted = list(reports)
-    else:
-        failed = _check(topics, _check_discovery(graph), args.include_warnings)
-        wanted = failed if args.report_failed else []
-    for name in wanted:
-        print(reports[name].text())
-
-
-def _check(topics: list[Topic], discovery: list[Finding], include_warnings: bool) -> list[str]:
-    """Run all checks, print findings and verdict, and answer the names of those that failed."""
+        for title, rows in _reports(graph):
+            width = max(len(name) for name, _ in rows)
+            print(f'\n   {title}', *(f'{name:{width}}: {value}' for name, value in rows), sep='\n')
+        return
     results = {
         'environment': list(check_environment(os.environ)),
-        'network': list(check_network(read_interfaces())),
-        'discovery': discovery,
-        'topic': list(check_topics(topics)),
-        'middleware': list(check_qos(topics)),
+        'topic': list(_check_topics(graph)),
+        'middleware': list(_check_qos(graph)),
     }
     for name, findings in results.items():
-        for finding in findings:
-            print(f'\n{name}: {finding.severity.value}: {finding.text}', file=sys.stderr)
-    failed = [name for name, found in results.items() if _fails(found, include_warnings)]
+        for is_error, text in findings:
+            kind = 'UserWarning: ERROR' if is_error else 'UserWarning'
+            print(f'\n{name}: {kind}: {text}', file=sys.stderr)
+    failed = [
+        name
+        for name, findings in results.items()
+        if any(is_error or args.include_warnings for is_error, _ in findings)
+    ]
     if failed:
         print(f'\n{len(failed)}/{len(results)} check(s) failed\n')
         print('Failed modules:', *failed)
     else:
         print(f'\nAll {len(results)} checks passed\n')
-    return failed
 
 
-def _fails(findings: list[Finding], include_warnings: bool) -> bool:
-    return any(include_warnings or found.severity is Severity.ERROR for found in findings)
+def check_environment(environ: Mapping[str, str]) -> Iterator[Finding]:
+    """Check the variables that decide which node finds which."""
+    if (distro := environ.get('ROS_DISTRO', '')) != 'jazzy':
+        yield False, f"ROS_DISTRO is '{distro}', not jazzy; source env.sh in this shell."
+    domain = environ.get('ROS_DOMAIN_ID', '') or '0'
+    if not domain.isdecimal() or int(domain) > _LAST_DOMAIN:
+        yield True, f"ROS_DOMAIN_ID is '{domain}'; it takes 0 to {_LAST_DOMAIN}."
+    elif int(domain) > _SAFE_DOMAIN:
+        text = 'uses ports that Linux gives to other programs'
+        yield False, f'ROS_DOMAIN_ID {domain} {text}; 0 to {_SAFE_DOMAIN} is safe.'
+    reach = environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
+    if reach and reach.upper() not in _RANGES:
+        yield True, f"ROS_AUTOMATIC_DISCOVERY_RANGE is '{reach}'; it takes {', '.join(_RANGES)}."
+    for prefix in environ.get('AMENT_PREFIX_PATH', '').split(':'):
+        if not Path(prefix, 'share', 'ament_index').is_dir():
+            text = 'which holds no packages; build the workspace and source env.sh again.'
+            yield False, f"AMENT_PREFIX_PATH names '{prefix}', {text}"
 
 
-def _check_discovery(graph: Graph) -> list[Finding]:
-    missing = take_census(graph, read_ports(graph.domain_id)).missing
-    if not missing:
-        return []
-    return [
-        error(
-            f'{missing} process(es) of this domain on this host cannot be seen. They may be no '
-            'ROS nodes, use another RMW_IMPLEMENTATION, or belong to another container or user.'
-        )
-    ]
+def _topics(graph: Graph) -> Iterator[tuple[str, list[str], list[Handle], list[Handle]]]:
+    for name, types in graph.topics():
+        if name not in _ALWAYS_THERE:
+            yield name, types, graph.publishers(name), graph.subscriptions(name)
 
 
-def _reports(graph: Graph, topics: list[Topic]) -> Mapping[str, Report]:
-    """The reports by the name of the check that they belong to."""
+def _check_topics(graph: Graph) -> Iterator[Finding]:
+    for name, types, publishers, subscriptions in _topics(graph):
+        if len(types) > 1:
+            yield True, f'{name} has several types: {", ".join(types)}.'
+        if publishers and not subscriptions:
+            yield False, f'Publisher without subscriber detected on {name}.'
+        if subscriptions and not publishers:
+            yield False, f'Subscriber without publisher detected on {name}.'
+
+
+def _pairs(graph: Graph) -> Iterator[tuple[str, Handle, Handle, Handle, str]]:
+    from rclpy.qos import qos_check_compatible
+
+    for name, _, publishers, subscriptions in _topics(graph):
+        for publisher in publishers:
+            for subscription in subscriptions:
+                fits = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
+                yield name, publisher, subscription, *fits
+
+
+def _check_qos(graph: Graph) -> Iterator[Finding]:
+    for name, publisher, subscription, verdict, reason in _pairs(graph):
+        if verdict.name == 'OK':
+            continue
+        pair = f'{publisher.node_name} -> {subscription.node_name}'
+        text = f"found on topic '{name}' ({pair}): {_LEADING_WORD.sub('', reason)}"
+        yield verdict.name == 'ERROR', f'QoS compatibility {verdict.name.lower()} {text}'
+
+
+def _reports(graph: Graph) -> Iterator[tuple[str, Rows]]:
     from rclpy.utilities import get_rmw_implementation_identifier
 
-    ports = read_ports(graph.domain_id)
-    discovery = Report(
+    yield (
+        'PLATFORM INFORMATION',
+        [
+            ('system', platform.system()),
+            ('platform info', platform.platform()),
+            ('release', platform.release()),
+            ('processor', platform.machine()),
+            ('python version', platform.python_version()),
+        ],
+    )
+    yield (
+        'ROS 2 INFORMATION',
+        [each for each in sorted(os.environ.items()) if _SHOWN.match(each[0])],
+    )
+    yield (
         'RMW MIDDLEWARE',
-        (
+        [
             ('middleware name', get_rmw_implementation_identifier()),
-            ('domain', graph.domain_id),
-            ('participants on this host', ports.count),
+            ('domain', graph.session.node.context.get_domain_id()),
             ('nodes', len(graph.nodes(hidden=True)) - 1),
             ('own node', graph.session.node.get_name()),
-        ),
+        ],
     )
-    return {
-        'platform': report_platform(),
-        'environment': report_environment(os.environ),
-        'network': report_network(read_interfaces()),
-        'discovery': discovery,
-        'topic': report_topics(topics),
-        'middleware': report_qos(topics),
-    }
+    rows: Rows = []
+    for name, _, publishers, subscriptions in _topics(graph):
+        rows.append(('topic', name))
+        rows.append(('publisher count', len(publishers)))
+        rows.append(('subscriber count', len(subscriptions)))
+    yield 'TOPIC LIST', rows or [('topic', 'none')]
+    rows = []
+    for name, publisher, subscription, _, reason in _pairs(graph):
+        rows.append(('topic [type]', f'{name} [{publisher.topic_type}]'))
+        rows.append(('publisher node', publisher.node_name))
+        rows.append(('subscriber node', subscription.node_name))
+        rows.append(('compatibility status', reason or 'OK'))
+    nothing = ('compatibility status', 'No publisher/subscriber pairs found')
+    yield 'QOS COMPATIBILITY LIST', rows or [nothing]

@@ -6,25 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import re
+from typing import Any
 
-from ..aliases import Message, Value
+from ..aliases import Message
 from ..cli.errors import FrontendError, UnknownNameError
-from ..cli.suggest import hint
 
 _INDEX = re.compile(r'\[(-?\d+)\]')
 
 
 def compile_filter(expression: str | None) -> Callable[[Message], bool]:
-    """Make a predicate of a Python expression in `m`, the message.
-
-    Args:
-        expression: For example `m.position[0] > 1.0`; None accepts every message.
-
-    Returns:
-        The predicate. It raises FrontendError when the expression fails on a message.
+    """Make a predicate of a Python expression in `m`, the message; None accepts every message.
 
     Raises:
-        FrontendError: When the expression is no Python.
+        FrontendError: The expression is no Python; from the predicate: it fails on a message.
     """
     if not expression:
         return lambda _: True
@@ -44,16 +38,10 @@ def compile_filter(expression: str | None) -> Callable[[Message], bool]:
 
 
 def parse_path(text: str | None) -> list[str]:
-    """Split the path of a field.
-
-    Args:
-        text: For example `pose.position` or `position.[0]`; None is the whole message.
-
-    Returns:
-        Its parts.
+    """Split the path of a field, e.g. `pose.position` or `position.[0]`; None is the message.
 
     Raises:
-        FrontendError: When there is none.
+        FrontendError: There is none in the text.
     """
     if text is None:
         return []
@@ -63,18 +51,11 @@ def parse_path(text: str | None) -> list[str]:
     return parts
 
 
-def select(message: Message, path: list[str]) -> Value:
-    """Follow a path into a message.
-
-    Args:
-        message: The message.
-        path: The parts of the path; an index stands in brackets.
-
-    Returns:
-        The field's value.
+def select(message: Message, path: list[str]) -> Any:  # noqa: ANN401  # a field of any type
+    """Follow the parts of a path into a message.
 
     Raises:
-        UnknownNameError: When it does not exist; it names the nearest field.
+        UnknownNameError: The field does not exist; it names those that do.
     """
     value = message
     for part in path:
@@ -82,8 +63,8 @@ def select(message: Message, path: list[str]) -> Value:
         try:
             value = value[int(index[1])] if index else getattr(value, part)
         except (AttributeError, IndexError, TypeError) as error:
-            fields = getattr(value, '_fields_and_field_types', {})
-            near = hint(part, fields) or (f'\nIt has: {", ".join(fields)}' if fields else '')
-            text = f"Invalid field '{'.'.join(path)}': {error}{near}"
+            fields = ', '.join(getattr(value, '_fields_and_field_types', ()))
+            known = f'\nIt has: {fields}' if fields else ''
+            text = f"Invalid field '{'.'.join(path)}': {error}{known}"
             raise UnknownNameError(text) from None
     return value

@@ -9,7 +9,7 @@ import sys
 
 from ..cli.errors import FrontendError
 from ..cli.verb import Argument, argument, exclusive, flag, verb
-from ..index.definition import Comments, expand
+from ..index.definition import expand
 from ..index.interfaces import (
     all_interfaces,
     class_of,
@@ -61,11 +61,7 @@ def packages(args: Namespace) -> None:
 
 @verb(argument('package_name', help="Name of the ROS package (e.g. 'example_interfaces')"))
 def package(args: Namespace) -> None:
-    """Print the types of one package.
-
-    Raises:
-        UnknownNameError: When the package defines none.
-    """
+    """Print the types of one package."""
     for name in interfaces_of(args.package_name):
         print(name)
 
@@ -75,11 +71,7 @@ def package(args: Namespace) -> None:
     flag('--no-quotes', help='if true output has no outer quotes.'),
 )
 def proto(args: Namespace) -> None:
-    """Print the defaults of a message, request or goal as YAML.
-
-    Raises:
-        UnknownNameError: When there is no such interface.
-    """
+    """Print the defaults of a message, request or goal as YAML."""
     from ..messages.document import to_document
     from ..messages.yaml_text import to_yaml
 
@@ -107,18 +99,13 @@ def proto(args: Namespace) -> None:
     ),
 )
 def show(args: Namespace) -> None:
-    """Print the definition with those of its fields' types.
-
-    Raises:
-        FrontendError: When no type is given on stdin.
-        UnknownNameError: When there is no such interface.
-    """
+    """Print the definition with those of its fields' types."""
     name = sys.stdin.readline().strip() if args.type == '-' else args.type
     if not name:
         raise FrontendError('the passed value is empty')
-    for line in expand(name, _read, Comments(not args.no_comments, args.all_comments)):
+
+    def read(type_: str) -> str:
+        return definition_path(type_).read_text(encoding='utf-8')
+
+    for line in expand(name, read, not args.no_comments, args.all_comments):
         print(line)
-
-
-def _read(name: str) -> str:
-    return definition_path(name).read_text(encoding='utf-8')

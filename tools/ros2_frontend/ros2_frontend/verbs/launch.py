@@ -22,12 +22,7 @@ Launch files run where ROS 2 Jazzy is installed (https://docs.ros.org/en/jazzy).
     argument('launch_arguments', nargs=REMAINDER, help='Arguments to the launch file'),
 )
 def launch(args: Namespace) -> NoReturn:
-    """Name the executables of the package; the one with the name of the launch file, if any.
-
-    Raises:
-        UnknownNameError: When there is no such package.
-        FrontendError: Otherwise.
-    """
+    """Name the executables of the package; the one with the name of the launch file, if any."""
     package = args.package_name
     names = sorted(path.name for path in executables(package))
     wanted = args.launch_file_name.partition('.')[0]

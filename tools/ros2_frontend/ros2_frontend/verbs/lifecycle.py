@@ -10,10 +10,9 @@ import sys
 from ..aliases import Message
 from ..cli.errors import FrontendError, NoAnswerError
 from ..cli.verb import argument, flag
+from ..names import NodeName
 from ..ros.calls import call
 from ..ros.graph import Graph, graph_verb
-from ..ros.names import NodeName
-from ..ros.session import Session
 from .node import LIST_ARGUMENTS
 from .node_argument import find_node, node_verb, OPTIONAL_NODE
 
@@ -42,64 +41,51 @@ def nodes(graph: Graph, args: Namespace) -> None:
 
 @graph_verb(*OPTIONAL_NODE)
 def get(graph: Graph, args: Namespace) -> None:
-    """Print the state of one node, or of all that have one.
-
-    Raises:
-        UnknownNameError: When there is no such node.
-        NoAnswerError: When the one node has no state, or is silent.
-    """
+    """Print the state of one node, or of all that have one."""
     if args.node_name:
         node = find_node(args.node_name, graph, args.include_hidden_nodes)
-        print(_state(graph.session, node))
+        print(_state(graph, node))
         return
     graph.settle()
     for node in _lifecycle_nodes(graph, args.include_hidden_nodes):
-        _print_state(graph.session, node)
+        try:
+            print(f'{node.full_name}: {_state(graph, node)}')
+        except NoAnswerError as error:  # noqa: PERF203  # the others may answer
+            print(error, file=sys.stderr)
 
 
-def _print_state(session: Session, node: NodeName) -> None:
-    try:
-        print(f'{node.full_name}: {_state(session, node)}')
-    except NoAnswerError as error:
-        print(error, file=sys.stderr)
-
-
-def _state(session: Session, node: NodeName) -> str:
-    state = call(session, _GET_STATE, f'{node.full_name}/get_state').current_state
+def _state(graph: Graph, node: NodeName) -> str:
+    state = call(graph, _GET_STATE, f'{node.full_name}/get_state').current_state
     return f'{state.label} [{state.id}]'
 
 
 @node_verb(flag('-a', '--all', help='Display all existing transitions'))
-def list_transitions(session: Session, node: NodeName, args: Namespace) -> None:
+def list_transitions(graph: Graph, node: NodeName, args: Namespace) -> None:
     """Print the transitions that the node can make now, or all of its state machine."""
     query = 'get_transition_graph' if args.all else 'get_available_transitions'
-    for entry in _transitions(session, node, query):
+    for entry in _transitions(graph, node, query):
         print(f'- {entry.transition.label} [{entry.transition.id}]')
         print(f'\tStart: {entry.start_state.label}')
         print(f'\tGoal: {entry.goal_state.label}')
 
 
 def _transitions(
-    session: Session, node: NodeName, query: str = 'get_available_transitions'
+    graph: Graph, node: NodeName, query: str = 'get_available_transitions'
 ) -> list[Message]:
-    response = call(session, _GET_TRANSITIONS, f'{node.full_name}/{query}')
+    response = call(graph, _GET_TRANSITIONS, f'{node.full_name}/{query}')
     return list(response.available_transitions)
 
 
 @node_verb(argument('transition', help='The lifecycle transition'))
-def set_state(session: Session, node: NodeName, args: Namespace) -> None:
-    """Make the node go through a transition, named by label or number.
-
-    Raises:
-        FrontendError: When it has no such transition now.
-    """
-    found = [entry.transition for entry in _transitions(session, node)]
+def set_state(graph: Graph, node: NodeName, args: Namespace) -> None:
+    """Make the node go through a transition, named by label or number."""
+    found = [entry.transition for entry in _transitions(graph, node)]
     wanted = [t for t in found if args.transition in {t.label, str(t.id)}]
     if not wanted:
         listed = ''.join(f'\n- {t.label} [{t.id}]' for t in found)
         raise FrontendError(f'Unknown transition requested, available ones are:{listed}')
     service = f'{node.full_name}/change_state'
-    if call(session, _CHANGE_STATE, service, transition=wanted[0]).success:
+    if call(graph, _CHANGE_STATE, service, transition=wanted[0]).success:
         print('Transitioning successful')
     else:
         print('Transitioning failed', file=sys.stderr)

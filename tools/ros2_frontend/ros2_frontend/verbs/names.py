@@ -13,8 +13,8 @@ from ..aliases import NamesAndTypes
 from ..cli.errors import UnknownNameError
 from ..cli.suggest import hint
 from ..cli.verb import Argument, argument, flag
+from ..names import absolute, is_hidden
 from ..ros.graph import Graph
-from ..ros.names import absolute, is_hidden
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,33 +29,29 @@ class Names:
     kind: str
     read: Callable[[Graph, bool], NamesAndTypes]
 
-    @property
-    def count_flag(self) -> Argument:
-        """The switch that prints only how many there are."""
-        text = f'Only display the number of {self.kind}s discovered'
-        return flag('-c', f'--count-{self.kind}s', dest='count', help=text)
+    def list_arguments(self, types: bool = True, hidden: bool = True) -> tuple[Argument, ...]:
+        """Return the switches of `list`, and of `find`, which shows no types."""
+        count = f'Only display the number of {self.kind}s discovered'
+        found = [flag('-c', f'--count-{self.kind}s', dest='count', help=count)]
+        if types:
+            found.insert(0, self.types_flag())
+        if hidden:  # the group has the same before its verb
+            text = f'Consider hidden {self.kind}s as well'
+            option = f'--include-hidden-{self.kind}s'
+            found.append(flag(option, default=SUPPRESS, help=text))
+        return tuple(found)
 
-    @property
-    def hidden_flag(self) -> Argument:
-        """The switch that shows hidden names; the group has the same before its verb."""
-        return flag(
-            f'--include-hidden-{self.kind}s',
-            default=SUPPRESS,
-            help=f'Consider hidden {self.kind}s as well',
-        )
-
-    @property
     def types_flag(self) -> Argument:
-        """The switch that shows types, too."""
+        """Return the switch that shows types, too."""
         return flag('-t', '--show-types', help=f'Additionally show the {self.kind} type')
 
     def name_argument(self, purpose: str, example: str) -> Argument:
-        """The name that the verb is about, with an example for the help."""
+        """Return the name that the verb is about, with an example for the help."""
         text = f"Name of the ROS {self.kind} to {purpose} (e.g. '{example}')"
         return argument(f'{self.kind}_name', help=text)
 
     def type_argument(self, example: str) -> Argument:
-        """The type that is looked for, with an example for the help."""
+        """Return the type that is looked for, with an example for the help."""
         text = f"Name of the ROS {self.kind} type to filter for (e.g. '{example}')"
         return argument(f'{self.kind}_type', help=text)
 
@@ -78,11 +74,7 @@ class Names:
         _print([name for name, types in self.shown(graph, args) if wanted in types], args)
 
     def print_type(self, graph: Graph, args: Namespace) -> int:
-        """Do `type`: one per line.
-
-        Returns:
-            The exit code: 1, and nothing on stdout, when there is no such name (as ros2cli does).
-        """
+        """Do `type`: one per line. Exit code 1 when there is no such name, as in ros2cli."""
         name = getattr(args, f'{self.kind}_name')
         try:
             types = self._types_of(name, graph, f"Unknown name '{name}'", self._hidden(args))
@@ -93,14 +85,7 @@ class Names:
         return 0
 
     def print_info_type(self, graph: Graph, args: Namespace, end: str = '\n') -> str:
-        """Do the first line of `info`, when the whole graph is there.
-
-        Returns:
-            The absolute name.
-
-        Raises:
-            UnknownNameError: It does not appear; the message names the nearest.
-        """
+        """Do the first line of `info`, when the whole graph is there; return the absolute name."""
         name = getattr(args, f'{self.kind}_name')
         types = self._types_of(name, graph, f"Unknown {self.kind} '{name}'")
         graph.settle()

@@ -5,13 +5,12 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Iterable
 import sys
 
-from ..aliases import NamesAndTypes, Node
+from ..aliases import NamesAndTypes
 from ..cli.verb import argument, flag
+from ..names import is_hidden
 from ..ros.graph import Graph, graph_verb
-from ..ros.names import is_hidden
 from .node_argument import find_node
 
 LIST_ARGUMENTS = (
@@ -43,11 +42,13 @@ def list_names(graph: Graph, args: Namespace) -> None:
     flag('--include-hidden', help='Display hidden topics, services, and actions as well'),
 )
 def info(graph: Graph, args: Namespace) -> None:
-    """Print what the node offers and uses.
+    """Print what the node offers and uses."""
+    from rclpy.action.graph import (
+        get_action_client_names_and_types_by_node,
+        get_action_server_names_and_types_by_node,
+    )
+    from rclpy.node import Node
 
-    Raises:
-        UnknownNameError: When there is no such node.
-    """
     unknown = f"Unable to find node '{args.node_name}'"
     wanted = find_node(args.node_name, graph, args.include_hidden, unknown)
     graph.settle()
@@ -59,30 +60,17 @@ def info(graph: Graph, args: Namespace) -> None:
             file=sys.stderr,
         )
     print(wanted.full_name)
-    for title, query in _queries():
+    for title, query in (
+        ('Subscribers', Node.get_subscriber_names_and_types_by_node),
+        ('Publishers', Node.get_publisher_names_and_types_by_node),
+        ('Service Servers', Node.get_service_names_and_types_by_node),
+        ('Service Clients', Node.get_client_names_and_types_by_node),
+        ('Action Servers', get_action_server_names_and_types_by_node),
+        ('Action Clients', get_action_client_names_and_types_by_node),
+    ):
         entries = query(graph.session.node, wanted.name, wanted.namespace)
         print(f'  {title}:')
         _print_entries(entries, args.include_hidden)
-
-
-Query = Callable[[Node, str, str], NamesAndTypes]
-
-
-def _queries() -> Iterable[tuple[str, Query]]:
-    from rclpy.action.graph import (
-        get_action_client_names_and_types_by_node,
-        get_action_server_names_and_types_by_node,
-    )
-    from rclpy.node import Node as RclpyNode
-
-    return (
-        ('Subscribers', RclpyNode.get_subscriber_names_and_types_by_node),
-        ('Publishers', RclpyNode.get_publisher_names_and_types_by_node),
-        ('Service Servers', RclpyNode.get_service_names_and_types_by_node),
-        ('Service Clients', RclpyNode.get_client_names_and_types_by_node),
-        ('Action Servers', get_action_server_names_and_types_by_node),
-        ('Action Clients', get_action_client_names_and_types_by_node),
-    )
 
 
 def _print_entries(entries: NamesAndTypes, include_hidden: bool) -> None:

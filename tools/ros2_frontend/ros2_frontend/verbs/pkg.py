@@ -12,8 +12,6 @@ from ..cli.verb import argument, flag, verb
 from ..index.packages import executables, package_prefixes, prefix_of
 
 _NOT_FOUND = 'Package not found'
-
-
 _PACKAGE = argument('package_name', help='The package name')
 
 
@@ -29,11 +27,7 @@ def list_names(_: Namespace) -> None:
     flag('--full-path', help='Show full path of each executable'),
 )
 def list_executables(args: Namespace) -> None:
-    """Print package and executable, one pair per line.
-
-    Raises:
-        UnknownNameError: When there is no such package.
-    """
+    """Print package and executable, one pair per line."""
     for package in [args.package_name] if args.package_name else package_prefixes():
         for path in executables(package):
             print(path if args.full_path else f'{package} {path.name}')
@@ -41,23 +35,14 @@ def list_executables(args: Namespace) -> None:
 
 @verb(_PACKAGE, flag('--share', help='Show share directory for the package'))
 def prefix(args: Namespace) -> None:
-    """Print the path of a package.
-
-    Raises:
-        UnknownNameError: When there is no such package.
-    """
+    """Print the path of a package."""
     path = prefix_of(args.package_name, _NOT_FOUND)
     print(path / 'share' / args.package_name if args.share else path)
 
 
 @verb(_PACKAGE, argument('-t', '--tag', help='The XML tag to output, e.g. version'))
 def xml(args: Namespace) -> None:
-    """Print the manifest or the text of each of its elements with the tag.
-
-    Raises:
-        UnknownNameError: When there is no such package.
-        FrontendError: When it has no manifest or no such tag.
-    """
+    """Print the manifest or the text of each of its elements with the tag."""
     share = prefix_of(args.package_name, _NOT_FOUND) / 'share' / args.package_name
     manifest = share / 'package.xml'
     if not manifest.is_file():

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from argparse import Namespace, REMAINDER
 import os
-from pathlib import Path
 import shlex
 import signal
 import sys
@@ -35,56 +34,22 @@ from ..index.packages import executables
     argument('argv', nargs=REMAINDER, help='Pass arbitrary arguments to the executable'),
 )
 def run(args: Namespace) -> NoReturn:
-    """Replace this process by the executable.
-
-    Raises:
-        UnknownNameError: When there is no such package or executable.
-    """
-    path = find_executable(args.package_name, args.executable_name)
-    prefix = shlex.split(args.prefix) if args.prefix else []
-    become([*prefix, str(path), *args.argv])
-
-
-def find_executable(package: str, name: str) -> Path:
-    """Find an executable of a package.
-
-    Args:
-        package: The package's name.
-        name: The executable's file name.
-
-    Returns:
-        Its path.
-
-    Raises:
-        UnknownNameError: When there is no such package or executable.
-        FrontendError: When several have the name.
-    """
+    """Replace this process by the executable."""
+    package, name = args.package_name, args.executable_name
     paths = executables(package)
     found = [path for path in paths if path.name == name]
+    if not paths:
+        text = f"No executable found\nPackage '{package}' has no executables; is it built?"
+        raise UnknownNameError(text)
     if not found:
-        raise UnknownNameError('No executable found' + _alternatives(package, name, paths))
+        names = sorted(path.name for path in paths)
+        near = hint(name, names) or f'\n{package} has: {", ".join(names)}'
+        raise UnknownNameError('No executable found' + near)
     if len(found) > 1:
         listed = ''.join(f'\n- {path}' for path in found)
         raise FrontendError(f'Multiple executables found:{listed}')
-    return found[0]
-
-
-def _alternatives(package: str, name: str, paths: list[Path]) -> str:
-    names = sorted(path.name for path in paths)
-    if not names:
-        return f"\nPackage '{package}' has no executables; is it built?"
-    return hint(name, names) or f'\n{package} has: {", ".join(names)}'
-
-
-def become(command: list[str]) -> NoReturn:
-    """Replace this process.
-
-    Args:
-        command: Program and arguments; the program is looked up in `PATH`.
-
-    Raises:
-        FrontendError: When it cannot be started.
-    """
+    prefix = shlex.split(args.prefix) if args.prefix else []
+    command = [*prefix, str(found[0]), *args.argv]
     sys.stdout.flush()
     sys.stderr.flush()
     # Python ignores SIGPIPE, and what is ignored stays ignored across exec

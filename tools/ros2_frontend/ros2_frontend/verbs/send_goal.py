@@ -16,9 +16,9 @@ from ..index.interfaces import class_of, Kind
 from ..messages.document import to_document
 from ..messages.fill import filled
 from ..messages.yaml_text import to_yaml
+from ..names import absolute
 from ..ros.actions import offered_actions
 from ..ros.graph import Graph, open_graph
-from ..ros.names import absolute
 from ..ros.session import Session
 
 _CANCEL_TIMEOUT = 5.0  # [s]
@@ -48,12 +48,7 @@ _STATUS = {
     flag('-f', '--feedback', help='Echo feedback messages for the goal'),
 )
 def send_goal(args: Namespace) -> None:
-    """Send the goal and wait for its result; Ctrl-C cancels it.
-
-    Raises:
-        BadTypeError: When the type is not installed or no action.
-        FieldValueError: When the values do not fit the goal.
-    """
+    """Send the goal and wait for its result; Ctrl-C cancels it."""
     type_ = class_of(args.action_type, Kind.ACTION, 'The passed action type is invalid')
     text = sys.stdin.read() if args.stdin else args.goal
     goal = filled(type_.Goal(), text, what='message fields')
@@ -62,69 +57,59 @@ def send_goal(args: Namespace) -> None:
     with open_graph(args) as graph:
         client = ActionClient(graph.session.node, type_, absolute(args.action_name))
         try:
-            _await_server(client, graph, args)
-            _Goal(graph.session, client).run(goal, args.feedback)
+            _await_server(client, graph, absolute(args.action_name))
+            print(f'Sending goal:\n     {_yaml(goal)}')
+            sent = client.send_goal_async(goal, _print_feedback if args.feedback else None)
+            try:
+                _follow(sent, graph.session)
+            except BaseException:  # whatever interrupts the wait cancels the goal
+                _cancel(sent, graph.session)
+                raise
         finally:
             client.destroy()
 
 
-class _Goal:
-    """One goal on its way."""
-
-    def __init__(self, session: Session, client: Handle) -> None:
-        self._session = session
-        self._client = client
-
-    def run(self, goal: Message, feedback: bool) -> None:
-        """Send, wait, print; whatever interrupts the wait cancels the goal."""
-        print(f'Sending goal:\n     {_yaml(goal)}')
-        sent = self._client.send_goal_async(goal, _print_feedback if feedback else None)
-        try:
-            self._follow(sent)
-        except BaseException:
-            self._cancel(sent)
-            raise
-
-    def _follow(self, sent: Handle) -> None:
-        handle = self._result_of(sent)
-        if not handle.accepted:
-            print('Goal was rejected.')
-            return
-        print(f'Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n')
-        result = self._result_of(handle.get_result_async())
-        print(f'Result:\n    {_yaml(result.result)}')
-        print(f'Goal finished with status: {_STATUS.get(result.status, "UNKNOWN")}')
-
-    def _cancel(self, sent: Handle) -> None:
-        """Cancel the goal; one that is just being sent may be accepted yet."""
-        if not self._session.spin_until(sent.done, _CANCEL_TIMEOUT):
-            raise FrontendError('Failed to cancel goal: it is not known whether it was accepted')
-        if sent.exception() is not None or not sent.result().accepted:
-            return
-        print('Canceling goal...')
-        future = sent.result().cancel_goal_async()
-        if not self._session.spin_until(future.done, _CANCEL_TIMEOUT):
-            raise FrontendError('Failed to cancel goal: no answer')
-        if not future.result().goals_canceling:
-            raise FrontendError('Failed to cancel goal')
-        print('Goal canceled.')
-
-    def _result_of(self, future: Handle) -> Handle:
-        self._session.spin_until(future.done)
-        if future.exception() is not None:
-            raise FrontendError(f'Exception while sending goal: {future.exception()!r}')
-        return future.result()
-
-
-def _await_server(client: Handle, graph: Graph, args: Namespace) -> None:
+def _await_server(client: Handle, graph: Graph, name: str) -> None:
     print('Waiting for an action server to become available...')
     if graph.wait_for(lambda: client.server_is_ready() or None):
         return
-    name = absolute(args.action_name)
     known = offered_actions(graph)
     if name not in known:
         print(f"There is no action '{name}' yet.{hint(name, known)}", file=sys.stderr)
     graph.wait_until(lambda: client.server_is_ready() or None)
+
+
+def _follow(sent: Handle, session: Session) -> None:
+    handle = _result_of(sent, session)
+    if not handle.accepted:
+        print('Goal was rejected.')
+        return
+    print(f'Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n')
+    result = _result_of(handle.get_result_async(), session)
+    print(f'Result:\n    {_yaml(result.result)}')
+    print(f'Goal finished with status: {_STATUS.get(result.status, "UNKNOWN")}')
+
+
+def _result_of(future: Handle, session: Session) -> Handle:
+    session.spin_until(future.done)
+    if future.exception() is not None:
+        raise FrontendError(f'Exception while sending goal: {future.exception()!r}')
+    return future.result()
+
+
+def _cancel(sent: Handle, session: Session) -> None:
+    """Cancel the goal; one that is just being sent may be accepted yet."""
+    if not session.spin_until(sent.done, _CANCEL_TIMEOUT):
+        raise FrontendError('Failed to cancel goal: it is not known whether it was accepted')
+    if sent.exception() is not None or not sent.result().accepted:
+        return
+    print('Canceling goal...')
+    future = sent.result().cancel_goal_async()
+    if not session.spin_until(future.done, _CANCEL_TIMEOUT):
+        raise FrontendError('Failed to cancel goal: no answer')
+    if not future.result().goals_canceling:
+        raise FrontendError('Failed to cancel goal')
+    print('Goal canceled.')
 
 
 def _print_feedback(message: Message) -> None:

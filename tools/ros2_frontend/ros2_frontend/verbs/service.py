@@ -12,7 +12,7 @@ from .names import Names
 SERVICES = Names('service', Graph.services)
 
 
-@graph_verb(SERVICES.types_flag, SERVICES.count_flag, SERVICES.hidden_flag)
+@graph_verb(*SERVICES.list_arguments())
 def list_names(graph: Graph, args: Namespace) -> None:
     """Print the services."""
     SERVICES.print_list(graph, args)
@@ -34,8 +34,7 @@ def type_of(graph: Graph, args: Namespace) -> int:
 
 @graph_verb(
     SERVICES.type_argument('rcl_interfaces/srv/ListParameters'),
-    SERVICES.count_flag,
-    SERVICES.hidden_flag,
+    *SERVICES.list_arguments(types=False),
 )
 def find(graph: Graph, args: Namespace) -> None:
     """Print the services that have a type."""

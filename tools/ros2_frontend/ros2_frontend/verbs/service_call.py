@@ -9,15 +9,16 @@ import math
 import sys
 import time
 
+from ..aliases import Handle
 from ..cli.arguments import content, GRAPH_ARGUMENTS, positive_float
 from ..cli.errors import NoAnswerError
 from ..cli.suggest import hint
 from ..cli.verb import argument, verb
 from ..index.interfaces import class_of, Kind
 from ..messages.fill import filled
-from ..ros.calls import Client
+from ..names import absolute, is_hidden
+from ..ros.calls import request as send
 from ..ros.graph import Graph, open_graph
-from ..ros.names import absolute, is_hidden
 from .service import SERVICES
 
 _GRACE = 0.02  # [s]; ros2cli, too, prints nothing when the service is there at once
@@ -49,50 +50,41 @@ _GRACE = 0.02  # [s]; ros2cli, too, prints nothing when the service is there at 
     ),
 )
 def call(args: Namespace) -> None:
-    """Call once, or at a rate until Ctrl-C.
-
-    Raises:
-        BadTypeError: When the type is not installed or no service.
-        FieldValueError: When the values do not fit the request.
-        NoAnswerError: When `--timeout` passed.
-    """
+    """Call once, or at a rate until Ctrl-C."""
     type_ = class_of(args.service_type, Kind.SERVICE, 'The passed service type is invalid')
     request = filled(type_.Request(), sys.stdin.read() if args.stdin else args.values)
     with open_graph(args) as graph:
-        client = Client(graph.session, type_, absolute(args.service_name))
+        client = graph.session.node.create_client(type_, absolute(args.service_name))
         _await(client, graph, args)
         while True:
             start = time.monotonic()
             print(f'requester: making request: {request!r}\n')
-            print(f'response:\n{client.call(request, args.timeout)!r}\n')
+            print(f'response:\n{send(graph.session, client, request, args.timeout)!r}\n')
             if args.rate is None:
                 return
             left = start + 1.0 / args.rate - time.monotonic()
             graph.session.spin_until(lambda: False, left)
 
 
-def _await(client: Client, graph: Graph, args: Namespace) -> None:
+def _await(client: Handle, graph: Graph, args: Namespace) -> None:
     """Wait for the service; print it when it is not there at once, and what else is."""
-    if client.wait(_GRACE):
+
+    def ready() -> bool | None:
+        return client.service_is_ready() or None
+
+    if graph.wait_for(ready, _GRACE):
         return
     print('waiting for service to become available...')
     start = time.monotonic()
-    if graph.wait_for(lambda: client.is_ready() or None, args.timeout or math.inf):
+    if graph.wait_for(ready, args.timeout or math.inf):
         return
-    name = client.name
-    _explain(name, args.service_type, graph.offered_services())
-    left = None if args.timeout is None else start + args.timeout - time.monotonic()
-    if not graph.wait_until(lambda: client.is_ready() or None, left):
-        raise NoAnswerError(f"Service '{name}' did not appear within {args.timeout:g} s")
-
-
-def _explain(name: str, wanted: str, services: dict[str, list[str]]) -> None:
-    """Print on stderr why the wait may be in vain."""
-    if wanted in services.get(name, ()):
-        return  # discovery has the service, and has not matched its endpoints yet
-    if name in services:
+    name, services = absolute(args.service_name), graph.offered_services()
+    if name not in services:
+        known = [other for other in services if is_hidden(name) or not is_hidden(other)]
+        print(f"There is no service '{name}' yet.{hint(name, known)}", file=sys.stderr)
+    elif args.service_type not in services[name]:  # else its endpoints are not matched yet
         offered = ', '.join(services[name])
-        print(f"Service '{name}' has the type {offered}, not {wanted}", file=sys.stderr)
-        return
-    known = [other for other in services if is_hidden(name) or not is_hidden(other)]
-    print(f"There is no service '{name}' yet.{hint(name, known)}", file=sys.stderr)
+        print(f"Service '{name}' has the type {offered}, not {args.service_type}", file=sys.stderr)
+    left = None if args.timeout is None else start + args.timeout - time.monotonic()
+    if not graph.wait_until(ready, left):
+        raise NoAnswerError(f"Service '{name}' did not appear within {args.timeout:g} s")

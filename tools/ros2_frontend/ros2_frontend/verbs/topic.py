@@ -16,9 +16,7 @@ TOPICS = Names('topic', Graph.topics)
 
 
 @graph_verb(
-    TOPICS.types_flag,
-    TOPICS.count_flag,
-    TOPICS.hidden_flag,
+    *TOPICS.list_arguments(),
     flag('-v', '--verbose', help='List full details about each topic'),
 )
 def list_names(graph: Graph, args: Namespace) -> None:
@@ -69,7 +67,7 @@ def type_of(graph: Graph, args: Namespace) -> int:
     return TOPICS.print_type(graph, args)
 
 
-@graph_verb(TOPICS.type_argument('std_msgs/msg/String'), TOPICS.count_flag, TOPICS.hidden_flag)
+@graph_verb(TOPICS.type_argument('std_msgs/msg/String'), *TOPICS.list_arguments(types=False))
 def find(graph: Graph, args: Namespace) -> None:
     """Print the topics that have a type."""
     TOPICS.print_found(graph, args)

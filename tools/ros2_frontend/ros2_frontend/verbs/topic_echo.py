@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from ..aliases import Handle, Message
 from ..cli.arguments import GRAPH_ARGUMENTS, positive_float, unsigned_int
@@ -13,8 +13,8 @@ from ..cli.verb import argument, flag, verb
 from ..messages.csv_text import to_csv
 from ..messages.document import Abbreviation, to_document
 from ..messages.yaml_text import to_yaml
+from ..names import absolute
 from ..ros.graph import open_graph
-from ..ros.names import absolute
 from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
 from .expression import compile_filter, parse_path, select
 from .topic import TOPICS
@@ -89,96 +89,63 @@ _FORMAT = (
     *_FORMAT,
 )
 def echo(args: Namespace) -> None:
-    """Print messages until Ctrl-C, `--once` or `--timeout`.
-
-    Raises:
-        FrontendError: When the topic's type is unknown or cannot be imported.
-    """
+    """Print messages until Ctrl-C, `--once` or `--timeout`."""
     from rclpy.event_handler import SubscriptionEventCallbacks
 
-    printer = Printer(args)
+    show = printer(args)
     wanted = message_class(args.message_type) if args.message_type else None
     topic = absolute(args.topic_name)
+    printed = False
+
+    def take(message: Message, info: Mapping[str, object]) -> None:
+        nonlocal printed
+        printed = show(message, info) or printed
+
     events = SubscriptionEventCallbacks(message_lost=None if args.no_lost_messages else print_lost)
     with open_graph(args) as graph:
         if wanted is None:
             wanted = class_of_topic(args.topic_name, graph)
         graph.wait_for(lambda: graph.publishers(topic) or None)
+        profile = matching_profile(args, graph, topic, print)
         graph.session.node.create_subscription(
-            wanted,
-            topic,
-            printer.take,
-            matching_profile(args, graph, topic, print),
-            event_callbacks=events,
-            raw=args.raw,
+            wanted, topic, take, profile, event_callbacks=events, raw=args.raw
         )
-        graph.session.spin_until(lambda: args.once and printer.count > 0, args.timeout)
+        graph.session.spin_until(lambda: args.once and printed, args.timeout)
 
 
-class Printer:
-    """Prints messages as the options set.
+def printer(args: Namespace) -> Callable[[Message, Mapping[str, object]], bool]:
+    """Make what prints a message with its times and numbers, unless the filter refuses it."""
+    path = parse_path(args.field)
+    accepts = compile_filter(args.filter_expr)
+    length = None if args.full_length else args.truncate_length
+    cut = Abbreviation(length, args.no_arr, args.no_str)
 
-    Attributes:
-        count: How many were printed.
-    """
+    def show(message: Message, info: Mapping[str, object]) -> bool:
+        value = select(message, path)
+        accepted = accepts(value)
+        if accepted:
+            print(_text(value, cut, args, info if args.include_message_info else None))
+        return accepted
 
-    def __init__(self, args: Namespace) -> None:
-        """Look at the options once.
+    return show
 
-        Args:
-            args: The parsed arguments of `topic echo`.
 
-        Raises:
-            FrontendError: When `--field` or `--filter` cannot be understood.
-        """
-        self.count = 0
-        self._args = args
-        self._path = parse_path(args.field)
-        self._accepts = compile_filter(args.filter_expr)
-        length = None if args.full_length else args.truncate_length
-        self._cut = Abbreviation(length, args.no_arr, args.no_str)
-
-    def take(self, message: Message, info: Mapping[str, object]) -> None:
-        """Print one message, unless the filter refuses it.
-
-        Args:
-            message: The message, or its bytes with `--raw`.
-            info: Time stamps and sequence numbers.
-
-        Raises:
-            UnknownNameError: When it has no such field.
-        """
-        value = select(message, self._path)
-        if not self._accepts(value):
-            return
-        self.count += 1
-        if not hasattr(value, 'SLOT_TYPES'):
-            self._print_plain(value, info)
-        elif self._args.csv:
-            head = [str(cell) for cell in info.values()] if self._args.include_message_info else []
-            print(','.join([*head, to_csv(value, self._cut)]))
-        else:
-            self._print_yaml(value, info)
-
-    def _print_plain(self, value: object, info: Mapping[str, object]) -> None:
-        if self._args.include_message_info:
-            print('---Got new message, message info:---')
-            print(info)
-            print('---Message data:---')
-        print(value, end='\n---\n')
-
-    def _print_yaml(self, message: Message, info: Mapping[str, object]) -> None:
-        if self._args.include_message_info:
-            print(to_yaml(dict(sorted(info.items()))), end='---\n')
-        print(to_yaml(to_document(message, self._cut), self._args.flow_style), end='---\n')
+def _text(
+    value: Message, cut: Abbreviation, args: Namespace, info: Mapping[str, object] | None
+) -> str:
+    """Return one message, or the selected field of one, as the options set."""
+    if not hasattr(value, 'SLOT_TYPES'):
+        head = '---Got new message, message info:---\n{}\n---Message data:---\n'
+        return f'{head.format(info) if info else ""}{value}\n---'
+    if args.csv:
+        cells = [str(cell) for cell in info.values()] if info else []
+        return ','.join([*cells, to_csv(value, cut)])
+    head = f'{to_yaml(dict(sorted(info.items())))}---\n' if info else ''
+    return f'{head}{to_yaml(to_document(value, cut), args.flow_style)}---'
 
 
 def print_lost(status: Handle) -> None:
-    """Report that messages were lost.
-
-    Args:
-        status: The event, with `total_count_change` and `total_count`.
-    """
+    """Report that messages were lost."""
     print(
         f'A message was lost!!!\n\ttotal count change:{status.total_count_change}'
         f'\n\ttotal count: {status.total_count}',

@@ -5,21 +5,20 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator
 import itertools
 import math
 import sys
 import time
 
-from ..aliases import Handle, Message
+from ..aliases import Handle
 from ..cli.arguments import content, GRAPH_ARGUMENTS, positive_float, unsigned_int
 from ..cli.errors import NoAnswerError
 from ..cli.verb import argument, exclusive, flag, verb
 from ..messages.fill import filled, Filler
+from ..names import absolute
 from ..ros.graph import Graph
-from ..ros.names import absolute
 from ..ros.qos import profile_of, PUBLISHER_QOS
-from ..ros.session import open_session, Session
+from ..ros.session import open_session
 from .topic import TOPICS
 from .topic_types import message_class
 
@@ -97,12 +96,7 @@ _REPETITION = (
     PUBLISHER_QOS,
 )
 def pub(args: Namespace) -> None:
-    """Publish until Ctrl-C, or as often as wanted.
-
-    Raises:
-        FieldValueError: When the values do not fit the message.
-        NoAnswerError: When no subscription appeared in `--max-wait-time-secs`.
-    """
+    """Publish until Ctrl-C, or as often as wanted."""
     message_type = message_class(args.message_type)
     filler = Filler(expand_now=True)
     text = sys.stdin.read() if args.stdin else args.values
@@ -114,26 +108,29 @@ def pub(args: Namespace) -> None:
         wanted = (1 if times else 0) if args.wait is None else args.wait
         graph = Graph(session, args.spin_time)
         if wanted:
-            _await_subscriptions(session, graph, publisher, wanted, args.max_wait_time_secs)
+            _await_subscriptions(graph, publisher, wanted, args.max_wait_time_secs)
         else:
             graph.settle()  # who is there already receives the first message, too
         print('publisher: beginning loop')
-        for count in _paced(session, times, 1.0 / args.rate):
-            _stamp(filler, session)
-            if args.print and count % args.print == 0:
-                print(f'publishing #{count}: {message!r}\n')
+        start = time.monotonic()
+        for index in range(times) if times else itertools.count():
+            session.spin_until(lambda: False, start + index / args.rate - time.monotonic())
+            for set_stamp in filler.stamps:
+                set_stamp(session.node.get_clock().now().to_msg())
+            if args.print and (index + 1) % args.print == 0:
+                print(f'publishing #{index + 1}: {message!r}\n')
             publisher.publish(message)
         session.spin_until(lambda: False, args.keep_alive)
 
 
 def _await_subscriptions(
-    session: Session, graph: Graph, publisher: Handle, wanted: int, longest: float | None
+    graph: Graph, publisher: Handle, wanted: int, longest: float | None
 ) -> None:
-    """Wait for subscriptions, with a line each second."""
+    """Wait for subscriptions, at most `longest` in [s], with a line each second."""
     deadline = time.monotonic() + (math.inf if longest is None else longest)
 
     def enough() -> bool | None:
-        session.spin_once(0.0)  # rclpy warns of subscriptions whose QoS does not fit
+        graph.session.spin_once(0.0)  # rclpy warns of subscriptions whose QoS does not fit
         return publisher.get_subscription_count() >= wanted or None
 
     while not enough():
@@ -145,18 +142,3 @@ def _await_subscriptions(
             )
         print(f'Waiting for at least {wanted} matching subscription(s)...')
         graph.wait_until(enough, min(_REMINDER, left))
-
-
-def _paced(session: Session, times: int, period: float) -> Iterator[int]:
-    """Count from 1, once per period, without drift; the first at once."""
-    start = time.monotonic()
-    for index in range(times) if times else itertools.count():
-        session.spin_until(lambda: False, start + index * period - time.monotonic())
-        yield index + 1
-
-
-def _stamp(filler: Filler, session: Session) -> None:
-    if filler.stamps:
-        now: Message = session.node.get_clock().now().to_msg()
-        for set_stamp in filler.stamps:
-            set_stamp(now)

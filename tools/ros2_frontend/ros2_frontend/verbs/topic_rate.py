@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections import deque
 from collections.abc import Callable
 import time
 
@@ -12,20 +13,16 @@ from ..aliases import Message
 from ..cli.arguments import positive_int
 from ..cli.errors import FrontendError
 from ..cli.verb import Argument, argument, flag
+from ..names import absolute
 from ..ros.graph import Graph, graph_verb
-from ..ros.names import absolute
 from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
-from ..ros.session import Session
 from .expression import compile_filter
-from .statistics import Delays, NANOSECONDS, Periods, Sizes
-from .topic_types import await_class_of_topic
+from .statistics import bandwidth, NANOSECONDS, Periods, spread
+from .topic_types import class_of_topic
 
 _REPORT_PERIOD = 1.0  # [s]
 _LONG_WINDOW = 10_000
 _SHORT_WINDOW = 100
-
-
-_Take = Callable[[Message], None]
 
 
 def _arguments(topic_help: str, window: int) -> tuple[Argument, ...]:
@@ -43,12 +40,22 @@ def _arguments(topic_help: str, window: int) -> tuple[Argument, ...]:
     )
 
 
-def _subscribe(graph: Graph, args: Namespace, take: _Take, raw: bool) -> None:
+def _subscribe(graph: Graph, args: Namespace, take: Callable[[Message], None], raw: bool) -> None:
     topic = absolute(args.topic_name)
-    message_type = await_class_of_topic(args.topic_name, graph)
+    message_type = class_of_topic(args.topic_name, graph, forever=True)
     graph.wait_for(lambda: graph.publishers(topic) or None)
     profile = matching_profile(args, graph, topic, print)
     graph.session.node.create_subscription(message_type, topic, take, profile, raw=raw)
+
+
+def _report(graph: Graph, report: Callable[[], str | None]) -> None:
+    """Print a report each second until Ctrl-C."""
+    due = time.monotonic()
+    while True:
+        due += _REPORT_PERIOD
+        graph.session.spin_until(lambda: False, due - time.monotonic())
+        if text := report():
+            print(text)
 
 
 @graph_verb(
@@ -74,11 +81,8 @@ def hz(graph: Graph, args: Namespace) -> None:
 
     def take(message: Message) -> None:
         now = time.time_ns() if args.use_wtime else clock.now().nanoseconds
-        if now and accepts(message) and not periods.add(now):
-            print('time has reset, resetting counters')
-        report = periods.report()
-        if report:
-            print(report)
+        if now and accepts(message) and (text := periods.add(now)):
+            print(text)
 
     _subscribe(graph, args, take, raw=not args.filter_expr)
     graph.session.spin()
@@ -87,44 +91,33 @@ def hz(graph: Graph, args: Namespace) -> None:
 @graph_verb(*_arguments('Topic name to monitor for bandwidth utilization', _SHORT_WINDOW))
 def bw(graph: Graph, args: Namespace) -> None:
     """Print the bandwidth once a second until Ctrl-C."""
-    sizes = Sizes(args.window)
-
-    def take(message: bytes) -> None:
-        sizes.add(time.monotonic(), len(message))
-
-    _subscribe(graph, args, take, raw=True)
+    samples: deque[tuple[float, int]] = deque(maxlen=args.window)
+    _subscribe(graph, args, lambda data: samples.append((time.monotonic(), len(data))), raw=True)
     print(f'Subscribed to [{args.topic_name}]')
-    _report(graph.session, lambda: sizes.report(time.monotonic()))
+    _report(graph, lambda: bandwidth(samples, time.monotonic()))
 
 
 @graph_verb(*_arguments('Topic name to calculate the delay for', _LONG_WINDOW))
 def delay(graph: Graph, args: Namespace) -> None:
-    """Print the delay once a second until Ctrl-C.
-
-    Raises:
-        FrontendError: When the messages have no header.
-    """
-    delays = Delays(args.window)
+    """Print the delay once a second until Ctrl-C."""
+    delays: deque[int] = deque(maxlen=args.window)
+    news: list[int] = []
     clock = graph.session.node.get_clock()
 
     def take(message: Message) -> None:
         if not hasattr(message, 'header'):
             raise FrontendError('msg does not have header')
         stamp = message.header.stamp
-        now = clock.now().nanoseconds
-        if now:
-            delays.add(now - (stamp.sec * NANOSECONDS + stamp.nanosec))
+        if now := clock.now().nanoseconds:
+            news.append(now - (stamp.sec * NANOSECONDS + stamp.nanosec))
+
+    def report() -> str | None:
+        if not news:
+            return 'no new messages' if delays else None
+        delays.extend(news)
+        news.clear()
+        mean = sum(delays) / len(delays) / NANOSECONDS
+        return f'average delay: {mean:.3f}\n{spread(delays)}'
 
     _subscribe(graph, args, take, raw=False)
-    _report(graph.session, delays.report)
-
-
-def _report(session: Session, report: Callable[[], str | None]) -> None:
-    """Print a report each second until Ctrl-C."""
-    due = time.monotonic()
-    while True:
-        due += _REPORT_PERIOD
-        session.spin_until(lambda: False, due - time.monotonic())
-        text = report()
-        if text:
-            print(text)
+    _report(graph, report)
