@@ -17,12 +17,11 @@ from .readiness import notify_ready
 from .realtime import declare_thread_priority, raise_thread_priority, settle_process_memory
 from .server_match import ServerMatch
 from .signals import stop_on_signals
-from .spinning import LINGER, make_executor, spin, spin_beside, WAKE_PERIOD
+from .spinning import LINGER, make_executor, spin, spin_beside
 
 __all__ = [
     'LATCHED',
     'LINGER',
-    'WAKE_PERIOD',
     'ParameterError',
     'ParameterReader',
     'RosLogBridge',

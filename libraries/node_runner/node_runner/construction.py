@@ -23,9 +23,6 @@ def destroyed_when_refused(
 
     rclpy enters a node into the graph at the beginning of its constructor, and its participant
     answers as long as the process lives, whatever became of the object.
-
-    Args:
-        construct: The constructor.
     """
 
     @wraps(construct)
@@ -42,9 +39,6 @@ def destroyed_if_refused(node: AnyNode) -> Iterator[AnyNode]:
 
     For functions that make nodes of the class ``Node`` and then read their parameters; in an
     ``ExitStack`` where there are several.
-
-    Args:
-        node: The node.
     """
     try:
         yield node

@@ -15,13 +15,7 @@ _LOOK_PERIOD = 0.1  # [s]
 
 
 def other_nodes(node: Node, names: Iterable[str], own: Sequence[str]) -> list[str]:
-    """Return the nodes of some names that others run.
-
-    Args:
-        node: Shows the graph.
-        names: Names with their namespaces.
-        own: Names of the nodes of this program, which do not count.
-    """
+    """Return the nodes of some names that others run."""
     graph = [
         f'{namespace.rstrip("/")}/{name}'
         for name, namespace in node.get_node_names_and_namespaces()

@@ -117,9 +117,6 @@ def log_as(node: Node) -> None:
     """Let the records of this process's ``logging`` appear as those of a node.
 
     Only the first node of a process counts. Without :func:`.run_program` nothing happens.
-
-    Args:
-        node: The node.
     """
     for handler in logging.getLogger().handlers:
         if isinstance(handler, RosLogBridge):

@@ -30,12 +30,7 @@ class LogRateLimit:
         self._windows: dict[Hashable, _Window] = {}
 
     def admit(self, source: Hashable, now: float) -> bool:
-        """Return whether a record may be logged.
-
-        Args:
-            source: What logs, such as file and line.
-            now: The present time.
-        """
+        """Return whether a record may be logged."""
         window = self._windows.setdefault(source, _Window(now))
         if window.admitted >= self._burst:
             window.suppressed += 1
@@ -44,11 +39,7 @@ class LogRateLimit:
         return True
 
     def collect(self, now: float) -> dict[Hashable, int]:
-        """End the windows that are over; return how many records each source lost in them.
-
-        Args:
-            now: The present time.
-        """
+        """End the windows that are over; return how many records each source lost in them."""
         over = [
             source
             for source, window in self._windows.items()

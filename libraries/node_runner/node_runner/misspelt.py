@@ -18,11 +18,8 @@ RCLPY_PREFIX = 'qos_overrides.'  # declared with a topic, so some of them later 
 def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
     """Refuse a parameter that looks like one of a node's; rclpy would ignore it.
 
-    Others are left alone: a parameter file may be for several nodes.
-
-    Args:
-        node: A node that has declared all its parameters.
-        similar: Names of other programs that look like one by chance.
+    Others are left alone: a parameter file may be for several nodes. ``similar`` are names of
+    other programs that look like one by chance; the node has declared all its parameters.
 
     Returns:
         The names that were given and that the node has not; they have no effect on it.
@@ -46,10 +43,6 @@ def refuse_misspelt(node: Node, similar: Collection[str] = ()) -> list[str]:
 
 def refuse_similar(unknown: Iterable[str], known: Iterable[str]) -> None:
     """Refuse a name that looks like a known one.
-
-    Args:
-        unknown: The unknown names.
-        known: Names that there are.
 
     Raises:
         ParameterError: There is one; the message names the likely one.

@@ -1,20 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Declares parameters with meaning and range, and reads them."""
+"""Declares parameters with meaning and range, and reads what they must be, or refuses it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+import math
 from typing import TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from . import parameter_values
+from .exceptions import ParameterError
+from .misspelt import closest
 
 Choice = TypeVar('Choice')
+Number = TypeVar('Number', int, float)
 Value = TypeVar('Value')
+
+_ALIKE = 0.6  # what is chosen from is known, so the suggestion may be a bold one
 
 
 class ParameterReader:
@@ -39,40 +45,36 @@ class ParameterReader:
 
     def text(self, name: str, default: str, meaning: str) -> str:
         """Declare and read a text."""
-        name, value = self._given(name, default)
-        return self._declare(name, parameter_values.text(name, value), meaning)
+        return self._declare(name, self._given(name, default, _text), meaning)
 
     def flag(self, name: str, meaning: str, *, default: bool) -> bool:
         """Declare and read a switch."""
-        name, value = self._given(name, default)
-        return self._declare(name, parameter_values.flag(name, value), meaning)
+        return self._declare(name, self._given(name, default, _flag), meaning)
 
     def whole(self, name: str, default: int, span: tuple[int, int], meaning: str) -> int:
         """Declare and read a whole number within a range."""
-        name, value = self._given(name, default)
         limits = IntegerRange(from_value=span[0], to_value=span[1])
-        return self._declare(name, parameter_values.whole(name, value, span), meaning, limits)
+        value = self._given(name, default, partial(_whole, span=span))
+        return self._declare(name, value, meaning, limits)
 
     def number(
         self, name: str, default: float, span: tuple[float, float] | None, meaning: str
     ) -> float:
         """Declare and read a number, within a range where one is given."""
-        name, value = self._given(name, default)
         limits = FloatingPointRange(from_value=span[0], to_value=span[1]) if span else None
-        return self._declare(name, parameter_values.number(name, value, span), meaning, limits)
+        value = self._given(name, default, partial(_number, span=span))
+        return self._declare(name, value, meaning, limits)
 
     def numbers(self, name: str, meaning: str) -> tuple[float, ...]:
-        """Declare and read a list of numbers, none by default."""
-        name, value = self._given(name, ())
-        read = parameter_values.numbers(name, value)
+        """Declare and read a list of finite numbers, none by default."""
+        read = self._given(name, (), _numbers)
         # an empty list would be one of bytes; a type without a value may stay unset
         self._declare(name, list(read) or Parameter.Type.DOUBLE_ARRAY, meaning)
         return read
 
     def texts(self, name: str, default: list[str], meaning: str) -> list[str]:
         """Declare and read a list of texts; the default is never empty, which has no type."""
-        name, value = self._given(name, default)
-        read = parameter_values.texts(name, value)
+        read = self._given(name, default, _texts)
         self._declare(name, read or Parameter.Type.STRING_ARRAY, meaning)
         return read
 
@@ -83,24 +85,20 @@ class ParameterReader:
         values: Mapping[str, Choice],
         meaning: str,
     ) -> Choice:
-        """Declare and read one of several names; return what it stands for.
-
-        Args:
-            name: Of the parameter.
-            default: One of the names.
-            values: What the names stand for.
-            meaning: Of the parameter.
-        """
-        name, value = self._given(name, default)
-        chosen = parameter_values.text(name, value)
+        """Declare and read one of several names; return what it stands for."""
+        chosen, full = self._given(name, default, _text), self._prefix + name
         self._declare(name, chosen, f'{meaning} ({", ".join(values)})')
-        return parameter_values.choice(name, chosen, values)
+        if chosen not in values:
+            meant = closest(chosen, values, _ALIKE)
+            question = f'; did you mean {meant!r}?' if meant else ''
+            raise ParameterError(f'{full} is {chosen!r}: it must be {_or(list(values))}{question}')
+        return values[chosen]
 
-    def _given(self, name: str, default: object) -> tuple[str, object]:
-        """Return the full name, and the value from outside or else the default."""
+    def _given(self, name: str, default: object, check: Callable[[str, object], Value]) -> Value:
+        """Return the value from outside or else the default, checked."""
         name = self._prefix + name
         given = self._node._parameter_overrides.get(name)  # noqa: SLF001  # no public way to read it
-        return name, default if given is None else given.value
+        return check(name, default if given is None else given.value)
 
     def _declare(
         self,
@@ -115,8 +113,65 @@ class ParameterReader:
         elif limits is not None:
             descriptor.floating_point_range = [limits]
         # the value from outside is in it already, and of the right kind
+        name = self._prefix + name
         self._node.declare_parameter(name, value, descriptor, ignore_override=True)
         return value
+
+
+def _of_kind(
+    kind: type[Value] | tuple[type[Value], ...], what: str, name: str, value: object
+) -> Value:
+    # a bool is an int for Python
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        raise ParameterError(f'{name} is {value!r}: it must be {what}')
+    return value
+
+
+def _text(name: str, value: object) -> str:
+    return _of_kind(str, 'a text', name, value)
+
+
+def _flag(name: str, value: object) -> bool:
+    return _of_kind(bool, 'true or false', name, value)
+
+
+def _whole(name: str, value: object, span: tuple[int, int]) -> int:
+    return _within(_of_kind(int, 'a whole number', name, value), name, span)
+
+
+def _number(name: str, value: object, span: tuple[float, float] | None = None) -> float:
+    number = _of_kind((int, float), 'a number', name, value)
+    if math.isnan(number):
+        raise ParameterError(f'{name} is nan: it must be a number')
+    return float(_within(number, name, span) if span else number)
+
+
+def _numbers(name: str, value: object) -> tuple[float, ...]:
+    read = tuple(_number(name, each) for each in _items(name, value, 'numbers'))
+    if not all(map(math.isfinite, read)):
+        raise ParameterError(f'{name} is {list(read)}: all of them must be finite')
+    return read
+
+
+def _texts(name: str, value: object) -> list[str]:
+    return [_text(name, each) for each in _items(name, value, 'texts')]
+
+
+def _items(name: str, value: object, what: str) -> list[object]:
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        raise ParameterError(f'{name} is {value!r}: it must be a list of {what}')
+    return list(value)
+
+
+def _within(value: Number, name: str, span: tuple[Number, Number]) -> Number:
+    low, high = span
+    if not low <= value <= high:
+        raise ParameterError(f'{name} is {value}: it must be {low} to {high}')
+    return value
+
+
+def _or(words: list[str]) -> str:
+    return ' or '.join(filter(None, [', '.join(words[:-1]), words[-1]]))
 
 
 def given_values(node: Node) -> dict[str, object]:

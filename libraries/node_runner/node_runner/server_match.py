@@ -30,12 +30,7 @@ class ServerMatch:
     """
 
     def __init__(self, node: Node, services: Iterable[str]) -> None:
-        """Begin.
-
-        Args:
-            node: Its clients of the services have been made.
-            services: Names, as the node gives them.
-        """
+        """Begin; the node has made its clients of the services, by these names."""
         self._node = node
         self._services = {node.resolve_service_name(name) for name in services}
         self._probes: dict[str, Client] = {}

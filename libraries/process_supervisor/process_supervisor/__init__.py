@@ -13,7 +13,7 @@ what the processes write.
 
 from .beside import join_in_time
 from .bring_up import bring_up_place, node_process
-from .console import explain, Shutdown, supervise, USAGE_ERROR
+from .console import Shutdown, supervise, USAGE_ERROR
 from .exceptions import CallError, GivenUpError, StartError, SupervisorError
 from .exclusive import exclusive
 from .nodes import (
@@ -32,9 +32,9 @@ from .readiness import ServiceManager
 from .robot_state import state_publisher
 from .ros_options import add_namespace, parse_with_ros, RosOptions
 from .runner import Runner
-from .spec import ProcessSpec, STOP_STEPS, StopStep
+from .spec import ProcessSpec, StopStep
 from .supervision import Notice, Outcome, Phase, Severity, Supervision
-from .terminal import is_smart, LineWriter, Painter, severity_of, wants_colour
+from .terminal import LineWriter, Painter, severity_of, wants_colour
 from .view import add_view, view_process
 
 __version__ = '0.1.0'
@@ -42,7 +42,6 @@ __version__ = '0.1.0'
 __all__ = [
     'EVERY_NODE',
     'LOG_FORMAT',
-    'STOP_STEPS',
     'USAGE_ERROR',
     'CallError',
     'Executable',
@@ -67,9 +66,7 @@ __all__ = [
     'add_view',
     'bring_up_place',
     'exclusive',
-    'explain',
     'find_executable',
-    'is_smart',
     'join_in_time',
     'namespaced_parameters',
     'node_argv',

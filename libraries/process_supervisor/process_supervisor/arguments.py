@@ -37,11 +37,7 @@ def seconds_from(least: float, *, finite: bool = True) -> Callable[[str], float]
 
 
 def add_timeout(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--timeout``.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare ``--timeout``."""
     parser.add_argument(
         '--timeout',
         metavar='S',
@@ -52,11 +48,7 @@ def add_timeout(parser: argparse.ArgumentParser) -> None:
 
 
 def add_network(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--network``.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare ``--network``."""
     parser.add_argument(
         '--network',
         metavar='NAMES',

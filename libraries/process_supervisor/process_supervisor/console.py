@@ -48,9 +48,6 @@ def supervise(
         processes: What to run.
         name: Name before the supervisor's own lines.
         shutdown: Done in a thread before they are stopped, if all had got ready.
-
-    Returns:
-        How it ended.
     """
     names = [spec.name for spec in processes]
     painter = Painter(name, names, wants_colour(sys.stdout, os.environ))
@@ -67,9 +64,23 @@ def supervise(
 
     def interrupted() -> bool:
         report(Phase.STOPPING)
-        return thread.begin()
+        if shutdown is None or runner.phase is not Phase.RUNNING:
+            return False
+        thread.start()
+        return True
 
-    thread = _ShutdownThread(shutdown, notify)
+    def shut_down(do: Shutdown) -> None:
+        outcome = Outcome(0, 'stopped by the user')
+        try:
+            do(
+                lambda text: notify(Notice(Severity.INFO, text)),
+                lambda: runner.phase is not Phase.RUNNING,
+            )
+        except Exception as error:  # noqa: BLE001  whatever it is, the processes are stopped
+            outcome = Outcome(1, f'{type(error).__name__}: {error}')
+        runner.stop(outcome)
+
+    thread = threading.Thread(target=shut_down, args=[shutdown], name='shutdown', daemon=True)
     with Runner(
         processes,
         lambda name, line: write(painter.line(name, line)),
@@ -77,9 +88,8 @@ def supervise(
         on_interrupt=interrupted,
         on_phase=report,
     ) as runner:
-        thread.runner = runner
         outcome = runner.run()
-        late = thread.join()
+        late = join_in_time(thread) if thread.ident is not None else ''
     if outcome.exit_code:
         notify(Notice(Severity.ERROR, explain(outcome)))
     if late:
@@ -88,55 +98,8 @@ def supervise(
     return outcome
 
 
-class _ShutdownThread:
-    """Runs a shutdown beside the supervisor.
-
-    Attributes:
-        runner: What is stopped after it.
-    """
-
-    runner: Runner
-
-    def __init__(self, shutdown: Shutdown | None, notify: Callable[[Notice], None]) -> None:
-        self._shutdown, self._notify = shutdown, notify
-        self._thread: threading.Thread | None = None
-
-    def begin(self) -> bool:
-        """Begin it at Ctrl-C; false when there is none, or not all are ready yet."""
-        if self._shutdown is None or self.runner.phase is not Phase.RUNNING:
-            return False
-        self._thread = threading.Thread(
-            target=self._run, args=[self._shutdown], name='shutdown', daemon=True
-        )
-        self._thread.start()
-        return True
-
-    def join(self) -> str:
-        """Wait until it has ended; ``given_up`` shows it when it is no longer wanted.
-
-        Returns:
-            Why it is given up; empty when it has ended.
-        """
-        return '' if self._thread is None else join_in_time(self._thread)
-
-    def _run(self, shutdown: Shutdown) -> None:
-        outcome = Outcome(0, 'stopped by the user')
-        try:
-            shutdown(
-                lambda text: self._notify(Notice(Severity.INFO, text)),
-                lambda: self.runner.phase is not Phase.RUNNING,
-            )
-        except Exception as error:  # noqa: BLE001  whatever it is, the processes are stopped
-            outcome = Outcome(1, f'{type(error).__name__}: {error}')
-        self.runner.stop(outcome)
-
-
 def explain(outcome: Outcome) -> str:
-    """Return why a bring-up failed, with what the process wrote last.
-
-    Args:
-        outcome: How it ended.
-    """
+    """Return why a bring-up failed, with what the process wrote last."""
     if not outcome.last_lines:
         return outcome.reason
     quoted = '\n'.join(f'    {line}' for line in outcome.last_lines)

@@ -46,11 +46,7 @@ class Guardian:
         self.dismissed = False
 
     def take(self, message: Mapping[str, Any]) -> None:
-        """Take in a message of the supervisor.
-
-        Args:
-            message: As in the table above.
-        """
+        """Take in a message of the supervisor."""
         if 'pid' in message:
             self._watch(message)
         elif 'gone' in message:

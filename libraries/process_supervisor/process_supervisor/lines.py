@@ -19,9 +19,6 @@ class LineSplitter:
 
         Args:
             data: As they were read; may end anywhere, also inside a character.
-
-        Returns:
-            The lines that are complete now, without their ends.
         """
         *lines, rest = (self._rest + data).split(b'\n')
         while len(rest) > LONGEST_LINE:

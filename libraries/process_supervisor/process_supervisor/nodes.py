@@ -53,10 +53,6 @@ class Executable:
 def find_executable(package: str, name: str) -> Path | None:
     """Find an executable as ``ros2 run`` does.
 
-    Args:
-        package: Its package.
-        name: Its name.
-
     Returns:
         Where it should be; None when the package does not exist.
     """
@@ -70,10 +66,6 @@ def find_executable(package: str, name: str) -> Path | None:
 
 def first_found(candidates: Iterable[Executable], find: FindExecutable) -> Executable | None:
     """Choose an executable out of several that do the same.
-
-    Args:
-        candidates: The executables, the best first.
-        find: Finds executables.
 
     Returns:
         The first whose package exists; None when none does.
@@ -101,9 +93,6 @@ def node_argv(
             :func:`namespaced_parameters`; a later one counts more.
         ros: Options of all nodes; what a person sets there counts most.
 
-    Returns:
-        Program and arguments.
-
     Raises:
         StartError: The executable is missing; the message has the remedy.
     """
@@ -124,12 +113,7 @@ def node_argv(
 
 
 def write_parameters(file: Path, urdf: str) -> None:
-    """Write a ROS parameter file with the description of the robot, for every node.
-
-    Args:
-        file: Where to.
-        urdf: The description.
-    """
+    """Write a ROS parameter file with the description of the robot, for every node."""
     # a JSON string is a YAML string, whatever characters are in it
     file.write_text(
         f'{EVERY_NODE}:\n  ros__parameters:\n    robot_description: {json.dumps(urdf)}\n'
@@ -138,14 +122,6 @@ def write_parameters(file: Path, urdf: str) -> None:
 
 def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
     """Make a parameter file reach its nodes in a namespace, and count less than a person's words.
-
-    Args:
-        file: A ROS parameter file.
-        ros: Options of all nodes.
-        folder: Where to write the copy.
-
-    Returns:
-        The copy.
 
     Raises:
         StartError: It is no parameter file.
@@ -165,9 +141,6 @@ def namespaced_parameters(file: Path, ros: RosOptions, folder: Path) -> Path:
 
 def parameters_by_node(file: Path) -> dict[str, Any]:
     """Read a parameter file by the own names of its nodes, whatever namespaces it names.
-
-    Args:
-        file: A ROS parameter file.
 
     Returns:
         The parameters of each node below ``ros__parameters``; what is for all nodes as ``/**``.
@@ -240,9 +213,6 @@ def _merged(base: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 
 def ros_domain(environment: Mapping[str, str]) -> str:
     """Return the ROS domain that all processes will be in.
-
-    Args:
-        environment: Environment variables.
 
     Raises:
         StartError: ROS_DOMAIN_ID is no domain; every process would fail with its own words.

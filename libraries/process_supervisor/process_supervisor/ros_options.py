@@ -91,11 +91,7 @@ class RosOptions:
 
 
 def add_namespace(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--namespace``.
-
-    Args:
-        parser: Where to.
-    """
+    """Declare ``--namespace``."""
     parser.add_argument(
         '--namespace',
         metavar='NS',

@@ -166,21 +166,13 @@ class Runner:
         return self._supervision.phase
 
     def run(self) -> Outcome:
-        """Start everything, and return when everything has ended.
-
-        Returns:
-            How it ended.
-        """
+        """Start everything, and return when everything has ended."""
         self._supervision.begin(time.monotonic())
         self._loop()
         return self._supervision.outcome or Outcome(0, 'nothing was to be run')
 
     def stop(self, outcome: Outcome) -> None:
-        """Request an orderly end, from any thread; after it, nothing happens.
-
-        Args:
-            outcome: Why, unless something else has already ended it.
-        """
+        """Request an orderly end, from any thread; after it, nothing happens."""
         self._requests.put(outcome)
         with contextlib.suppress(OSError):  # full of wake-ups: it will wake up; or it has ended
             self._wake_write.send(b'\0')

@@ -24,7 +24,8 @@ class StopSequence:
     """Stops the processes of one order after those of the order before.
 
     It gets what happened (:meth:`exited`) and what time it is (:meth:`advance`), and sends
-    signals through the callable it was given.
+    signals, each to the process of a name, through the callable it was given. ``now`` is steady
+    time in [s].
 
     Attributes:
         forced: Names of processes that did not end by their first signal.
@@ -32,11 +33,7 @@ class StopSequence:
     """
 
     def __init__(self, send: Callable[[str, Signals], None]) -> None:
-        """Begin with no process to stop.
-
-        Args:
-            send: Sends a signal to the process of that name.
-        """
+        """Begin with no process to stop."""
         self._send = send
         self._members: dict[str, _Member] = {}
         self.forced: set[str] = set()
@@ -68,11 +65,7 @@ class StopSequence:
         self._members.pop(name, None)
 
     def advance(self, now: float) -> None:
-        """Send what is due: the first signal to those whose turn it is, the next to the slow.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Send what is due: the first signal to those whose turn it is, the next to the slow."""
         while turn := self.current:
             for name in turn:
                 self._advance_member(name, now)
@@ -100,11 +93,7 @@ class StopSequence:
         return min(deadlines, default=None)
 
     def force(self, now: float) -> None:
-        """Kill everybody at once, in no order.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Kill everybody at once, in no order."""
         for name, member in self._members.items():
             member.order = 0
             member.steps = ((Signals.SIGKILL, 2.0),)

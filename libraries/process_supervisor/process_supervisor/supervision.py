@@ -99,7 +99,7 @@ class _Child:
 class Supervision:
     """Starts processes at once, waits until all are ready, stops all when a required one ends.
 
-    Another one that ends after it was ready is started again.
+    Another one that ends after it was ready is started again. ``now`` is steady time in [s].
 
     Attributes:
         phase: What it is doing.
@@ -160,11 +160,7 @@ class Supervision:
         return tuple(name for name in self._late_ones() if self._children[name].spec.awaited)
 
     def begin(self, now: float) -> None:
-        """Start everything.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Start everything."""
         self._enter(Phase.STARTING)
         self._begun = now
         for name, child in self._children.items():
@@ -185,22 +181,11 @@ class Supervision:
         return ''
 
     def line(self, name: str, text: str) -> None:
-        """Take in a line of output.
-
-        Args:
-            name: The process that wrote it.
-            text: The line, without its end.
-        """
+        """Take in a line of output."""
         self._children[name].lines.append(text)
 
     def ready(self, name: str, now: float, status: str = '') -> None:
-        """Take in that a process is ready.
-
-        Args:
-            name: The process that reported it.
-            now: Steady time in [s].
-            status: What it says of itself, for the user.
-        """
+        """Take in that a process is ready."""
         child = self._children[name]
         if child.reported:
             return
@@ -260,11 +245,7 @@ class Supervision:
                 self._plan_restart(child, why, now)
 
     def interrupt(self, now: float) -> None:
-        """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Ctrl-C: stop; again, later than :data:`ECHO_TIME`: stop at once."""
         if 0.0 <= now - self._interrupted < ECHO_TIME:
             return
         self._interrupted = now
@@ -277,12 +258,7 @@ class Supervision:
             self.stop(Outcome(0, 'stopped by the user'), now)
 
     def stop(self, outcome: Outcome, now: float) -> None:
-        """Stop everything in order; the first outcome stays.
-
-        Args:
-            outcome: Why.
-            now: Steady time in [s].
-        """
+        """Stop everything in order; the first outcome stays."""
         if self.phase in {Phase.STOPPING, Phase.STOPPED}:
             return
         self.outcome = outcome
@@ -294,11 +270,7 @@ class Supervision:
         self._advance_stop(now)
 
     def advance(self, now: float) -> None:
-        """Do what is due.
-
-        Args:
-            now: Steady time in [s].
-        """
+        """Do what is due."""
         if self.phase in {Phase.STARTING, Phase.RUNNING}:
             self._restart_ended(now)
             self._check_deadlines(now)

@@ -26,14 +26,8 @@ SEVERITY_COLOURS = {Severity.WARNING: YELLOW, Severity.ERROR: RED}
 ROS_SEVERITY = re.compile(r'^\[(DEBUG|INFO|WARN|ERROR|FATAL)\]')
 """Severity at the start of a line of rcutils logging, in the format that the bring-up sets."""
 
-SEVERITIES = {
-    'DEBUG': Severity.INFO,
-    'INFO': Severity.INFO,
-    'WARN': Severity.WARNING,
-    'ERROR': Severity.ERROR,
-    'FATAL': Severity.ERROR,
-}
-"""How loud the severities of rcutils are here."""
+LOUD_SEVERITIES = {'WARN': Severity.WARNING, 'ERROR': Severity.ERROR, 'FATAL': Severity.ERROR}
+"""How loud the severities of rcutils are here; the others are information."""
 
 
 def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
@@ -43,16 +37,8 @@ def wants_colour(stream: TextIO, environment: Mapping[str, str]) -> bool:
         stream: Where it goes.
         environment: Variables: NO_COLOR (https://no-color.org) and TERM count.
     """
-    return stream.isatty() and not environment.get('NO_COLOR') and is_smart(environment)
-
-
-def is_smart(environment: Mapping[str, str]) -> bool:
-    """Return whether the terminal understands more than plain text.
-
-    Args:
-        environment: Variables: TERM counts.
-    """
-    return environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
+    smart = environment.get('TERM', 'dumb') not in {'dumb', 'unknown', ''}
+    return stream.isatty() and not environment.get('NO_COLOR') and smart
 
 
 def severity_of(line: str) -> Severity:
@@ -63,7 +49,7 @@ def severity_of(line: str) -> Severity:
             warning: nothing of the kind is expected.
     """
     match = ROS_SEVERITY.match(line)
-    return SEVERITIES[match[1]] if match else Severity.WARNING
+    return LOUD_SEVERITIES.get(match[1], Severity.INFO) if match else Severity.WARNING
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +67,7 @@ class Painter:
     colour: bool
 
     def line(self, name: str, text: str) -> str:
-        """Format a line of a process.
-
-        Args:
-            name: The process.
-            text: What it wrote.
-        """
+        """Format a line of a process."""
         prefix = self._prefix(name)
         if not self.colour:
             return f'{prefix} {text}'
@@ -95,11 +76,7 @@ class Painter:
         return f'{shade}{prefix}{RESET} {body}{text}{RESET if body else ""}'
 
     def notice(self, notice: Notice) -> str:
-        """Format a notice of the program itself.
-
-        Args:
-            notice: The notice.
-        """
+        """Format a notice of the program itself."""
         prefix = self._prefix(self.own)
         if not self.colour:
             mark = {Severity.WARNING: 'warning: ', Severity.ERROR: 'error: '}
@@ -115,19 +92,11 @@ class LineWriter:
     """Writes lines at once; goes on silently when their reader is gone."""
 
     def __init__(self, stream: TextIO) -> None:
-        """Write to a stream.
-
-        Args:
-            stream: Standard output, usually.
-        """
+        """Write to a stream."""
         self._stream = stream
 
     def __call__(self, line: str) -> None:
-        """Write a line.
-
-        Args:
-            line: Without its end.
-        """
+        """Write a line."""
         # a closed terminal or pipe must not keep us from stopping the drives
         with contextlib.suppress(OSError, ValueError):
             self._stream.write(line + '\n')
