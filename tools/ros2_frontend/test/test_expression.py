@@ -44,7 +44,7 @@ def test_no_path_is_the_message(message: JointState) -> None:
     [
         (
             'nam',
-            "Invalid field 'nam': 'JointState' object has no attribute 'nam'\nIt has: header, nam",
+            "Invalid field 'nam': 'JointState' object has no attribute 'nam'\nIt has: header",
         ),
         ('header.zzz', "'Header' object has no attribute 'zzz'\nIt has: stamp, frame_id"),
         ('name.[5]', 'Invalid field .* index out of range'),
