@@ -11,6 +11,7 @@ import math
 from quad_description import Feet, Quadruped
 
 from ..exceptions import ParameterError
+from ..settings import check_settings, setting
 from .body import BodyLimits
 from .schedule import Gait, Schedule, SCHEDULES
 from .servo_compensation import ServoModel
@@ -21,26 +22,33 @@ from .velocity import VelocityLimits
 class GaitParameters:
     """Tuning of the gait; the defaults are those that walk with the XGO's dimensions."""
 
-    # forward and backward in [m/s]; its servos are at their speed there
-    max_linear_velocity_x: float = 0.3
-    max_linear_velocity_y: float = 0.15  # to a side in [m/s]
-    max_angular_velocity_z: float = 1.5  # turning in [rad/s]
-    linear_acceleration: float = 1.0  # change of the linear velocity in [m/s^2]
-    angular_acceleration: float = 4.0  # change of the turning in [rad/s^2]
-    nominal_height: float = 0.085  # hip axes above the centres of the feet in [m]
-    # feet outwards from below the hips in [m]; pushes tip a wide stance less often, and it goes
-    # less exactly as commanded
-    stance_widening: float = 0.0
-    # feet ahead of the centre of mass in [m], when the URDF's is not true
-    com_x_translation: float = 0.0
-    swing_height: float = 0.02  # how high a foot is lifted in [m]
-    stance_depth: float = 0.0  # how far a standing foot is pushed below the ground in [m]
-    stance_duration: float = 0.0  # how long a foot stands in [s]; 0 takes that of the gait
-    duty: float = 0.0  # share of the period that a foot stands; 0 takes that of the gait
-    # body to the side away from the lifted legs in [m]; negative takes that of the gait
-    sway: float = -1.0
-    level_gain: float = 0.5  # turns the body against the measured tilt, per tilt; 0 is off
-    heading_gain: float = 2.0  # corrects the turning by the measured heading, in [1/s]; 0 is off
+    # the servos are at their speed there
+    max_linear_velocity_x: float = setting(0.3, 0.01, 2.0, 'forward and backward [m/s]')
+    max_linear_velocity_y: float = setting(0.15, 0.01, 2.0, 'to a side [m/s]')
+    max_angular_velocity_z: float = setting(1.5, 0.05, 6.0, 'turning [rad/s]')
+    linear_acceleration: float = setting(1.0, 0.05, 20.0, 'change of the linear velocity [m/s2]')
+    angular_acceleration: float = setting(4.0, 0.1, 100.0, 'change of the turning [rad/s2]')
+    nominal_height: float = setting(0.085, 0.02, 1.0, "hip axes above the feet's centres [m]")
+    # pushes tip a wide stance less often, and it goes less exactly as commanded
+    stance_widening: float = setting(0.0, 0.0, 0.5, 'feet outwards from below the hips [m]')
+    com_x_translation: float = setting(
+        0.0, -0.2, 0.2, "feet ahead of the URDF's centre of mass [m]"
+    )
+    swing_height: float = setting(0.02, 0.0, 0.2, 'lift of a foot [m]')
+    stance_depth: float = setting(0.0, 0.0, 0.05, 'how far a standing foot is pushed down [m]')
+    stance_duration: float = setting(
+        0.0, 0.0, 5.0, 'how long a foot stands [s]; 0: that of the gait'
+    )
+    duty: float = setting(
+        0.0, 0.0, 0.95, 'share of a cycle that a foot stands; 0: that of the gait'
+    )
+    sway: float = setting(
+        -1.0, -1.0, 0.1, 'body away from the lifted legs [m]; negative: that of the gait'
+    )
+    level_gain: float = setting(0.5, 0.0, 1.0, 'turns the body against its measured tilt; 0: off')
+    heading_gain: float = setting(
+        2.0, 0.0, 10.0, 'corrects the turning by the measured heading [1/s]; 0: off'
+    )
     servo: ServoModel | None = None  # what to compensate for; None for servos that are firm
     # how far the body may be moved over the feet
     body: BodyLimits = field(default_factory=BodyLimits)
@@ -51,10 +59,7 @@ class GaitParameters:
         Raises:
             ParameterError: A value is outside of its range; the message has name and range.
         """
-        for name, (least, most) in RANGES.items():
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise ParameterError(f'{name} {value} is not within {least} to {most}')
+        check_settings(self)
         if self.duty and not self.duty >= MIN_DUTY:
             raise ParameterError(f'duty {self.duty} is below {MIN_DUTY}; 0 takes that of the gait')
         if self.servo is not None and not (0.0 < self.servo.kp < math.inf):
@@ -112,25 +117,6 @@ class GaitParameters:
 
 
 MIN_DUTY = 0.5  # below it there are moments without a foot on the ground
-
-RANGES: dict[str, tuple[float, float]] = {
-    'max_linear_velocity_x': (0.01, 2.0),
-    'max_linear_velocity_y': (0.01, 2.0),
-    'max_angular_velocity_z': (0.05, 6.0),
-    'linear_acceleration': (0.05, 20.0),
-    'angular_acceleration': (0.1, 100.0),
-    'nominal_height': (0.02, 1.0),
-    'stance_widening': (0.0, 0.5),
-    'com_x_translation': (-0.2, 0.2),
-    'swing_height': (0.0, 0.2),
-    'stance_depth': (0.0, 0.05),
-    'stance_duration': (0.0, 5.0),
-    'duty': (0.0, 0.95),
-    'sway': (-1.0, 0.1),
-    'level_gain': (0.0, 1.0),
-    'heading_gain': (0.0, 10.0),
-}
-"""Range of each parameter, both ends included; units as in :class:`GaitParameters`."""
 
 AS_TUNED = GaitParameters()
 """The gait as it is when nothing is set."""

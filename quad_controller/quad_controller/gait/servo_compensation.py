@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 from quad_description import jacobian, Quadruped, Targets
 
+from ..settings import setting
+
 GRAVITY = 9.81  # [m/s^2]
 
 
@@ -23,10 +25,10 @@ GRAVITY = 9.81  # [m/s^2]
 class ServoModel:
     """A servo as a spring with a damper."""
 
-    kp: float = 2.45  # stiffness in [N m/rad]
-    damping: float = 0.09  # its own velocity gain and the joint's friction in [N m s/rad]
-    inertia: float = 0.001  # what a joint turns in [kg m^2]
-    mass: float = 0.0  # weight that the legs carry in [kg]; 0 takes that of the URDF
+    kp: float = setting(2.45, 0.01, 1000.0, 'stiffness of a servo [N m/rad]')
+    damping: float = setting(0.09, 0.0, 10.0, 'velocity gain and friction of a servo [N m s/rad]')
+    inertia: float = setting(0.001, 0.0, 1.0, 'what a joint turns [kg m2]')
+    mass: float = setting(0.0, 0.0, 100.0, 'what the legs carry [kg]; 0: as in the URDF')
 
 
 class ServoCompensation:

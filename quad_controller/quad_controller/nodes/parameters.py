@@ -15,56 +15,12 @@ from node_runner import declare_thread_priority, ParameterReader, refuse_misspel
 from quad_description import DescriptionError, PRESETS, Quadruped, quadruped, robot_urdf
 
 from ..gait.body import BodyLimits
-from ..gait.parameters import GaitParameters, RANGES
+from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.servo_compensation import ServoModel
-from ..policy.options import GravitySource, ImuFrame, OPTION_RANGES, PolicyOptions
-from ..states.parameters import STATE_RANGES, StateParameters
-
-GAIT_MEANINGS: Mapping[str, str] = {
-    'max_linear_velocity_x': 'forward and backward [m/s]',
-    'max_linear_velocity_y': 'to a side [m/s]',
-    'max_angular_velocity_z': 'turning [rad/s]',
-    'linear_acceleration': 'change of the linear velocity [m/s2]',
-    'angular_acceleration': 'change of the turning [rad/s2]',
-    'nominal_height': "hip axes above the feet's centres [m]",
-    'stance_widening': 'feet outwards from below the hips [m]',
-    'com_x_translation': "feet ahead of the URDF's centre of mass [m]",
-    'swing_height': 'lift of a foot [m]',
-    'stance_depth': 'how far a standing foot is pushed down [m]',
-    'stance_duration': 'how long a foot stands [s]; 0: that of the gait',
-    'duty': 'share of a cycle that a foot stands; 0: that of the gait',
-    'sway': 'body away from the lifted legs [m]; negative: that of the gait',
-    'level_gain': 'turns the body against its measured tilt; 0: off',
-    'heading_gain': 'corrects the turning by the measured heading [1/s]; 0: off',
-}
-STATE_MEANINGS: Mapping[str, str] = {
-    'command_timeout': 'an older velocity counts as zero [s]',
-    'warn_age': 'older joint states and attitudes are reported [s]',
-    'hold_age': 'with older ones nothing moves on [s]',
-    'fault_age': 'older ones are a fault [s]',
-    'max_tilt': 'more is a fall [rad]',
-    'max_turn_rate': 'a faster body is falling [rad/s]',
-    'fall_time': 'how long it must be so [s]',
-    'low_battery': 'charge 0 to 1 below which the robot lies down; 0: never',
-    'battery_time': 'how long it must be so [s]',
-    'lie_height': "hip axes above the feet's centres when it lies [m]",
-    'blend_speed': 'fastest joint between two poses [rad/s]',
-    'blend_time': 'shortest time between two poses [s]',
-    'hold_band': 'a held joint that is further off is not pulled back [rad]',
-    'setpoint_speed_ratio': 'speed of set-points per speed of joints; soft servos need 2',
-}
-SERVO_RANGES: Mapping[str, tuple[tuple[float, float], str]] = {
-    'kp': ((0.01, 1000.0), 'stiffness of a servo [N m/rad]'),
-    'damping': ((0.0, 10.0), 'velocity gain and friction of a servo [N m s/rad]'),
-    'inertia': ((0.0, 1.0), 'what a joint turns [kg m2]'),
-    'mass': ((0.0, 100.0), 'what the legs carry [kg]; 0: as in the URDF'),
-}
-POLICY_MEANINGS: Mapping[str, str] = {
-    'phase_period': '[s]; 0: that of the contract',
-    'soft_limits': "share of a joint's range that its targets may use",
-    'low_pass': 'cut-off of a filter of its targets [Hz]; 0: none',
-}
+from ..policy.options import GravitySource, ImuFrame, PolicyOptions
+from ..settings import settings_of
+from ..states.parameters import StateParameters
 
 THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
 
@@ -132,7 +88,9 @@ def changed_gait(gait: GaitParameters, values: Mapping[str, object]) -> GaitPara
     Raises:
         ParameterError: A value does not make sense.
     """
-    changes: dict[str, Any] = {name: values[name] for name in GAIT_MEANINGS if name in values}
+    changes: dict[str, Any] = {
+        name: values[name] for name, *_ in settings_of(gait) if name in values
+    }
     return replace(gait, **changes) if changes else None
 
 
@@ -147,33 +105,31 @@ def _robot(read: ParameterReader) -> Quadruped:
         raise DescriptionError(f'robot_description: {error}') from error
 
 
-def _gait(node: Node, read: ParameterReader) -> GaitParameters:
-    default, live = GaitParameters(), ParameterReader(node, fixed=False)
-    values = {
-        name: live.number(name, getattr(default, name), RANGES[name], meaning)
-        for name, meaning in GAIT_MEANINGS.items()
+def _read(read: ParameterReader, kind: type, prefix: str = '') -> dict[str, Any]:
+    """Declare and read all numbers of a dataclass; the period is set as a rate."""
+    return {
+        name: read.number(prefix + name, default, span, meaning)
+        for name, default, span, meaning in settings_of(kind)
+        if name != 'period'
     }
+
+
+def _gait(node: Node, read: ParameterReader) -> GaitParameters:
+    values = _read(ParameterReader(node, fixed=False), GaitParameters)
     return GaitParameters(**values, servo=_servo(read), body=BodyLimits())
 
 
 def _servo(read: ParameterReader) -> ServoModel | None:
-    default = ServoModel()
     enabled = read.flag(
         'servo_compensation.enabled', default=False, meaning='set-points ahead of soft servos'
     )
-    values = {
-        name: read.number(f'servo_compensation.{name}', getattr(default, name), span, meaning)
-        for name, (span, meaning) in SERVO_RANGES.items()
-    }
+    values = _read(read, ServoModel, 'servo_compensation.')
     return ServoModel(**values) if enabled else None
 
 
 def _policy_options(read: ParameterReader) -> PolicyOptions:
     default = PolicyOptions()
-    values: dict[str, Any] = {
-        name: read.number(f'policy_{name}', getattr(default, name), OPTION_RANGES[name], meaning)
-        for name, meaning in POLICY_MEANINGS.items()
-    }
+    values = _read(read, PolicyOptions, 'policy_')
     contract = read.text(
         'policy_contract', '', 'YAML file with the contract of the policy, or what its file lacks'
     )
@@ -202,10 +158,7 @@ def _policy_options(read: ParameterReader) -> PolicyOptions:
 
 def _states(read: ParameterReader) -> StateParameters:
     default = StateParameters()
-    values = {
-        name: read.number(name, getattr(default, name), STATE_RANGES[name], meaning)
-        for name, meaning in STATE_MEANINGS.items()
-    }
+    values = _read(read, StateParameters)
     rate = read.number('loop_rate', 1.0 / default.period, (10.0, 200.0), 'steps a second [Hz]')
     return StateParameters(
         **values,

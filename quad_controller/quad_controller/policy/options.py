@@ -7,11 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 from ..exceptions import ParameterError
+from ..settings import check_settings, setting, settings_of
 from .gains import ServoResponse
 
 
@@ -40,13 +40,15 @@ class PolicyOptions:
 
     # file whose values count before those in the policy's own; None for none
     contract: Path | None = None
-    phase_period: float = 0.0  # in [s]; 0 takes that of the contract
+    phase_period: float = setting(0.0, 0.0, 10.0, '[s]; 0: that of the contract')
     imu_frame: ImuFrame = ImuFrame.AUTO  # of the angular velocity
     gravity_source: GravitySource = GravitySource.BLEND  # of the direction of gravity
     # joints of the policy that the robot lacks count as being at their default
     hold_missing: bool = False
-    soft_limits: float = 0.9  # share of a joint's range that targets may use
-    low_pass: float = 0.0  # cut-off of a filter of the targets in [Hz]; 0 for none
+    soft_limits: float = setting(
+        0.9, 0.1, 1.0, "share of a joint's range that its targets may use"
+    )
+    low_pass: float = setting(0.0, 0.0, 100.0, 'cut-off of a filter of its targets [Hz]; 0: none')
     # how the servos of the robot follow, to be compared with those of the training; None when
     # nobody knows
     servo: ServoResponse | None = None
@@ -57,14 +59,11 @@ class PolicyOptions:
         Raises:
             ParameterError: A value is outside of its range.
         """
-        for name, (least, most) in OPTION_RANGES.items():
-            value = getattr(self, name)
-            if not (math.isfinite(value) and least <= value <= most):
-                raise ParameterError(f'policy_{name} {value} is not within {least} to {most}')
+        check_settings(self, 'policy_')
 
     def to_json(self) -> str:
         """Return all that decides about observations and targets, but the contract's file."""
-        numbers = {name: getattr(self, name) for name in OPTION_RANGES}
+        numbers = {name: getattr(self, name) for name, *_ in settings_of(self)}
         words = {name: getattr(self, name).value for name in OPTION_WORDS}
         return json.dumps({**numbers, **words, 'hold_missing': self.hold_missing})
 
@@ -83,13 +82,6 @@ class PolicyOptions:
         except (ValueError, TypeError, AttributeError) as error:
             raise ParameterError(f'options of a policy {text!r}: {error}') from error
 
-
-OPTION_RANGES: dict[str, tuple[float, float]] = {
-    'phase_period': (0.0, 10.0),
-    'soft_limits': (0.1, 1.0),
-    'low_pass': (0.0, 100.0),
-}
-"""Range of each number, both ends included; units as in :class:`PolicyOptions`."""
 
 OPTION_WORDS: dict[str, type[Enum]] = {'imu_frame': ImuFrame, 'gravity_source': GravitySource}
 """Kind of each choice."""

@@ -8,31 +8,39 @@ from dataclasses import dataclass
 import math
 
 from ..exceptions import ParameterError
+from ..settings import check_settings, setting
 
 
 @dataclass(frozen=True, slots=True)
 class StateParameters:
     """Tuning of everything but the gait and the policy."""
 
-    period: float = 0.02  # nominal time between two steps in [s]
-    command_timeout: float = 0.5  # a velocity older than this counts as zero, in [s]
-    warn_age: float = 0.06  # joint states and attitude older than this are reported, in [s]
-    hold_age: float = 0.2  # older than this, nothing moves on, in [s]
-    fault_age: float = 0.5  # older than this is a fault, in [s]
-    max_tilt: float = 0.9  # a larger angle between the body's z axis and up is a fall, in [rad]
-    max_turn_rate: float = 8.0  # a body that turns faster is falling, in [rad/s]
-    fall_time: float = 0.1  # how long it must be so in [s]
-    low_battery: float = 0.1  # charge below which the robot lies down; 0 never
-    battery_time: float = 3.0  # how long the charge must be lower in [s]
+    period: float = setting(0.02, 0.002, 0.1, 'time between two steps [s]')
+    command_timeout: float = setting(0.5, 0.05, 10.0, 'an older velocity counts as zero [s]')
+    warn_age: float = setting(0.06, 0.01, 5.0, 'older joint states and attitudes are reported [s]')
+    hold_age: float = setting(0.2, 0.02, 5.0, 'with older ones nothing moves on [s]')
+    fault_age: float = setting(0.5, 0.05, 10.0, 'older ones are a fault [s]')
+    max_tilt: float = setting(0.9, 0.1, math.pi, 'more is a fall [rad]')
+    max_turn_rate: float = setting(8.0, 1.0, 100.0, 'a faster body is falling [rad/s]')
+    fall_time: float = setting(0.1, 0.0, 2.0, 'how long it must be so [s]')
+    low_battery: float = setting(
+        0.1, 0.0, 0.9, 'charge 0 to 1 below which the robot lies down; 0: never'
+    )
+    battery_time: float = setting(3.0, 0.0, 60.0, 'how long it must be so [s]')
     require_imu: bool = True  # whether the robot may move its legs only with a known attitude
-    lie_height: float = 0.055  # hip axes above the centres of the feet when it lies, in [m]
-    blend_speed: float = 1.0  # speed of the fastest joint between two poses in [rad/s]
-    blend_time: float = 1.0  # shortest time between two poses in [s]
-    # how far a joint may be off a set-point that holds it, in [rad]; it follows then
-    hold_band: float = 0.25
+    lie_height: float = setting(
+        0.055, 0.01, 1.0, "hip axes above the feet's centres when it lies [m]"
+    )
+    blend_speed: float = setting(1.0, 0.1, 10.0, 'fastest joint between two poses [rad/s]')
+    blend_time: float = setting(1.0, 0.2, 10.0, 'shortest time between two poses [s]')
+    hold_band: float = setting(
+        0.25, 0.02, 3.2, 'a held joint that is further off is not pulled back [rad]'
+    )
     # speed of a set-point per speed of its joint; a soft servo that is compensated for has its
     # set-point further ahead, and needs 2
-    setpoint_speed_ratio: float = 1.0
+    setpoint_speed_ratio: float = setting(
+        1.0, 0.05, 5.0, 'speed of set-points per speed of joints; soft servos need 2'
+    )
     # whether the gait goes on walking when a policy fails, or stands
     policy_fallback_walks: bool = False
     # whether the mode get_up may throw the robot off its back, at full speed
@@ -44,32 +52,9 @@ class StateParameters:
         Raises:
             ParameterError: A value is outside of its range; the message has name and range.
         """
-        for name, (least, most) in STATE_RANGES.items():
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise ParameterError(f'{name} {value} is not within {least} to {most}')
+        check_settings(self)
         if not self.warn_age <= self.hold_age <= self.fault_age:
             raise ParameterError(
                 f'warn_age {self.warn_age}, hold_age {self.hold_age} and fault_age '
                 f'{self.fault_age} must grow in this order'
             )
-
-
-STATE_RANGES: dict[str, tuple[float, float]] = {
-    'period': (0.002, 0.1),
-    'command_timeout': (0.05, 10.0),
-    'warn_age': (0.01, 5.0),
-    'hold_age': (0.02, 5.0),
-    'fault_age': (0.05, 10.0),
-    'max_tilt': (0.1, math.pi),
-    'max_turn_rate': (1.0, 100.0),
-    'fall_time': (0.0, 2.0),
-    'low_battery': (0.0, 0.9),
-    'battery_time': (0.0, 60.0),
-    'lie_height': (0.01, 1.0),
-    'blend_speed': (0.1, 10.0),
-    'blend_time': (0.2, 10.0),
-    'setpoint_speed_ratio': (0.05, 5.0),
-    'hold_band': (0.02, 3.2),
-}
-"""Range of each parameter, both ends included; units as in :class:`StateParameters`."""

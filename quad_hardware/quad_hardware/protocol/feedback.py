@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from .frame import Frame
 from .function_table import SLOTS, STATE
@@ -14,6 +15,7 @@ Vector = tuple[float, float, float]
 Slots = tuple[float, ...]
 
 NO_VALUES: Slots = (0.0,) * SLOTS
+_NAMES = {'euler1': 'raw_attitude', 'euler2': 'attitude'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,22 +42,9 @@ class Feedback:
         Raises:
             CodecError: A value does not fit its field.
         """
-        payload = STATE.pack(
-            battery=(self.battery,),
-            mode=(self.mode,),
-            faults=(self.faults,),
-            device_time=(self.device_time,),
-            euler1=self.raw_attitude,
-            euler2=self.attitude,
-            acceleration=self.acceleration,
-            position=self.position,
-            velocity=self.velocity,
-            load=self.load,
-            temperature=self.temperature,
-            battery_voltage=(self.battery_voltage,),
-            sequence=(self.sequence,),
-        )
-        return Frame(Kind.PUSH, STATE.address, payload)
+        values = {part.name: getattr(self, _name(part.name)) for part in STATE.fields}
+        runs = {name: v if isinstance(v, tuple) else (v,) for name, v in values.items()}
+        return Frame(Kind.PUSH, STATE.address, STATE.pack(**runs))
 
 
 def decode_feedback(payload: bytes) -> Feedback:
@@ -66,24 +55,10 @@ def decode_feedback(payload: bytes) -> Feedback:
     Raises:
         CodecError: The payload has another length.
     """
-    values = STATE.unpack(payload)
-    return Feedback(
-        battery=int(values['battery'][0]),
-        mode=int(values['mode'][0]),
-        faults=int(values['faults'][0]),
-        device_time=int(values['device_time'][0]),
-        attitude=_vector(values['euler2']),
-        raw_attitude=_vector(values['euler1']),
-        acceleration=_vector(values['acceleration']),
-        position=values['position'],
-        velocity=values['velocity'],
-        load=values['load'],
-        temperature=values['temperature'],
-        battery_voltage=values['battery_voltage'][0],
-        sequence=int(values['sequence'][0]),
-    )
+    runs: dict[str, Any] = STATE.unpack(payload)
+    return Feedback(**{_name(key): v if len(v) > 1 else v[0] for key, v in runs.items()})
 
 
-def _vector(values: tuple[float, ...]) -> Vector:
-    x, y, z = values
-    return x, y, z
+def _name(field: str) -> str:
+    """Return the attribute that a field of the table has here."""
+    return _NAMES.get(field, field)
