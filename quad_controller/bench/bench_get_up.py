@@ -24,7 +24,7 @@ import numpy as np
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.states.controller import Controller
-from quad_controller.states.lying import Lying, lying_on
+from quad_controller.states.get_up_poses import Lying, lying_on
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
 from quad_description import quadruped, robot_urdf

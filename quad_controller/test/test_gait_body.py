@@ -15,8 +15,7 @@ import pytest
 from quad_builds import urdf
 from quad_controller.exceptions import ParameterError
 from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Leveller, UPRIGHT
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.heading import HeadingHold
+from quad_controller.gait.generator import GaitGenerator, HeadingHold
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait
 from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel

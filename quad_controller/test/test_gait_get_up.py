@@ -15,8 +15,7 @@ import pytest
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.states.controller import Controller
 from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES
-from quad_controller.states.get_up_poses import RECOVERIES, Stage
-from quad_controller.states.lying import Lying, lying_on
+from quad_controller.states.get_up_poses import Lying, lying_on, RECOVERIES, Stage
 from quad_controller.states.modes import State
 from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf

@@ -14,8 +14,7 @@ import pytest
 
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.states.controller import Controller
-from quad_controller.states.get_up_poses import RECOVERIES, Stage
-from quad_controller.states.lying import Lying
+from quad_controller.states.get_up_poses import Lying, RECOVERIES, Stage
 from quad_controller.states.parameters import StateParameters
 from quad_description import LEGS
 from quad_sim.physics import Robot

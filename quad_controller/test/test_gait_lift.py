@@ -12,9 +12,9 @@ import pytest
 
 from quad_controller.gait.body import UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.lift import SwingLift
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait, SCHEDULES
+from quad_controller.gait.stepping import SwingLift
 from quad_controller.gait.velocity import Velocity
 from quad_gait_rig import ROBOT
 

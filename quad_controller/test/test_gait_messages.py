@@ -220,8 +220,8 @@ def test_feedback_makes_steps_and_is_used_once() -> None:
     outputs: queue.Queue[Output] = queue.Queue()
     with running(outputs.put) as loop:
         assert outputs.get(timeout=TEST_TIMEOUT).targets is None
-        loop.offer_joints(JointSample(FOLDED, (0.0,) * 12))
-        loop.offer_imu(UPRIGHT)
+        loop.offer(joints=JointSample(FOLDED, (0.0,) * 12))
+        loop.offer(imu=UPRIGHT)
         output = outputs.get(timeout=TEST_TIMEOUT)
         while output.targets is None:
             output = outputs.get(timeout=TEST_TIMEOUT)

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.timing.pacer import Pacer, WINDOW
-from quad_controller.timing.statistics import LoopStatistics
+from quad_controller.timing.pacer import LoopStatistics, Pacer, WINDOW
 
 PERIOD = 0.02  # [s]
 

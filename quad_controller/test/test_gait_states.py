@@ -17,8 +17,7 @@ from quad_controller.gait.generator import GaitGenerator
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.velocity import Velocity
 from quad_controller.states.controller import Controller
-from quad_controller.states.faults import Fault
-from quad_controller.states.modes import Answer, MODES, State
+from quad_controller.states.modes import Answer, Fault, MODES, State
 from quad_controller.states.parameters import StateParameters
 from quad_description import (
     DescriptionError,

@@ -14,10 +14,9 @@ import pytest
 from quad_builds import urdf
 from quad_controller.gait.body import UPRIGHT
 from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.lift import hermite
 from quad_controller.gait.parameters import GaitParameters
 from quad_controller.gait.schedule import Gait, SCHEDULES
-from quad_controller.gait.stepping import Stepper
+from quad_controller.gait.stepping import hermite, Stepper
 from quad_controller.gait.velocity import REST, Velocity
 from quad_description import quadruped
 

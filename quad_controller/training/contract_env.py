@@ -30,7 +30,7 @@ from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.network import Floats, Port
 from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.states.limiter import StepLimiter
+from quad_controller.states.motion import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets
 from quad_sim.env import Randomization, WalkingEnv
 

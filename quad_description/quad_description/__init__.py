@@ -18,12 +18,9 @@ Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
 
 from .backend import Backend, RecordedBackend
 from .exceptions import DescriptionError, PresetError
-from .joint_commands import STREAM_TIMEOUT
-from .kinematics.leg import FEET, LegGeometry, LEGS
-from .kinematics.leg_kinematics import foot_position, jacobian, LegSolution, solve
-from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, Targets
-from .kinematics.support import raised_feet
-from .poses import Pose, pose_positions
+from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
+from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
+from .poses import Pose, pose_positions, STREAM_TIMEOUT
 from .presets import PRESETS, robot_urdf
 from .state import ImuSample, JointSample, RobotState
 from .urdf import Joint, JointLimits, movable_joints

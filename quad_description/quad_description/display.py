@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+import math
 import sys
+from typing import Final
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
@@ -18,8 +21,34 @@ from .exceptions import DescriptionError
 from .kinematics.quadruped import quadruped
 from .poses import Pose, pose_positions
 from .presets import PRESETS, robot_urdf
-from .sweep import sweep
-from .urdf import movable_joints
+from .urdf import Joint, movable_joints
+
+SWEEP_DURATION: Final = 2.5  # [s] for one joint, there and back
+
+
+def sweep(joints: Sequence[Joint], rest: Mapping[str, float], elapsed: float) -> dict[str, float]:
+    """Return the positions at a time of a sweep, which begins anew after the last joint.
+
+    The joint whose turn it is goes from its rest position to its upper limit, to its lower limit
+    and back, along a sine each way; the others rest.
+
+    Args:
+        joints: The joints, in the order of their turns.
+        rest: Their rest positions in [rad] or [m].
+        elapsed: Time since the start in [s].
+
+    Returns:
+        Positions in [rad] or [m] by name, in the order of the joints.
+    """
+    positions = {joint.name: rest[joint.name] for joint in joints}
+    turn, phase = divmod(elapsed / SWEEP_DURATION, 1.0)
+    moving = joints[int(turn) % len(joints)]
+    wave = math.sin(2.0 * math.pi * phase)
+    here = rest[moving.name]
+    amplitude = moving.limits.upper - here if wave > 0.0 else here - moving.limits.lower
+    positions[moving.name] = here + amplitude * wave
+    return positions
+
 
 SWEEP = 'sweep'
 MOTIONS = (SWEEP, *(pose.value for pose in Pose))

@@ -5,10 +5,15 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any
+from typing import Any, Final
 
-from .figures import robot_numbers
 from .kinematics.leg import LEGS
+from .presets import robot_numbers
+
+STREAM_TIMEOUT: Final = 0.5
+"""A pause [s] that ends a stream of joint commands: a robot that it leaves with a foot in the air
+is laid down by the hardware node, so the next stream has to begin where the joints are then."""
+
 
 _LEG_JOINTS = ('hip', 'thigh', 'calf')
 _ARM_JOINTS = ('yaw', 'thigh', 'calf')

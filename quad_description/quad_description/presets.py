@@ -1,15 +1,29 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The URDF of a preset, expanded from the xacro files of this package."""
+"""The URDF of a preset, and the numbers that its xacro files read: model/robot.yaml."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 import math
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
 
 from .exceptions import DescriptionError, PresetError
-from .figures import MODEL, robot_numbers
+
+MODEL = Path(__file__).parent / 'model'
+"""Folder with the xacro files and their numbers."""
+
+
+@lru_cache(maxsize=1)
+def robot_numbers() -> dict[str, Any]:
+    """Return what robot.yaml says; one copy for everybody, nobody changes it."""
+    with (MODEL / 'robot.yaml').open(encoding='utf-8') as file:
+        numbers: dict[str, Any] = yaml.safe_load(file)
+    return numbers
+
 
 PRESETS: Final[tuple[str, ...]] = tuple(sorted(robot_numbers()['presets']))
 """Names of the robots that there are."""

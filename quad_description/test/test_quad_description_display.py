@@ -25,7 +25,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
 from quad_description import movable_joints, Pose, pose_positions, quadruped, robot_urdf
-from quad_description.sweep import sweep, SWEEP_DURATION
+from quad_description.display import sweep, SWEEP_DURATION
 
 pytestmark = pytest.mark.slow
 

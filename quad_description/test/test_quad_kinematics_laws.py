@@ -23,7 +23,7 @@ from quad_description import (
     robot_urdf,
     solve,
 )
-from quad_description.kinematics.leg_kinematics import calf_rotation
+from quad_description.kinematics.leg import calf_rotation
 from quad_description.kinematics.tree import link_poses
 from quad_description.rotations import conjugate, multiply, rotation_vector
 

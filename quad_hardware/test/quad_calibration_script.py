@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from quad_hardware.calibration.console import CancelledError
+from quad_hardware.calibration.wizard import CancelledError, Console
 
 
-class Script:
+class Script(Console):
     """Someone who answers in order, moves the robot before, and remembers what was said."""
 
     def __init__(self, *answers: str | tuple[Callable[[], None], str]) -> None:

@@ -33,7 +33,7 @@ from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
 from quad_hardware.calibration.robot import ImuReading
 from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
-from quad_hardware.estimation.gravity import STANDARD_GRAVITY
+from quad_hardware.estimation.filters import STANDARD_GRAVITY
 from quad_hardware.estimation.imu_mounting import ImuMounting
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of

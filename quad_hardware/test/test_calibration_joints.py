@@ -16,15 +16,15 @@ import yaml
 
 from quad_calibration_script import Script
 from quad_hardware.calibration import robot
-from quad_hardware.calibration.console import prompt_number
-from quad_hardware.calibration.joints import (
+from quad_hardware.calibration.main import run_calibrate
+from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
+from quad_hardware.calibration.wizard import (
     MIN_TURN,
     moved_motor,
+    prompt_number,
     with_direction,
     with_limits,
 )
-from quad_hardware.calibration.main import run_calibrate
-from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
 from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2

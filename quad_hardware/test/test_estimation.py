@@ -26,14 +26,21 @@ from quad_description.rotations import (
     Vector,
 )
 from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
-from quad_hardware.estimation.battery import Battery, BatteryFilter, REPORTS
-from quad_hardware.estimation.device_clock import SampleClock
-from quad_hardware.estimation.filters import AttitudeRate, JointRate
-from quad_hardware.estimation.gravity import (
+from quad_hardware.estimation.filters import (
+    AttitudeRate,
+    Battery,
+    BatteryFilter,
+    CHARGE_REPORTS,
     gravity_from_acceleration,
     GravityCheck,
+    JointRate,
 )
-from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility
+from quad_hardware.estimation.plausibility import (
+    BoardWatch,
+    MAX_REFUSALS,
+    Plausibility,
+    SampleClock,
+)
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import DEVICE_TIME_WRAP, Report
@@ -154,6 +161,17 @@ def test_the_clock_of_the_robot_takes_the_jitter_away(delays: list[float]) -> No
     assert all(abs(step - 0.02) < 1e-5 + 1e-3 for step in steps)
 
 
+def test_a_report_that_is_held_up_is_no_restart_of_the_board() -> None:
+    """On the way it may lie for most of a second; a clock that is further off began anew."""
+    watch = BoardWatch()
+    times = [(0.0, 10.0), (0.02, 10.02), (0.54, 10.04), (2.06, 10.06)]
+    restarted = [
+        watch.restarted(replace(STATE, arrival=arrival, device_time=device))
+        for arrival, device in times
+    ]
+    assert restarted == [False, False, False, True]
+
+
 def test_a_robot_that_restarts_is_dated_anew() -> None:
     """Its counter goes back to zero; without a counter, the arrival counts."""
     clock = SampleClock()
@@ -197,7 +215,7 @@ def test_one_damaged_report_does_not_empty_the_battery() -> None:
     for charge in (80.0, 80.0, 3.0, 200.0, 80.0):
         battery.take(replace(STATE, battery=charge, voltage=7.4))
     assert battery.state == Battery(80.0, 7.4)
-    for _ in range(REPORTS):
+    for _ in range(CHARGE_REPORTS):
         battery.take(replace(STATE, battery=5.0))
     assert battery.state.charge == 5.0
 

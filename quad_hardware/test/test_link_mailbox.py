@@ -16,7 +16,7 @@ import pytest
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import CommandLimiter, JointMap, servo_of
 from quad_hardware.link import Driver, LinkOptions, LinkState
-from quad_hardware.link.mailbox import Mailbox
+from quad_hardware.link.driver import Mailbox
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 

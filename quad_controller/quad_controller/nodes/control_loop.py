@@ -5,16 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 import threading
 import time
+from typing import Any
 
-from quad_description import ImuSample, JointSample, RobotState
-from quad_description.rotations import Vector
+from quad_description import RobotState
 
 from ..states.controller import Controller
 from ..states.status import Output
-from ..timing.pacer import Pacer
-from ..timing.statistics import LoopFigures, LoopStatistics
+from ..timing.pacer import LoopFigures, LoopStatistics, Pacer
 
 PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same report
 
@@ -47,11 +47,7 @@ class ControlLoop:
         self._statistics = LoopStatistics(period)
         self._pacer = Pacer(period, time.monotonic())
         self._arrived = threading.Condition()
-        self._joints: JointSample | None = None
-        self._imu: ImuSample | None = None
-        self._battery: float | None = None
-        self._linear_velocity: Vector | None = None
-        self._foot_contacts: tuple[bool, ...] | None = None
+        self._measurement = RobotState()
         self._arrival: float | None = None
         self._stopping = False
         self._begin: Callable[[], None] = lambda: None
@@ -75,34 +71,16 @@ class ControlLoop:
         if self._thread.is_alive():
             self._thread.join()
 
-    def offer_joints(self, joints: JointSample) -> None:
-        """Hand in joint states; they may make a step at once."""
+    def offer(self, **values: Any) -> None:  # noqa: ANN401
+        """Hand in fields of a RobotState for the next step; joints may make one at once."""
         with self._arrived:
-            self._joints, self._arrival = joints, time.monotonic()
-            if self._pacer.takes(self._arrival):
+            self._measurement = replace(self._measurement, **values)
+            if 'joints' in values:
+                self._arrival = time.monotonic()
+                if self._pacer.takes(self._arrival):
+                    self._arrived.notify()
+            elif 'imu' in values and self._arrival is not None:
                 self._arrived.notify()
-
-    def offer_imu(self, imu: ImuSample) -> None:
-        """Hand in an attitude for the next step."""
-        with self._arrived:
-            self._imu = imu
-            if self._arrival is not None:
-                self._arrived.notify()
-
-    def offer_battery(self, battery: float | None) -> None:
-        """Hand in a charge for the next step."""
-        with self._arrived:
-            self._battery = battery
-
-    def offer_linear_velocity(self, velocity: Vector) -> None:
-        """Hand in a velocity of the body in its own frame [m/s] for the next step."""
-        with self._arrived:
-            self._linear_velocity = velocity
-
-    def offer_foot_contacts(self, contacts: tuple[bool, ...]) -> None:
-        """Hand in which feet are on the ground for the next step."""
-        with self._arrived:
-            self._foot_contacts = contacts
 
     def figures(self) -> LoopFigures:
         """Return how well the time is kept."""
@@ -126,15 +104,8 @@ class ControlLoop:
                     return
                 now = time.monotonic()
                 arrival = self._arrival
-                measurement = RobotState(
-                    self._joints,
-                    self._imu,
-                    self._battery,
-                    linear_velocity=self._linear_velocity,
-                    foot_contacts=self._foot_contacts,
-                )
-                self._joints = self._imu = self._battery = self._arrival = None
-                self._linear_velocity = self._foot_contacts = None
+                measurement, self._measurement = self._measurement, RobotState()
+                self._arrival = None
                 self._pacer.stepped(now, arrival)
             with self.lock:
                 output = self._controller.step(measurement, now - last)
@@ -154,7 +125,7 @@ class ControlLoop:
             left = self._pacer.deadline(self._arrival is not None) - now
             if self._arrival is not None and self._pacer.takes(now):
                 # joints and attitude of one report come one after the other
-                paired = self._imu is not None
+                paired = self._measurement.imu is not None
                 left = 0.0 if paired else min(left, self._arrival + PAIR_TIME - now)
             if left <= 0.0:
                 return

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timezone
+from functools import partial
 from pathlib import Path
 import sys
 import threading
 import time
+from typing import TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Pose, Twist, TwistStamped
@@ -52,8 +54,7 @@ from ..recording.recorder import Recorder
 from ..recording.run import PolicyRun
 from ..recording.step import StepTiming
 from ..states.controller import Controller
-from ..states.faults import Fault
-from ..states.modes import Answer
+from ..states.modes import Answer, Fault
 from ..states.policy_motion import NO_POLICY
 from ..states.status import EventKind, Output, Status
 from . import messages
@@ -71,6 +72,8 @@ ESTIMATE_WAIT = 1.0  # [s] for the first message, when a policy that needs it is
 ESTIMATES = {'odom': Odometry, 'foot_contacts': FootContacts}
 GAIT_WORDS = {'', 'gait'}  # instead of a policy's path
 WARN_PERIOD = 2.0  # [s] between two warnings of the same kind
+
+Reply = TypeVar('Reply', SetMode.Response, Trigger.Response)
 
 
 class ControllerNode(Node):
@@ -260,7 +263,7 @@ class ControllerNode(Node):
     def _take_joints(self, data: bytes) -> None:
         message, numbers = self._joint_states.read(data)
         try:
-            self._loop.offer_joints(self._joints.read(message, numbers, self._targets))
+            self._loop.offer(joints=self._joints.read(message, numbers, self._targets))
         except ValueError as error:
             self._refuse(Fault.JOINTS, str(error))
             return
@@ -273,17 +276,17 @@ class ControllerNode(Node):
 
     def _take_imu(self, data: bytes) -> None:
         try:
-            self._loop.offer_imu(messages.imu_sample(*self._imu.read(data)))
+            self._loop.offer(imu=messages.imu_sample(*self._imu.read(data)))
         except ValueError as error:
             self._refuse(Fault.IMU, str(error))
 
     def _take_odometry(self, message: Odometry) -> None:
-        self._loop.offer_linear_velocity(messages.linear_velocity(message))
+        self._loop.offer(linear_velocity=messages.linear_velocity(message))
         self._arrived['odom'].set()
 
     def _take_contacts(self, message: FootContacts) -> None:
         try:
-            self._loop.offer_foot_contacts(messages.foot_contacts(message))
+            self._loop.offer(foot_contacts=messages.foot_contacts(message))
         except ValueError as error:
             self.get_logger().warning(str(error), throttle_duration_sec=WARN_PERIOD)
             return
@@ -295,7 +298,7 @@ class ControllerNode(Node):
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _take_battery(self, message: BatteryState) -> None:
-        self._loop.offer_battery(messages.charge(message))
+        self._loop.offer(battery=messages.charge(message))
 
     def _take_twist(self, message: Twist) -> None:
         with self._loop.lock:
@@ -316,10 +319,20 @@ class ControllerNode(Node):
             self.get_logger().warning(answer.message, throttle_duration_sec=WARN_PERIOD)
 
     def _set_mode(self, request: SetMode.Request, response: SetMode.Response) -> SetMode.Response:
+        ask = partial(self._controller.set_mode, request.mode)
+        return self._answer(f'mode {request.mode!r}', ask, response)
+
+    def _take_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._answer('stop', self._controller.stop, response)
+
+    def _clear_fault(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._answer('clear_fault', self._controller.clear_fault, response)
+
+    def _answer(self, what: str, ask: Callable[[], Answer], response: Reply) -> Reply:
         with self._loop.lock:
-            answer = self._controller.set_mode(request.mode)
+            answer = ask()
         response.success, response.message = answer.accepted, answer.message
-        self.get_logger().info(f'mode {request.mode!r}: {answer.message}')
+        self.get_logger().info(f'{what}: {answer.message}')
         return response
 
     def _take_load_request(self, request: LoadPolicy.Request) -> LoadPolicy.Response:
@@ -350,24 +363,6 @@ class ControllerNode(Node):
             return answer
         self._report.publish(String(data=str(loaded)))
         return Answer(True, f'{answer.message}; sha256 {loaded.digest}')
-
-    def _take_stop(
-        self, _request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
-        with self._loop.lock:
-            answer = self._controller.stop()
-        response.success, response.message = answer.accepted, answer.message
-        self.get_logger().info(f'stop: {answer.message}')
-        return response
-
-    def _clear_fault(
-        self, _request: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
-        with self._loop.lock:
-            answer = self._controller.clear_fault()
-        response.success, response.message = answer.accepted, answer.message
-        self.get_logger().info(f'clear_fault: {answer.message}')
-        return response
 
     def _tune(self, parameters: list[Parameter]) -> SetParametersResult:
         """Take another tuning of the gait, or return why not."""

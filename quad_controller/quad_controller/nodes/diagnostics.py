@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..recording.recorder import Recorder
 from ..states.status import Status
-from ..timing.statistics import LoopFigures
+from ..timing.pacer import LoopFigures
 
 
 def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:

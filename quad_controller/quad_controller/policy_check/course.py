@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import functools
 import math
 import operator
-from typing import Protocol, TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quad_description import Backend, Quadruped, RobotState
+from quad_description import Quadruped
 
 from ..exceptions import CheckError, QuadControllerError
 from ..gait.parameters import AS_TUNED, GaitParameters
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from quad_sim import CommandTiming
     from quad_sim.physics import Metered
 
+    from .arenas import PhysicsArena, SerialArena
+
 SETTLE_TIME = 1.0  # [s] to take up speed
 REST_TIME = 1.0  # [s] at the end, to come to rest on all feet
 PUSH_INTERVAL = 2.0  # [s]
@@ -35,37 +37,6 @@ AXES = {'forward': 'x', 'lateral': 'y', 'turn': 'yaw'}
 TOP = Velocity(0.3, 0.15, 1.5)
 """Fastest commands of the course: those of the gait."""
 SPEEDS = 3
-
-
-class Arena(Protocol):
-    """Where a robot walks and is watched."""
-
-    backend: Backend  # the robot
-
-    def stand(self) -> RobotState:
-        """Put the robot on its feet, whatever it did before."""
-        ...
-
-    def kick(self, x: float, y: float) -> None:
-        """Change its velocity at once [m/s]."""
-        ...
-
-    def watch(self) -> None:
-        """Look at it, after each step."""
-        ...
-
-    def begin(self) -> None:
-        """Measure from now on."""
-        ...
-
-    def read(self) -> tuple[Metered, CommandTiming | None]:
-        """Return what was measured, and the timing where there are real clocks."""
-        ...
-
-    @property
-    def interruption(self) -> str:
-        """What the machine did to the walk since it stood or was measured; empty for nothing."""
-        ...
 
 
 def axis_of(command: Velocity) -> str:
@@ -173,7 +144,7 @@ class CourseWalker:
 
     def __init__(
         self,
-        arena: Arena,
+        arena: PhysicsArena | SerialArena,
         robot: Quadruped,
         policy: Policy | None,
         gait: GaitParameters = AS_TUNED,

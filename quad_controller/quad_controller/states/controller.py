@@ -23,14 +23,15 @@ from ..gait.schedule import Gait
 from ..gait.velocity import REST, Velocity
 from ..policy.interface import Policy
 from .commands import Commands
-from .faults import Fault, FaultLatch, LYING_FAULTS
 from .get_up import get_up_refusal, stands
 from .health import Health
-from .limiter import StepLimiter
 from .machine import Poses, StateMachine
 from .modes import (
     Answer,
+    Fault,
+    FaultLatch,
     GAIT_STATES,
+    LYING_FAULTS,
     ModeRequest,
     MODES,
     MOVING_STATES,
@@ -40,13 +41,11 @@ from .modes import (
     UPRIGHT_STATES,
     WAYS_DOWN,
 )
-from .motion import Situation
-from .notices import Notices
+from .motion import Situation, StepLimiter
 from .parameters import StateParameters
 from .policy_motion import NO_POLICY, PolicyChoice
-from .status import Event, EventKind, Output, Status
-from .tracking import TrackingMonitor
-from .unseen import UnseenJoints
+from .status import Event, EventKind, Notices, Output, Status
+from .tracking import TrackingMonitor, UnseenJoints
 
 MAX_STEP = 0.05  # [s] after a longer pause the gait goes on where it was instead of leaping
 

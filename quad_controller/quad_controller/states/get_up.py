@@ -23,10 +23,9 @@ import math
 from quad_description import ImuSample, Quadruped, Targets
 from quad_description.rotations import Vector
 
-from .faults import Fault, FaultLatch
-from .get_up_poses import RECOVERIES
+from .get_up_poses import Lying, lying_on, RECOVERIES
 from .health import Health
-from .lying import Lying, lying_on
+from .modes import Fault, FaultLatch
 from .motion import Blend, Hold, Motion, Situation, Swing
 
 STILL_ANGLE = 0.05  # [rad] by which the body of a robot at rest may turn

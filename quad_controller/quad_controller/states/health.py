@@ -12,7 +12,7 @@ from quad_description.rotations import Vector
 
 from ..gait.velocity import REST
 from ..policy.interface import Policy, PolicyInputs
-from .faults import Fault
+from .modes import Fault
 from .parameters import StateParameters
 
 REFUSAL_LIFE = 0.2

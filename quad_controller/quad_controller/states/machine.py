@@ -23,9 +23,8 @@ from quad_description import Quadruped, Targets
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
 from ..policy.interface import Policy
-from .faults import Reaction
 from .get_up import FinalPoses, GetUp
-from .modes import GAIT_STATES, MOVING_STATES, State
+from .modes import GAIT_STATES, MOVING_STATES, Reaction, State
 from .motion import Blend, Hold, Motion, Walk
 from .parameters import StateParameters
 from .policy_motion import PolicyMotion

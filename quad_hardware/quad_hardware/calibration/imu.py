@@ -23,12 +23,12 @@ from quad_description.rotations import (
     yaw_of,
 )
 
-from ..estimation.gravity import STANDARD_GRAVITY
+from ..estimation.filters import STANDARD_GRAVITY
 from ..estimation.imu_mounting import ImuMounting
 from ..exceptions import CommandError
 from ..report import Report
-from .console import Console
 from .robot import ImuReading, LimpRobot
+from .wizard import Console
 
 MIN_TILT = math.radians(8.0)  # [rad] that distinguishes a direction from a shaking hand
 MIN_TURN = math.radians(20.0)  # [rad]

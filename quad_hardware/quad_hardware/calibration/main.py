@@ -17,11 +17,10 @@ from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
 from ..link import DEFAULT_PORT, LinkOptions
 from ..protocol import Model, Protocol, PROTOCOLS
-from .console import CancelledError, Console, TerminalConsole
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, servo_parameters, write_parameters
 from .robot import LimpRobot
-from .wizard import calibrate_joints, zero_all
+from .wizard import calibrate_joints, CancelledError, Console, zero_all
 
 DEFAULT_FILE = Path('quad_calibration.yaml')
 AUTO = 'auto'
@@ -54,7 +53,7 @@ def main() -> None:
     """Entry point."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    sys.exit(run_calibrate(sys.argv[1:], TerminalConsole()))
+    sys.exit(run_calibrate(sys.argv[1:], Console()))
 
 
 def _joints(options: argparse.Namespace, console: Console) -> None:

@@ -24,7 +24,7 @@ from quad_description.rotations import yaw_of
 from ..estimation import SCALES
 from ..exceptions import NoAnswerError
 from ..link import DEFAULT_PORT
-from .console import Console, prompt_number
+from .wizard import Console, prompt_number
 
 if TYPE_CHECKING:
     from types import TracebackType

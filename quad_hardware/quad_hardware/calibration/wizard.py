@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Leads a person through the joints of a robot, one after the other."""
+"""Leads a person through the joints of a robot: what is asked, and what the angles mean."""
 
 from __future__ import annotations
 
@@ -10,9 +10,99 @@ import math
 
 from ..exceptions import CommandError
 from ..joints import JointServo
-from .console import confirm, Console
-from .joints import moved_motor, with_direction, with_limits, with_zero
 from .robot import LimpRobot
+
+
+class CancelledError(Exception):
+    """The person has cancelled; nothing is written."""
+
+
+class Console:
+    """A person at a terminal."""
+
+    def write(self, text: str) -> None:
+        """Print a text."""
+        print(text, flush=True)  # noqa: T201  # what the program is for
+
+    def prompt(self, question: str) -> str:
+        """Return the answer to a question.
+
+        Raises:
+            CancelledError: Ctrl-C or Ctrl-D was pressed.
+        """
+        try:
+            return input(f'{question} ').strip()
+        except (EOFError, KeyboardInterrupt):
+            raise CancelledError('cancelled; nothing was written') from None
+
+
+def confirm(console: Console, question: str, *, default: bool = False) -> bool:
+    """Return the answer to a question of yes or no."""
+    choices = '[Y/n]' if default else '[y/N]'
+    answer = console.prompt(f'{question} {choices}').lower()
+    return answer.startswith('y') if answer else default
+
+
+def prompt_number(console: Console, question: str) -> float:
+    """Prompt for a positive number, until there is one."""
+    while True:
+        answer = console.prompt(question)
+        try:
+            number = float(answer.replace(',', '.'))
+        except ValueError:
+            number = 0.0
+        if 0.0 < number < float('inf'):
+            return number
+        console.write(f'{answer!r} is not a positive number; for example 0.95')
+
+
+MIN_TURN = 8.0  # [deg] that distinguishes a direction from a shaking hand
+LIMIT_MARGIN = math.radians(2.0)  # [rad] that targets stay away from a stop
+
+
+def with_zero(servo: JointServo, angle: float) -> JointServo:
+    """Return a servo whose joint is at zero where the servo reads an angle [deg]."""
+    return replace(servo, offset=-servo.sign * servo.gain * angle)
+
+
+def with_direction(servo: JointServo, zero: float, turned: float) -> JointServo:
+    """Return a servo whose joint went the positive way from one angle to another [deg].
+
+    Raises:
+        CommandError: It was turned by less than MIN_TURN.
+    """
+    if abs(turned - zero) < MIN_TURN:
+        raise CommandError(
+            f'{servo.joint}: motor {servo.motor} turned by {turned - zero:.1f} degrees; at least '
+            f'{MIN_TURN:.0f} are needed. Is this the right joint?'
+        )
+    sign = 1 if turned > zero else -1
+    return with_zero(replace(servo, sign=sign), zero)
+
+
+def with_limits(servo: JointServo, one: float, other: float) -> JointServo:
+    """Return a servo that stays within two ends of its travel [deg], and within its limits so far.
+
+    Raises:
+        CommandError: The ends are so close that nothing is left between them.
+    """
+    low, high = sorted((servo.position(one), servo.position(other)))
+    lower = max(low + LIMIT_MARGIN, servo.lower)
+    upper = min(high - LIMIT_MARGIN, servo.upper)
+    if lower >= upper:
+        raise CommandError(
+            f'{servo.joint}: nothing is left between {low:.2f} and {high:.2f} rad within its '
+            f'limits {servo.lower:.2f} to {servo.upper:.2f}'
+        )
+    return replace(servo, lower=lower, upper=upper)
+
+
+def moved_motor(before: dict[int, float], after: dict[int, float]) -> int | None:
+    """Return the motor that turned the farthest, None when none turned enough."""
+    turns = {motor: abs(after[motor] - before[motor]) for motor in after if motor in before}
+    motor = max(turns, key=turns.__getitem__, default=None)
+    return motor if motor is not None and turns[motor] >= MIN_TURN else None
+
 
 # what zero and the positive direction look like (quad_description)
 _PLACES = {

@@ -4,14 +4,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from quad_description import DescriptionError
 from quad_description.urdf import parse
 
 from .finding import error, Finding, good, note, warning
-from .tree import links_without_place
+
+ROOT = 'odom'
+
+
+def links_without_place(links: Iterable[str], parents: Mapping[str, str]) -> list[str]:
+    """Return the links that have no chain of transforms from odom."""
+    return [link for link in links if not _reaches(link, parents)]
+
+
+def _reaches(link: str, parents: Mapping[str, str]) -> bool:
+    seen: set[str] = set()
+    while link != ROOT:
+        if link in seen or link not in parents:  # a loop is no way either
+            return False
+        seen.add(link)
+        link = parents[link]
+    return True
+
 
 NODES = ('hardware_node', 'controller_node', 'robot_state_publisher')
 RATE, MIN_RATE_RATIO = 50.0, 0.9  # [Hz], and the share of it that is still well

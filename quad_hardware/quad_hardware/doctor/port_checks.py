@@ -12,7 +12,7 @@ import stat
 
 from serial.tools import list_ports
 
-from ..estimation.battery import LOW_BATTERY
+from ..estimation.filters import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
 from ..link import connect, latency_problem, latency_timer, read_battery
 from ..protocol import model_of_firmware, V1

@@ -20,13 +20,10 @@ from quad_description import (
 from ..exceptions import CommandError
 from ..joints import JointMap
 from ..report import Report
-from .battery import Battery, BatteryFilter
-from .device_clock import BoardWatch, SampleClock
-from .filters import AttitudeRate, JointRate
-from .gravity import GravityCheck
+from .filters import AttitudeRate, Battery, BatteryFilter, GravityCheck, JointRate
 from .imu_mounting import ImuMounting, UNCHECKED_DEVIATION
 from .odometry import LegOdometry, OdometrySettings, OdometryState
-from .plausibility import Plausibility
+from .plausibility import BoardWatch, Plausibility, SampleClock
 
 
 class RateSource(Enum):

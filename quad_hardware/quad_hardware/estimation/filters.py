@@ -1,13 +1,118 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rates from differences: of attitudes, and of joint positions, through a low-pass."""
+"""Filters of the estimator: rates from differences through a low-pass, gravity, battery."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 import math
+from statistics import median
 
-from quad_description.rotations import conjugate, multiply, Quaternion, rotation_vector, Vector
+from quad_description.rotations import (
+    conjugate,
+    down_in_body,
+    multiply,
+    Quaternion,
+    rotation_vector,
+    Vector,
+)
+
+from ..report import Report
+
+STANDARD_GRAVITY = 9.80665  # [m/s²]
+TOLERANCE = 2.0  # [m/s²] beyond which the body is accelerating
+REPORTS = 50  # that are looked at together: a second, in which the pushes of a gait cancel out
+
+
+def gravity_from_acceleration(acceleration: Vector) -> Vector | None:
+    """Return the unit vector that points down, in the body; None while it accelerates.
+
+    An accelerometer at rest reads the opposite of gravity (REP 145).
+    """
+    length = math.hypot(*acceleration)
+    if abs(length - STANDARD_GRAVITY) > TOLERANCE:
+        return None
+    x, y, z = acceleration
+    return -x / length, -y / length, -z / length
+
+
+class GravityCheck:
+    """Compares both directions over some time: each step of a gait accelerates the body.
+
+    More than a few degrees: the axes of the IMU are not those of the body.
+    """
+
+    def __init__(self) -> None:
+        self._reports: deque[tuple[Quaternion, Vector]] = deque(maxlen=REPORTS)
+
+    def take(self, attitude: Quaternion, acceleration: Vector | None) -> None:
+        """Take a report.
+
+        Args:
+            acceleration: Specific force in the body [m/s²]; None when it is not measured.
+        """
+        if acceleration is not None:
+            self._reports.append((attitude, acceleration))
+
+    @property
+    def error(self) -> float | None:
+        """Angle between the means [rad]; None in the first second, and while it accelerates."""
+        reports = list(self._reports)  # another thread may take the next one
+        if len(reports) < REPORTS:
+            return None
+        down = _mean([down_in_body(attitude) for attitude, _ in reports])
+        felt = gravity_from_acceleration(_mean([felt for _, felt in reports]))
+        length = math.hypot(*down)
+        if felt is None or length == 0.0:
+            return None
+        cosine = sum(a * b for a, b in zip(down, felt, strict=True)) / length
+        return math.acos(min(max(cosine, -1.0), 1.0))
+
+
+def _mean(vectors: Sequence[Vector]) -> Vector:
+    x, y, z = (sum(values) / len(vectors) for values in zip(*vectors, strict=True))
+    return x, y, z
+
+
+CHARGE_REPORTS = 25  # that the median is taken of: half a second
+EMPTY, FULL = 0.0, 100.0  # [%]
+LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%] below which it is to be charged, and useless
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """State of the battery."""
+
+    charge: float | None = None  # [%]; None while unknown
+    voltage: float | None = None  # [V]; None where it is not reported
+
+
+class BatteryFilter:
+    """Takes the median of the last reports.
+
+    Attributes:
+        state: The state of the battery by now.
+    """
+
+    def __init__(self) -> None:
+        self.state = Battery()
+        self._charges: deque[float] = deque(maxlen=CHARGE_REPORTS)
+        self._voltages: deque[float] = deque(maxlen=CHARGE_REPORTS)
+
+    def take(self, report: Report) -> Battery:
+        """Take a report, whose charge does not count when it cannot be; return the new state."""
+        if report.battery is not None and EMPTY <= report.battery <= FULL:
+            self._charges.append(report.battery)
+        if report.voltage is not None:
+            self._voltages.append(report.voltage)
+        self.state = Battery(
+            median(self._charges) if self._charges else None,
+            median(self._voltages) if self._voltages else None,
+        )
+        return self.state
+
 
 MAX_GAP = 0.2  # [s] a difference over more says nothing about now
 ZERO: Vector = (0.0, 0.0, 0.0)

@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
-from .dialect import Dialect, DialectCounters
+from .dialect import Dialect, DialectCounters, LinkState, LinkStatus
 from .driver import Driver, QUIET_TIME, STALE_TIME
-from .latency import latency_problem, latency_timer
-from .port import DEFAULT_PORT, Port, SerialPort
+from .port import DEFAULT_PORT, latency_problem, latency_timer, Port, SerialPort
 from .probe import connect, Connection, read_battery, read_firmware, send_request
 from .session import FrameParser, LinkOptions, make_dialect, Session
-from .status import LinkState, LinkStatus
 
 __all__ = [
     'DEFAULT_PORT',

@@ -10,7 +10,7 @@ import math
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ..estimation import Health
-from ..estimation.battery import EMPTY_BATTERY, LOW_BATTERY
+from ..estimation.filters import EMPTY_BATTERY, LOW_BATTERY
 from ..joints import CommandCounters
 from ..link import latency_problem, LinkState, LinkStatus
 from ..protocol import Fault, ParserCounters

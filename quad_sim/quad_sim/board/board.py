@@ -14,9 +14,8 @@ from quad_hardware.protocol import Fault, Model, MOTOR_ORDER
 
 from ..plant.plant import Plant
 from ..plant.state import Measurement
-from .power import Battery, HOT, LOW_BATTERY, Overload, ServoThermalModel
+from .power import Battery, HOT, LOW_BATTERY, Overload, ServoThermalModel, Turn
 from .servos import Mount, Servos
-from .turning import Turn
 from .walking import Walker
 
 GAIT_PERIOD = 0.02  # [s] between two sets of targets of the board's own gait
