@@ -31,13 +31,11 @@ class PolicyError(QuadControllerError, ValueError):
     """A policy does not fit this robot, or cannot be loaded.
 
     Scenarios: joints in the file that the robot lacks, another observation width, no metadata.
-
-    Attributes:
-        reason: What is wrong in one line; the message may have a table.
     """
 
     def __init__(self, message: str, reason: str = '') -> None:
         """Keep the reason beside the message, whose first line it is by default."""
+        # what is wrong in one line; the message may have a table
         self.reason = reason or message.partition('\n')[0]
         super().__init__(message)
 

@@ -71,17 +71,12 @@ class NoNetwork:
 
 
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
-    """Walking with the observations and actions of a contract.
-
-    Attributes:
-        contract: The contract.
-        simulation: The environment below.
-    """
+    """Walking with the observations and actions of a contract."""
 
     def __init__(self, env: WalkingEnv, values: Values) -> None:
         """Wrap an environment by the values of a contract."""
         super().__init__(env)
-        self.simulation = env
+        self.simulation = env  # the environment below
         robot = quadruped(robot_urdf())
         self.contract = contract_of(values)
         self._runner = PolicyRunner(

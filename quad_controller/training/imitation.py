@@ -48,11 +48,7 @@ class Round:
 
 
 class Imitation:
-    """Learns from the teacher.
-
-    Attributes:
-        normaliser: Of the observations; there is none before the first round.
-    """
+    """Learns from the teacher."""
 
     def __init__(
         self, actor: Actor, envs: ProcessVectorEnv, lessons: Lessons, *, scale: float, seed: int
@@ -63,6 +59,7 @@ class Imitation:
             envs: Their observations end with the actions of the teacher.
             scale: What an action of one moves a joint by in [rad].
         """
+        # of the observations; there is none before the first round
         self.normaliser: Normaliser | None = None
         self._actor, self._envs, self._lessons, self._scale = actor, envs, lessons, scale
         self._random = np.random.default_rng(seed)

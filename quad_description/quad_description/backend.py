@@ -53,11 +53,7 @@ class Backend(ABC):
 
 
 class RecordedBackend(Backend):
-    """Plays states that another back end gave; the last one stays.
-
-    Attributes:
-        sent: All targets that were to be sent, in their order.
-    """
+    """Plays states that another back end gave; the last one stays."""
 
     def __init__(
         self, names: Sequence[str], states: Iterable[RobotState], period: float = 0.02
@@ -75,6 +71,7 @@ class RecordedBackend(Backend):
         self._states = tuple(states)
         if not self._states:
             raise ValueError('a recording needs at least one state')
+        # all targets that were to be sent, in their order
         self.sent: list[Sequence[float] | None] = []
 
     @property

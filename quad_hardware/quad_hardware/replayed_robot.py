@@ -45,9 +45,6 @@ class ReplayedRobot:
     What a :class:`.SerialRobot` decides by looking at bytes is decided anew, by the same parser,
     dialect and estimation; states of the link are those of the log. Times are those of the log
     [s].
-
-    Attributes:
-        names: Joints in the order of the URDF.
     """
 
     def __init__(
@@ -68,7 +65,7 @@ class ReplayedRobot:
         Raises:
             CommandError: The legs of the URDF cannot be read.
         """
-        self.names = settings.joints.names
+        self.names = settings.joints.names  # joints in the order of the URDF
         self._settings = settings
         self._on_state, self._on_change = on_state, on_change
         self._on_refusal = on_refusal

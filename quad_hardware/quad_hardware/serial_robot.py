@@ -54,11 +54,6 @@ class SerialRobot:
 
     The callbacks are called in the thread of the driver, except ``warn``; everything else may be
     called in one other thread. Times are on the monotonic clock [s].
-
-    Attributes:
-        names: Joints in the order of targets.
-        timeout: Time after the last command at which :meth:`miss_commands` is to be called [s].
-        black_box: Writes the last bytes when a fault happens; None without.
     """
 
     def __init__(
@@ -82,7 +77,7 @@ class SerialRobot:
             CommandError: The legs of the URDF cannot be read.
             RecordingError: The serial log cannot be written.
         """
-        self.names = settings.joints.names
+        self.names = settings.joints.names  # joints in the order of targets
         self._joints = settings.joints
         self._on_state, self._on_change = on_state, on_change
         self._on_refusal = on_refusal
@@ -100,6 +95,7 @@ class SerialRobot:
         self._last_note = ''
         self._recorders: list[Recorder] = []
         self._log_file: SerialLogFile | None = None
+        # writes the last bytes when a fault happens; None without
         self.black_box: BlackBox | None = None
         port = settings.link.path
         if settings.black_box is not None:
@@ -117,6 +113,7 @@ class SerialRobot:
             self._tapped,
         )
         self._latest: tuple[Report, RobotState] | None = None  # while the link is running
+        # time after the last command at which :meth:`miss_commands` is to be called [s]
         self.timeout = self._commander.timeout
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:

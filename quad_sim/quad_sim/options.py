@@ -34,7 +34,7 @@ _NOISE = {'none': NONE, 'board': BOARD}
 class Simulation:
     """A robot and its line, ready to be served."""
 
-    plant: Plant  # the robot
+    plant: Plant
     board: Board  # its board
     line: RobotLine  # its serial line
 

@@ -55,11 +55,7 @@ class Watched:
 
 
 class ServedRobot:
-    """Makes a robot that lives in real time, for a ``with`` block.
-
-    Attributes:
-        port: Path of its serial port.
-    """
+    """Makes a robot that lives in real time, for a ``with`` block."""
 
     def __init__(self, *arguments: str) -> None:
         """Prepare; the robot stands as soon as the block begins.
@@ -68,7 +64,7 @@ class ServedRobot:
             arguments: Of fake_xgo, but for ``--link`` and ``--start``.
         """
         self._arguments = arguments
-        self.port = ''
+        self.port = ''  # path of its serial port
 
     def __enter__(self) -> Self:
         """Start the process.

@@ -144,12 +144,7 @@ class _Foot:
 
 
 class Stepper:
-    """Moves four feet through a gait.
-
-    Attributes:
-        schedule: The gait; may be exchanged while the feet stand.
-        lift: How high a foot is lifted [m] in it, by its velocity over the ground [m/s].
-    """
+    """Moves four feet through a gait."""
 
     def __init__(
         self,
@@ -164,8 +159,9 @@ class Stepper:
             neutral: Where the feet are without motion, in the body's frame in [m].
             depth: How far a standing foot is pushed below the ground in [m].
         """
-        self.schedule = schedule
+        self.schedule = schedule  # the gait; may be exchanged while the feet stand
         self._neutral = neutral
+        # how high a foot is lifted [m] in it, by its velocity over the ground [m/s]
         self.lift = lift
         self._depth = depth
         self._feet = [_Foot() for _ in neutral]

@@ -20,11 +20,7 @@ PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same rep
 
 
 class ControlLoop:
-    """Owns the thread; everything else of the controller is used under :attr:`lock`.
-
-    Attributes:
-        lock: Hold it to call the controller between two steps.
-    """
+    """Owns the thread; everything else of the controller is used under :attr:`lock`."""
 
     def __init__(
         self,
@@ -41,7 +37,7 @@ class ControlLoop:
             record: Takes every output after it was published, in the thread, with the time since
                 the step before, that of the step, and from feedback to command in [s].
         """
-        self.lock = threading.Lock()
+        self.lock = threading.Lock()  # hold it to call the controller between two steps
         self._controller, self._period = controller, period
         self._publish, self._fail, self._record = publish, fail, record
         self._statistics = LoopStatistics(period)

@@ -23,9 +23,6 @@ class JointReader:
     """Puts the joints of a message into the robot's order.
 
     The order of a message seldom changes, so the permutation is kept until it does.
-
-    Attributes:
-        unreported: Joints that were in no message yet; empty before the first.
     """
 
     def __init__(self, robot: Quadruped) -> None:
@@ -33,6 +30,7 @@ class JointReader:
         self._spared = {robot.names[index] for index in robot.others}
         self._seen: list[str] | None = None
         self._places: list[int | None] = []
+        # joints that were in no message yet; empty before the first
         self.unreported: tuple[str, ...] = ()
 
     def read(
@@ -83,17 +81,14 @@ class JointReader:
 
 
 class CommandFilter:
-    """Decides how many joints a command is for: all, or the first ones, which are the legs.
-
-    Attributes:
-        others_move: Whether joints that are no legs' will be sent elsewhere, ever.
-    """
+    """Decides how many joints a command is for: all, or the first ones, which are the legs."""
 
     def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
         """Begin with a robot that has not moved."""
         legs = len(robot.names) - len(robot.others)
         legs_first = all(index >= legs for index in robot.others)
         self._count = legs if legs_first else len(robot.names)
+        # whether joints that are no legs' will be sent elsewhere, ever
         self.others_move = others_move
         self._moved = False
 

@@ -29,7 +29,7 @@ THREAD_PRIORITY = 45  # SCHED_FIFO: below that of the driver, which it waits for
 class NodeSettings:
     """All parameters."""
 
-    robot: Quadruped  # the robot
+    robot: Quadruped
     gait: GaitParameters  # tuning of the gait
     first_gait: Gait  # gait to begin with
     states: StateParameters  # limits of states, watchdogs and protections

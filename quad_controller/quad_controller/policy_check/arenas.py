@@ -60,11 +60,7 @@ def servo_response(servo: str) -> ServoResponse:
 
 
 class PhysicsArena:
-    """A robot in physics, in virtual time.
-
-    Attributes:
-        backend: The robot.
-    """
+    """A robot in physics, in virtual time."""
 
     def __init__(self, choice: RobotChoice, conditions: Conditions = AS_MADE) -> None:
         """Make robot and ground.
@@ -114,17 +110,13 @@ class PhysicsArena:
 
 
 class PatientBackend(Backend):
-    """A robot in real time whose machine may be busy: it is waited for, and that is noted.
-
-    Attributes:
-        interruption: What came between two steps last; empty for nothing.
-    """
+    """A robot in real time whose machine may be busy: it is waited for, and that is noted."""
 
     def __init__(self, backend: Backend) -> None:
         """Wait for a robot."""
         self._backend = backend
         self.names, self.period = backend.names, backend.period
-        self.interruption = ''
+        self.interruption = ''  # what came between two steps last; empty for nothing
         self._stepped_at: float | None = None
 
     def reset(self) -> RobotState:
@@ -164,16 +156,12 @@ class PatientBackend(Backend):
 
 
 class SerialArena:
-    """A robot in physics behind its serial line, in another process and in real time.
-
-    Attributes:
-        backend: The driver of its serial port.
-    """
+    """A robot in physics behind its serial line, in another process and in real time."""
 
     def __init__(self, served: ServedRobot, backend: Backend) -> None:
         """Watch a robot."""
         self._served, self._patient = served, PatientBackend(backend)
-        self.backend: Backend = self._patient
+        self.backend: Backend = self._patient  # the driver of its serial port
 
     def stand(self) -> RobotState:
         """Put the robot on its feet."""

@@ -49,7 +49,7 @@ def axis_of(command: Velocity) -> str:
 class Passage:
     """What came of one command."""
 
-    commanded: Velocity  # the command
+    commanded: Velocity
     went: Velocity  # mean velocity, in the robot's own frame
     time: float  # how long it walked in [s]
     falls: int  # how often it fell, or its watchdogs ended the walk

@@ -59,7 +59,7 @@ def shipped_walkers() -> dict[str, Candidate]:
 class Trial:
     """A course that somebody walks."""
 
-    who: Candidate  # who walks
+    who: Candidate
     commands: tuple[Velocity, ...]  # one after the other
     duration: float  # of each in [s]
     conditions: Conditions = AS_MADE  # what differs

@@ -12,12 +12,7 @@ from .modes import Answer, MOVING_STATES, State
 
 
 class Commands:
-    """The newest commands.
-
-    Attributes:
-        pose: Pose of the body over its feet.
-        refused: How many commands were not finite.
-    """
+    """The newest commands."""
 
     def __init__(self, timeout: float) -> None:
         """Start at rest.
@@ -28,8 +23,8 @@ class Commands:
         self._timeout = timeout
         self._velocity = REST
         self._age = math.inf
-        self.pose = UPRIGHT
-        self.refused = 0
+        self.pose = UPRIGHT  # pose of the body over its feet
+        self.refused = 0  # how many commands were not finite
 
     def set_velocity(self, velocity: Velocity) -> Answer:
         """Take a velocity; one that is not finite stops the robot."""

@@ -110,11 +110,7 @@ def get_up_refusal(health: Health, latch: FaultLatch, *, swings: bool) -> str:
 
 
 class GetUp(Motion):
-    """Brings a robot to its feet by poses.
-
-    Attributes:
-        text: What it is doing, for people.
-    """
+    """Brings a robot to its feet by poses."""
 
     def __init__(
         self, robot: Quadruped, last: Targets, final: FinalPoses, *, swings: bool
@@ -134,7 +130,7 @@ class GetUp(Motion):
         self._tries: Counter[Lying] = Counter()
         self._finished, self._failure, self._rises = False, '', False
         self._stages = self._script()
-        self.text = 'waits until it is at rest'
+        self.text = 'waits until it is at rest'  # what it is doing, for people
         next(self._stages)
 
     @property

@@ -33,13 +33,7 @@ EASE_TIME = 0.7  # [s] over which a policy takes over
 
 
 class Poses:
-    """The poses that the robot goes to; joints that are no legs' may have one or stay.
-
-    Attributes:
-        robot: The robot.
-        fallback_positions: Positions of all joints that are assumed of those that nobody has
-            measured [rad].
-    """
+    """The poses that the robot goes to; joints that are no legs' may have one or stay."""
 
     def __init__(self, robot: Quadruped, lie_height: float, arm_pose: Sequence[float]) -> None:
         """Prepare them.
@@ -59,6 +53,7 @@ class Poses:
             )
         self.robot = robot
         self._arm = dict(zip(robot.others, arm_pose, strict=True)) if arm_pose else {}
+        # positions of all joints that are assumed of those that nobody has measured [rad]
         self.fallback_positions = self.with_arm([0.0] * len(robot.names))
         self._lying = robot.solve(robot.footprint(lie_height, self.fallback_positions))
 

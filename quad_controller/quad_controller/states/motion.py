@@ -25,9 +25,6 @@ class StepLimiter:
 
     The last thing that a target passes. A joint that is found outside of its limits is not pulled
     into them before something is requested: its range reaches to where it is, and shrinks with it.
-
-    Attributes:
-        limited: How many targets of single joints were too fast so far, and were cut.
     """
 
     def __init__(self, limits: Sequence[JointLimits], period: float, speed: float = 1.0) -> None:
@@ -40,7 +37,7 @@ class StepLimiter:
         self._longest = MAX_PERIODS * period
         self._speed = speed
         self._last: Targets | None = None
-        self.limited = 0
+        self.limited = 0  # how many targets of single joints were too fast so far, and were cut
 
     @property
     def last(self) -> Targets | None:
@@ -155,11 +152,7 @@ class Hold(Motion):
 
 
 class Blend(Motion):
-    """Goes from one pose to another, all joints together, with a soft start and end.
-
-    Attributes:
-        duration: How long it takes in [s].
-    """
+    """Goes from one pose to another, all joints together, with a soft start and end."""
 
     def __init__(self, start: Targets, end: Targets, speed: float, least: float) -> None:
         """Plan it.
@@ -173,7 +166,7 @@ class Blend(Motion):
         self._start, self._end = start, end
         way = max(abs(b - a) for a, b in zip(start, end, strict=True))
         # a cosine is pi / 2 times as fast in its middle as on average
-        self.duration = max(least, way * math.pi / 2 / speed)
+        self.duration = max(least, way * math.pi / 2 / speed)  # how long it takes in [s]
         self._time = 0.0
 
     @property
@@ -221,15 +214,11 @@ class Swing(Motion):
 
 
 class Walk(Motion):
-    """The geometric gait; stands when the velocity is zero.
-
-    Attributes:
-        reachable: Whether the legs reached where they should in the last step.
-    """
+    """The geometric gait; stands when the velocity is zero."""
 
     def __init__(self, generator: GaitGenerator) -> None:
         self._generator = generator
-        self.reachable = True
+        self.reachable = True  # whether the legs reached where they should in the last step
 
     @property
     def settled(self) -> bool:

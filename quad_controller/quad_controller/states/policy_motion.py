@@ -17,13 +17,7 @@ WIND_DOWN = 0.5  # [s] without velocity before the gait takes over
 
 
 class PolicyMotion(Motion):
-    """Follows a policy.
-
-    Attributes:
-        policy: The policy.
-        answer: What it answered last; None when there was nothing to ask it by.
-        steps: How often it was stepped.
-    """
+    """Follows a policy."""
 
     def __init__(self, policy: Policy, start: Targets, ease_time: float) -> None:
         """Begin where the joints are.
@@ -34,8 +28,9 @@ class PolicyMotion(Motion):
         """
         policy.reset(start)
         self.policy = policy
+        # what it answered last; None when there was nothing to ask it by
         self.answer: PolicyStep | None = None
-        self.steps = 0
+        self.steps = 0  # how often it was stepped
         self._start = self._last = start
         self._ease_time = ease_time
         self._time = 0.0

@@ -72,7 +72,7 @@ class Output:
     shadow: Targets | None  # what the policy would do, in a dry run; None otherwise
     title: str  # name of the state, with the way to it
     ready: bool  # whether all measurements were received once that walking needs
-    events: tuple[Event, ...]  # news
+    events: tuple[Event, ...]
     situation: Situation | None = None  # what the motion knew; None when nothing moved
     asked: Asked | None = None  # the policy that was asked, followed or watched; None for none
 

@@ -79,11 +79,7 @@ MIN_RATIO = 0.1  # of that way, that its joint must have gone; soft servos go a 
 
 
 class TrackingMonitor:
-    """Compares how far targets and joints went.
-
-    Attributes:
-        text: Which joints did not follow in the last window; empty when all did.
-    """
+    """Compares how far targets and joints went."""
 
     def __init__(self, names: Sequence[str]) -> None:
         """Begin with a new window."""
@@ -91,7 +87,7 @@ class TrackingMonitor:
         self._targets: list[Sequence[float]] = []
         self._measured: list[Sequence[float]] = []
         self._time = 0.0
-        self.text = ''
+        self.text = ''  # which joints did not follow in the last window; empty when all did
 
     def step(self, targets: Sequence[float], measured: Sequence[float], dt: float) -> None:
         """Take what was sent and measured in a step.

@@ -97,11 +97,7 @@ GAIN = 0.2  # share of its distance from the schedule that an arrival draws the 
 
 
 class Pacer:
-    """Says when the next step is due; times are those of a monotonic clock in [s].
-
-    Attributes:
-        overruns: Steps that were left out because the one before came too late.
-    """
+    """Says when the next step is due; times are those of a monotonic clock in [s]."""
 
     def __init__(self, period: float, now: float) -> None:
         """Make the first step due now."""
@@ -109,7 +105,7 @@ class Pacer:
         self._window = WINDOW * period
         self._due = now
         self._locked = False
-        self.overruns = 0
+        self.overruns = 0  # steps that were left out because the one before came too late
 
     def deadline(self, fresh: bool) -> float:
         """Return when a step is due at the latest.

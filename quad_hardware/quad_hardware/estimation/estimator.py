@@ -59,11 +59,7 @@ class Health:
 
 
 class Estimator:
-    """Turns reports into states of the robot.
-
-    Attributes:
-        refusal: Why the last report that was refused could not be.
-    """
+    """Turns reports into states of the robot."""
 
     def __init__(self, urdf: str, joints: JointMap, settings: EstimatorSettings) -> None:
         """Begin without a report.
@@ -72,7 +68,7 @@ class Estimator:
             CommandError: The legs of the URDF cannot be read.
         """
         self._refused = 0
-        self.refusal = ''
+        self.refusal = ''  # why the last report that was refused could not be
         self._joints = joints
         self._sent: dict[str, float] = {}  # targets that were sent last
         self._settings = settings

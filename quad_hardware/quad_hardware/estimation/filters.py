@@ -90,14 +90,10 @@ class Battery:
 
 
 class BatteryFilter:
-    """Takes the median of the last reports.
-
-    Attributes:
-        state: The state of the battery by now.
-    """
+    """Takes the median of the last reports."""
 
     def __init__(self) -> None:
-        self.state = Battery()
+        self.state = Battery()  # the state of the battery by now
         self._charges: deque[float] = deque(maxlen=CHARGE_REPORTS)
         self._voltages: deque[float] = deque(maxlen=CHARGE_REPORTS)
 

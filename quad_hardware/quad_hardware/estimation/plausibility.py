@@ -96,10 +96,6 @@ class Plausibility:
 
     A jump, or an IMU that reports what cannot be, may be a damaged frame; when it lasts it is so.
     Joints that cannot be are never believed.
-
-    Attributes:
-        imu_problem: Why attitude and acceleration of the last report that could be are of no use;
-            empty while the IMU works.
     """
 
     def __init__(self, motors: Collection[int]) -> None:
@@ -111,6 +107,8 @@ class Plausibility:
         self._motors = tuple(motors)
         self._last: Report | None = None
         self._refused = 0
+        # why attitude and acceleration of the last report that could be are of no use; empty while
+        # the IMU works
         self.imu_problem = ''
 
     def check(self, state: Report) -> str:

@@ -58,11 +58,7 @@ class _Descent:
 
 
 class CommandLoss:
-    """Watches a stream of commands, and brings the robot down when they leave a leg in the air.
-
-    Attributes:
-        timeout: A pause after which a stream has ended [s].
-    """
+    """Watches a stream of commands, and brings the robot down when they leave a leg in the air."""
 
     def __init__(
         self,
@@ -76,7 +72,7 @@ class CommandLoss:
         Args:
             raised: Names the feet that are in the air at targets of the legs [rad].
         """
-        self.timeout = timeout
+        self.timeout = timeout  # a pause after which a stream has ended [s]
         self._legs = joints.names[: joints.leg_count]
         servos = joints.servos[: joints.leg_count]
         pose = pose_positions(Pose.LIE)

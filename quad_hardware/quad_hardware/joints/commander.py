@@ -31,12 +31,7 @@ class CommandCounters:
 
 
 class JointCommander:
-    """Lets joint commands through to the servos; times are on the monotonic clock [s].
-
-    Attributes:
-        counters: What became of them.
-        timeout: Time after the last command at which :meth:`miss` is to be called [s].
-    """
+    """Lets joint commands through to the servos; times are on the monotonic clock [s]."""
 
     def __init__(
         self,
@@ -58,7 +53,7 @@ class JointCommander:
             obstacle: Says why nothing is sent.
             warn: Takes what is the matter with a command.
         """
-        self.counters = CommandCounters()
+        self.counters = CommandCounters()  # what became of them
         self._joints = joints
         # two streams: one that wakes after the way down begins anew, however the legs moved
         self._commanded = CommandLimiter(joints, limiter)
@@ -67,6 +62,7 @@ class JointCommander:
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self._moved_by = ''  # what took the legs from where the commands of before left them
+        # time after the last command at which :meth:`miss` is to be called [s]
         self.timeout = self._loss.timeout
 
     @property

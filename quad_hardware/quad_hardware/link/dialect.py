@@ -74,18 +74,14 @@ class Step:
 class Dialect(ABC, Generic[Received]):
     """Conversation with one robot.
 
-    Attributes:
-        protocol: What the robot speaks.
-        can_release: The torque of its servos can be switched off.
-
     The caller does :meth:`step` again when its ``wake`` has come, after :meth:`command` and after
     frames; and :meth:`handle_frame` for each frame.
     """
 
     def __init__(self, protocol: Protocol, now: float) -> None:
         """Begin a conversation."""
-        self.protocol = protocol
-        self.can_release = True
+        self.protocol = protocol  # what the robot speaks
+        self.can_release = True  # the torque of its servos can be switched off
         self._counters = DialectCounters()
         self._now = now
 

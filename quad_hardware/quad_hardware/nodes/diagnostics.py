@@ -40,13 +40,10 @@ _LINK_LEVELS = {
 
 
 class LinkDiagnostic:
-    """Describes the serial link, look by look: damage is judged since the last one.
-
-    Attributes:
-        damage: What is wrong with its frames since the last look; empty while they are good.
-    """
+    """Describes the serial link, look by look: damage is judged since the last one."""
 
     def __init__(self) -> None:
+        # what is wrong with its frames since the last look; empty while they are good
         self.damage = ''
         self._frames = self._damaged = 0
 

@@ -62,11 +62,7 @@ class ObservedRobot(Interface):
 
 
 class RobotTopics:
-    """Publishes state, ``odom``, ``foot_contacts``, ``/tf``, ``battery_state``, ``diagnostics``.
-
-    Attributes:
-        link: What is said of the serial link.
-    """
+    """Publishes joints, imu, odom, foot_contacts, /tf, battery_state and diagnostics."""
 
     def __init__(
         self,
@@ -81,7 +77,7 @@ class RobotTopics:
         Args:
             steady: Returns when a time of the robot's states is, on the monotonic clock [s].
         """
-        self.link = LinkDiagnostic()
+        self.link = LinkDiagnostic()  # what is said of the serial link
         self._node, self._robot = node, robot
         self._frames, self._deviations = frames, deviations
         self._steady = steady

@@ -39,17 +39,7 @@ class Mode(IntEnum):
 
 
 class Board:
-    """What both protocols talk to. Time is that of the caller and only goes forward.
-
-    Attributes:
-        servos: The servos by motor id.
-        battery: The battery.
-        walker: The board's own gait.
-        model: Whose ranges scale bytes.
-        firmware: Version as the board reports it.
-        lost_time: Time that was skipped because the process was held up [s].
-        imu_failed: Whether the attitude is not finite.
-    """
+    """What both protocols talk to. Time is that of the caller and only goes forward."""
 
     def __init__(
         self,
@@ -72,13 +62,13 @@ class Board:
             SetupError: The robot has a joint for which the board has no servo.
         """
         joints = movable_joints(urdf)
-        self.servos = Servos(plant, joints, model, mounts or {})
-        self.battery = Battery(charge)
-        self.walker = Walker(urdf)
-        self.model = model
-        self.firmware = firmware or FIRMWARE[model]
-        self.lost_time = 0.0
-        self.imu_failed = False
+        self.servos = Servos(plant, joints, model, mounts or {})  # the servos by motor id
+        self.battery = Battery(charge)  # the battery
+        self.walker = Walker(urdf)  # the board's own gait
+        self.model = model  # whose ranges scale bytes
+        self.firmware = firmware or FIRMWARE[model]  # version as the board reports it
+        self.lost_time = 0.0  # time that was skipped because the process was held up [s]
+        self.imu_failed = False  # whether the attitude is not finite
         self._plant = plant
         self._efforts = [joint.limits.effort for joint in joints]
         self._with_arm = len(joints) > len(pose_positions(Pose.STAND))

@@ -72,12 +72,7 @@ def _scale(joint: Joint, motor: int, model: Model, mount: Mount) -> _Scale:
 
 
 class Servos:
-    """All servos of a robot, by motor id.
-
-    Attributes:
-        fitted: Ids of the servos that the robot has, in the order of the wire.
-        failed: Id of the servo that does not work, None if all do.
-    """
+    """All servos of a robot, by motor id."""
 
     def __init__(
         self,
@@ -111,8 +106,9 @@ class Servos:
         self._slots = [slot_of(motor) for motor in order]
         self._gains = np.array([self._scale[motor].gain for motor in order])
         self._offsets = np.array([self._scale[motor].offset for motor in order])
+        # ids of the servos that the robot has, in the order of the wire
         self.fitted = tuple(motor for motor in MOTOR_ORDER if motor in self._joint)
-        self.failed: int | None = None
+        self.failed: int | None = None  # id of the servo that does not work, None if all do
         self._speed = dict.fromkeys(self.fitted, MAX_SPEED)
 
     def command(self, angles: Mapping[int, float], duration: float | None = None) -> None:

@@ -35,16 +35,6 @@ class RandomizedRobot:
     """A robot in physics that differs in each episode, by ranges that are data.
 
     Actions are how far the targets of the joints are from a robot that stands in [rad].
-
-    Attributes:
-        robot: The robot in physics.
-        period: Time of a step in [s].
-        stand: Joint positions of a robot that stands in [rad].
-        lowest: Actions that lead to the lower limits of the joints in [rad].
-        highest: Actions that lead to their upper limits in [rad].
-        action_space: All between them.
-        action: The one of the step before; what the set-points are at the start of an episode.
-        state: What the sensors measured last.
     """
 
     def __init__(
@@ -61,17 +51,21 @@ class RandomizedRobot:
             DescriptionError: There is no such preset.
         """
         urdf = robot_urdf(preset)
-        self.robot = Robot(urdf, servo, noise=randomization.noise)
-        self.period = period
+        self.robot = Robot(urdf, servo, noise=randomization.noise)  # the robot in physics
+        self.period = period  # time of a step in [s]
         self.vary(randomization)
         limits = [joint.limits for joint in movable_joints(urdf)]
         stand = pose_positions(Pose.STAND)
+        # joint positions of a robot that stands in [rad]
         self.stand: Floats = np.array([stand[name] for name in self.robot.joint_names], np.float32)
+        # actions that lead to the lower limits of the joints in [rad]
         self.lowest: Floats = np.array([each.lower for each in limits], np.float32) - self.stand
+        # actions that lead to their upper limits in [rad]
         self.highest: Floats = np.array([each.upper for each in limits], np.float32) - self.stand
-        self.action_space = spaces.Box(self.lowest, self.highest)
+        self.action_space = spaces.Box(self.lowest, self.highest)  # all between them
+        # the one of the step before; what the set-points are at the start of an episode
         self.action: Floats = np.zeros_like(self.stand)
-        self.state = RobotState()
+        self.state = RobotState()  # what the sensors measured last
 
     def vary(self, randomization: Randomization) -> None:
         """Let other things differ from the next episode on; noise stays as it was made.

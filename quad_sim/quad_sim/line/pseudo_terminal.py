@@ -30,11 +30,7 @@ _BAUD_OF = {
 
 
 class PseudoTerminal:
-    """The robot's end of a serial line; the other end is a device that any program can open.
-
-    Attributes:
-        link: Path that leads to the device, whatever its name is.
-    """
+    """The robot's end of a serial line; the other end is a device that any program can open."""
 
     def __init__(self, link: Path) -> None:
         """Make the device and the link.
@@ -42,7 +38,7 @@ class PseudoTerminal:
         Raises:
             SetupError: Something else is there, or the link cannot be made.
         """
-        self.link = link
+        self.link = link  # path that leads to the device, whatever its name is
         self._master = self._slave = -1
         self._claim = _claim(link)
         if os.path.lexists(link) and not _is_left_over(link):

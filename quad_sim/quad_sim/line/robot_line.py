@@ -32,15 +32,7 @@ class LineStatistics:
 
 
 class RobotLine:
-    """A board, its serial line in both directions, and the faults of both.
-
-    Attributes:
-        faults: What goes wrong; may be added to.
-        statistics: What the robot has received.
-        to_robot: The wire from the host.
-        to_host: The wire to the host.
-        command_times: When joint commands of protocol v2 came.
-    """
+    """A board, its serial line in both directions, and the faults of both."""
 
     def __init__(
         self,
@@ -58,10 +50,12 @@ class RobotLine:
             command_gap: Least time between two frames of the host in protocol v1 [s]; a frame that
                 comes sooner is lost, as the vendor warns.
         """
-        self.faults = faults or FaultPlan()
-        self.statistics = LineStatistics()
-        self.command_times = CommandTimes()
+        self.faults = faults or FaultPlan()  # what goes wrong; may be added to
+        self.statistics = LineStatistics()  # what the robot has received
+        self.command_times = CommandTimes()  # when joint commands of protocol v2 came
+        # the wire from the host
         self.to_robot = Wire(self.faults, FaultKind.DEAF, seed, slow=False)
+        # the wire to the host
         self.to_host = Wire(self.faults, FaultKind.SILENCE, seed + 1, slow=True)
         self._board = board
         self._functions, self._registers = Functions(board), Registers(board)

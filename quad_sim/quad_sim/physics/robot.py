@@ -41,10 +41,6 @@ class Robot:
 
     Time passes in :meth:`step` only. Two robots with equal arguments and equal calls have equal
     states, bit for bit, on one machine.
-
-    Attributes:
-        joint_names: The movable joints in the order of the URDF; all arrays have this order.
-        feet: Links of the feet, in the order of foot_forces.
     """
 
     def __init__(
@@ -75,8 +71,9 @@ class Robot:
         self._model = build_model(urdf, self._servo, terrain, timestep)
         self._data = mujoco.MjData(self._model)
         joints = movable_joints(urdf)
+        # the movable joints in the order of the URDF; all arrays have this order
         self.joint_names: Final = tuple(joint.name for joint in joints)
-        self.feet: Final = FEET
+        self.feet: Final = FEET  # links of the feet, in the order of foot_forces
         self._qpos = [int(self._model.joint(name).qposadr[0]) for name in self.joint_names]
         self._qvel = [int(self._model.joint(name).dofadr[0]) for name in self.joint_names]
         self._touch = [int(self._model.sensor(foot).adr[0]) for foot in FEET]

@@ -19,11 +19,7 @@ Targets = Mapping[str, float] | Sequence[float] | Array
 
 
 class TargetRamp:
-    """The set-points of all servos, one value for each time step.
-
-    Attributes:
-        values: The set-points now [rad]; changes in place with every step.
-    """
+    """The set-points of all servos, one value for each time step."""
 
     def __init__(self, joints: Sequence[Joint], timestep: float, values: Array) -> None:
         """Stand still.
@@ -36,7 +32,7 @@ class TargetRamp:
         self._lower = np.array([joint.limits.lower for joint in joints])
         self._upper = np.array([joint.limits.upper for joint in joints])
         self._timestep = timestep
-        self.values: Array = values
+        self.values: Array = values  # the set-points now [rad]; changes in place with every step
         self._goal: Array = values.copy()
         self._slope: Array = np.zeros(len(joints))  # [rad] a step; 0 for those that stand still
         self._arrival = np.zeros(len(joints), dtype=np.int64)  # step in which each arrives
