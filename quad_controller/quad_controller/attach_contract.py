@@ -46,11 +46,7 @@ def main() -> None:
 
 
 def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> ContractDocument:
-    """Lay what was set over the files, those over each other, and all over the model's own.
-
-    Raises:
-        PolicyError: Something cannot be read.
-    """
+    """Lay what was set over the files, those over each other, and all over the model's own."""
     document = read_metadata(OnnxNetwork(model, new_weights=True).metadata)
     top = ContractDocument({})
     for text in settings:
@@ -64,12 +60,7 @@ def _document(model: Path, files: Sequence[Path], settings: Sequence[str]) -> Co
 
 
 def _write(model: Path, target: Path, document: ContractDocument) -> None:
-    """Write the model with its contract, whole or not at all.
-
-    Raises:
-        PolicyError: Its weights lie in files that are not beside the target.
-        OSError: It cannot be written.
-    """
+    """Write the model with its contract, whole or not at all."""
     read = onnx_file.read_model(model)
     data = onnx_file.with_metadata(read.data, CONTRACT_KEY, document.to_yaml())
     if read.sides:

@@ -92,11 +92,7 @@ def main() -> None:
 def _reference(
     loaded: LoadedPolicy, recording: Path | None
 ) -> tuple[ObservationStatistics | None, str]:
-    """Return what observations are compared with, and where it comes from.
-
-    Raises:
-        PolicyError: It cannot be read.
-    """
+    """Return what observations are compared with, and where it comes from."""
     if recording is not None:
         steps = read_recording(recording)
         return statistics_of(loaded.runner, steps), f'recording {recording}'
@@ -116,11 +112,7 @@ def _options_for(model: str | None, contract: Path | None, recorded: PolicyRun) 
 
 
 def _model_of(recorded: PolicyRun, recording: Path) -> str:
-    """Return the policy that a recording was begun with.
-
-    Raises:
-        PolicyError: There was none, or nobody knows.
-    """
+    """Return the policy that a recording was begun with."""
     if recorded.policy is None:
         raise PolicyError(
             f'recording {recording} does not say which policy ran (it goes on, its recorder was '

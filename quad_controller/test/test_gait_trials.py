@@ -37,15 +37,17 @@ from quad_controller.policy_check.course import (
     Passage,
 )
 from quad_controller.policy_check.findings import (
+    against_gait,
     Compared,
     figures_table,
     Findings,
+    is_too_late,
     Swept,
     text_of,
+    timing_notes,
     tracking_table,
     write_csv,
 )
-from quad_controller.policy_check.judgement import against_gait, is_too_late, timing_notes
 from quad_controller.policy_check.main import ExitCode, run
 from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
 from quad_controller.policy_check.walk import WalkingRobot

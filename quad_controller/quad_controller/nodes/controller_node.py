@@ -174,11 +174,7 @@ class ControllerNode(Node):
             self.get_logger().info(f'{words}; {recorder.failure}' if recorder.failure else words)
 
     def _make_recorder(self) -> Recorder:
-        """Begin a recording.
-
-        Raises:
-            ParameterError: It cannot be written there.
-        """
+        """Begin a recording."""
         settings, now = self._settings, datetime.now(tz=timezone.utc)
         folder = Path(settings.record).expanduser() / now.strftime('quad_%Y%m%d_%H%M%S_%f')
         names = ','.join(settings.robot.names)
@@ -206,11 +202,7 @@ class ControllerNode(Node):
         return loaded.runner, ''
 
     def _load_policy(self, text: str) -> LoadedPolicy:
-        """Load and check a policy by its path or name; the log has the table in either case.
-
-        Raises:
-            PolicyError: It does not fit.
-        """
+        """Load and check a policy by its path or name; the log has the table in either case."""
         settings = self._settings
         gait = GaitGenerator(settings.robot, settings.gait)
         try:

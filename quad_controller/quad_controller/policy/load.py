@@ -156,11 +156,7 @@ def validate_policy(
 
 
 def _accepted(rows: tuple[Row, ...], verdict: str) -> Report:
-    """Return the rows of a check as a report.
-
-    Raises:
-        PolicyError: It refuses the policy; the message has the verdict and the table.
-    """
+    """Return the rows of a check as a report."""
     report = Report(rows)
     if report.refused:
         raise PolicyError(f'{verdict}:\n{report}', report.reason)

@@ -120,9 +120,6 @@ def _check_weights(
     """Refuse weights that are not numbers, or not those of the model; return warnings.
 
     Recurrent cells of ONNX Runtime turn NaN into ordinary numbers, so answers do not show it.
-
-    Raises:
-        PolicyError: A weight is not finite, or the side files are not those of the export.
     """
     damaged = model.not_finite()
     if damaged:

@@ -169,12 +169,7 @@ def _entry(entry: memoryview) -> tuple[str, str]:
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int, memoryview, int]]:
-    """Yield number, start, content and end of each field.
-
-    Raises:
-        ValueError: It is no message of protocol buffers.
-        IndexError: It ends too early.
-    """
+    """Yield number, start, content and end of each field."""
     place = 0
     while place < len(message):
         start = place

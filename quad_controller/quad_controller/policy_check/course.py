@@ -210,11 +210,7 @@ class CourseWalker:
         return True
 
     def _excused(self) -> bool:
-        """Return whether a fall is that of the machine, which paused the controller or the robot.
-
-        Raises:
-            CheckError: That comes too often.
-        """
+        """Return whether a fall is that of the machine, which paused controller or robot."""
         if not self._arena.interruption:
             return False
         self.interruptions += 1

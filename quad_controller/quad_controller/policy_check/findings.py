@@ -1,17 +1,134 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""All that was found of a policy, as tables for people and as a file of figures."""
+"""What was found of a policy: whether it stands up, tables for people, a file of figures."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 import csv
 from dataclasses import dataclass, field
 import math
 from typing import TextIO
 
+import numpy as np
+
 from ..gait.velocity import Velocity
+from ..policy.contract.model import PolicyContract, Source
+from ..policy.network import Floats, Network
+from ..policy.observation import observed_places
 from .conditions import Sweep
 from .course import AXES, axis_of, CourseFigures, Passage
+
+MAX_LACK, MAX_EXCESS = 0.5, 0.2
+"""Shares of what is commanded along an axis that may be missing, and be too much."""
+MAX_DRIFT = Velocity(0.04, 0.04, 0.1)
+"""What a policy may be off along an axis in any case in [m/s] and [rad/s]."""
+MAX_SATURATION = 0.2
+"""Share of the time that servos may be at their limits, where the gait's are not."""
+MIN_EFFECT = 0.1
+"""Of a term on the actions, as part of how they vary, to be seen on a walk."""
+TINY = 1e-6
+LATENCY_GOAL, JITTER_GOAL = 0.003, 0.002
+"""Of commands on the wire with real-time priority: median and 99th percentile in [s]."""
+
+
+def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
+    """Yield along which axes it went otherwise than commanded, and what that hints at."""
+    for axis in ('x', 'y', 'yaw'):
+        got, want, drift = (getattr(each, axis) for each in (went, commanded, MAX_DRIFT))
+        most = MAX_EXCESS if got * want > want**2 else MAX_LACK
+        if abs(got - want) <= max(most * abs(want), drift):
+            continue
+        if got * want < 0.0:
+            hint = 'the other way: look at the order of its joints, and at signs (scales below 0)'
+        elif abs(got) < abs(want):
+            hint = 'too slow: is it made for other servos (--servo), or a smaller scale?'
+        else:
+            hint = 'too far: look at its scales, and at the frame of the IMU'
+        yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
+
+
+def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -> Iterator[str]:
+    """Yield which terms count so little that a walk does not show whether they are right.
+
+    Args:
+        network: Of the policy; one without memory.
+        observed: What it saw on a walk, an observation in each row.
+    """
+    plain = _answers(network, observed)
+    # what varies is mirrored about its mean: all of gravity turned round is another robot
+    varies = observed.std(0) > TINY
+    mirrored = np.where(varies, 2.0 * observed.mean(0), 0.0).astype(np.float32) - observed
+    usual = math.sqrt(float(plain.var(0).mean()))
+    places = observed_places(contract) % sum(term.width for term in contract.terms)
+    start = 0
+    for term in contract.terms:
+        mine = (places >= start) & (places < start + term.width)
+        start += term.width
+        if term.source is Source.CONSTANT:
+            continue
+        other = _answers(network, np.where(mine, mirrored, observed))
+        effect = math.sqrt(float(((other - plain) ** 2).mean())) / max(usual, TINY)
+        if effect < MIN_EFFECT:
+            yield (
+                f'{term.name} hardly counts (mirrored, it changes the actions by {effect:.0%} of '
+                'how they vary): a walk need not show that its frame, a sign or its scale is wrong'
+            )
+
+
+def _answers(network: Network, observed: Floats) -> Floats:
+    return np.concatenate([network.run(row[np.newaxis]) for row in observed])
+
+
+def against_gait(policy: CourseFigures, gait: CourseFigures) -> Iterator[str]:
+    """Yield why a policy does not stand up on a course that the gait walked, too."""
+    if not any(each.time for each in policy.passages):
+        yield 'it never came to walk'
+        return
+    if policy.falls > gait.falls:
+        yield f'it fell {policy.falls} times, the gait {gait.falls}'
+    for each, other in zip(policy.passages, gait.passages, strict=True):
+        gone_astray = list(astray(each.went, each.commanded)) if each.time else []
+        if gone_astray:
+            so_did_the_gait = other.time and any(astray(other.went, other.commanded))
+            alike = ' (so does the gait: look at the servos)' if so_did_the_gait else ''
+            yield f'commanded {velocity_text(each.commanded)}: {"; ".join(gone_astray)}{alike}'
+    for name, what in (('torque_saturation', 'torque'), ('speed_saturation', 'speed')):
+        share, others = policy.mean(name), gait.mean(name)
+        if share > MAX_SATURATION and share > 2.0 * others:
+            yield (
+                f'its servos are at their largest {what} for {share:.0%} of the time, '
+                f'those of the gait for {others:.0%}'
+            )
+
+
+def timing_notes(figures: CourseFigures) -> Iterator[str]:
+    """Yield where commands were later on the wire than they shall be; no fault of a policy."""
+    timing = figures.timing
+    if timing is None:
+        return
+    latency, jitter = timing.latency(0.5), timing.jitter(0.99)
+    if latency > LATENCY_GOAL:
+        yield (
+            f'observation to command took {latency * 1e3:.1f} ms (median), '
+            f'goal {LATENCY_GOAL * 1e3:g} ms'
+        )
+    if jitter > JITTER_GOAL:
+        yield (
+            f'commands were {jitter * 1e3:.1f} ms off their period (p99), '
+            f'goal {JITTER_GOAL * 1e3:g} ms: a busy machine, or no real-time priority'
+        )
+
+
+def is_too_late(figures: CourseFigures, period: float) -> bool:
+    """Return whether commands came so late that a walk says nothing of who walked."""
+    return figures.timing is not None and figures.timing.jitter(0.99) > period
+
+
+def velocity_text(velocity: Velocity) -> str:
+    """Return a velocity for people."""
+    return f'{velocity.x:+.3f} {velocity.y:+.3f} m/s {velocity.yaw:+.2f} rad/s'
+
 
 POLICY, GAIT = 'policy', 'gait'
 

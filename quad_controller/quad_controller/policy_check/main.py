@@ -28,22 +28,20 @@ from ..states.parameters import StateParameters
 from .conditions import SWEEPS
 from .course import course_for
 from .findings import (
+    against_gait,
+    astray,
     Compared,
     figures_table,
     Findings,
+    is_too_late,
     sweep_table,
     Swept,
     text_of,
-    tracking_table,
-    write_csv,
-)
-from .judgement import (
-    against_gait,
-    astray,
-    is_too_late,
     timing_notes,
+    tracking_table,
     unseen_terms,
     velocity_text,
+    write_csv,
 )
 from .walk import walk
 
@@ -176,11 +174,7 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
 
 
 def _add_course(found: Findings, compared: Compared) -> None:
-    """Take and print what policy and gait came to on a course.
-
-    Raises:
-        CheckError: The policy failed where the machine was too late.
-    """
+    """Take and print what policy and gait came to on a course."""
     found.courses.append(compared)
     reasons = list(against_gait(compared.policy, compared.gait))
     late = list(timing_notes(compared.policy))

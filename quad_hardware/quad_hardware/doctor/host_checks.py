@@ -9,7 +9,7 @@ import importlib.util
 
 from dds_network import NETWORK_VARIABLE, NetworkChoiceError, selected_reach
 
-from ..link.vendor_library import is_installed
+from ..link.vendor import is_installed
 from .finding import error, Finding, good, note, warning
 
 MIN_MEMORY = 300e6  # [B] below that, processes are soon ended

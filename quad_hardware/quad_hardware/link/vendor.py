@@ -11,10 +11,12 @@ not found, are the serial port inside XgoDog and the name of the acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 import importlib
+import inspect
 import os
+from typing import Protocol as Interface
 
 from quad_description.rotations import Vector
 
@@ -24,7 +26,71 @@ from ..report import Report
 from .dialect import Dialect, Step
 from .port import CHUNK
 from .v2_dialect import REQUEST_PERIOD, STATE_WIRE_TIME
-from .vendor_library import Dog, find_serial, find_write_method, StateParser
+
+WriteAngle = Callable[[int, float], object]
+
+
+class Dog(Interface):
+    """What is public of the vendor's XgoDog."""
+
+    def read_version(self) -> object:
+        """Return the firmware version."""
+
+    def system_set_feedback(self, on: int, /) -> object:
+        """Have states pushed."""
+
+
+class StateParser(Interface):
+    """What is public of the vendor's SendStateParser."""
+
+    def feed_bytes(self, data: bytes, /) -> Iterable[object]:
+        """Take bytes, return states."""
+
+
+def is_installed() -> bool:
+    """Return whether ``import xgo_lib2`` gives the vendor's library and not our stand-in."""
+    try:
+        library = importlib.import_module('xgo_lib2')
+    except ImportError:
+        return False
+    return not hasattr(library, 'IS_STAND_IN')
+
+
+@dataclass(frozen=True, slots=True)
+class Descriptor:
+    """Something with a file descriptor."""
+
+    fileno: Callable[[], int]
+
+
+def find_serial(dog: object, depth: int = 2) -> Descriptor | None:
+    """Return the open serial port among the attributes of an object, or of what it holds."""
+    slots = (getattr(dog, name, None) for name in getattr(dog, '__slots__', ()))
+    for value in (*getattr(dog, '__dict__', {}).values(), *slots):
+        if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
+            return Descriptor(value.fileno)
+        if depth > 1 and (found := find_serial(value, depth - 1)) is not None:
+            return found
+    return None
+
+
+def find_write_method(dog: object, name: str) -> WriteAngle:
+    """Return the method that writes a servo angle.
+
+    Nothing public says its name, and a wrong one would move servos in another unit or not at all.
+
+    Raises:
+        LinkError: It has no method of that name; the message lists what there is.
+    """
+    methods = dict(inspect.getmembers(dog, callable))
+    if name in methods and not name.startswith('_'):
+        return methods[name]
+    public = ', '.join(method for method in methods if not method.startswith('_'))
+    raise LinkError(
+        f'the XgoDog of xgo_lib2 has no method {name!r}; set vendor_servo_method to the one that '
+        f'writes the angle [deg] of a motor by its id, one of {public}'
+    )
+
 
 VENDOR = Protocol(
     name='vendor',

@@ -23,8 +23,7 @@ from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateS
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
 from ..link import DEFAULT_PORT, LinkOptions
-from ..link.vendor import VENDOR
-from ..link.vendor_library import is_installed
+from ..link.vendor import is_installed, VENDOR
 from ..protocol import Model, Protocol, PROTOCOLS
 from ..serial_robot import RobotSettings
 

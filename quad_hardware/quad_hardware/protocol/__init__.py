@@ -11,7 +11,7 @@ The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read the
 """
 
 from .feedback import decode_feedback, Feedback
-from .frame import checksum, Frame
+from .frame import checksum, Frame, ParserCounters, StreamParser
 from .function_table import ALL_MOTORS, Code, Fault, Refusal, STATE, V2
 from .motors import (
     ANGLE_SPANS,
@@ -22,7 +22,6 @@ from .motors import (
     MOTOR_ORDER,
     slot_of,
 )
-from .parser import ParserCounters, StreamParser
 from .register_table import (
     ACTION_RESET,
     model_of_firmware,

@@ -3,9 +3,8 @@
 """What went over a serial line: kept in memory, written as a log, read again."""
 
 from .fault_watch import FAULT_TEXTS, FaultWatch, LossWatch
-from .log_file import SerialLogFile
 from .memory import SerialMemory
-from .serial_log import Entry, Opened, read_serial_log, StateEntered, Transfer
+from .serial_log import Entry, Opened, read_serial_log, SerialLogFile, StateEntered, Transfer
 from .tap import Recorder, tapped
 
 __all__ = [

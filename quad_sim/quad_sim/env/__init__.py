@@ -16,9 +16,9 @@ Many at once, spread over the cores::
 
 from gymnasium.envs.registration import register
 
-from .observation import Observation
 from .processes import ProcessVectorEnv
 from .randomization import NO_RANDOMIZATION, Randomization
+from .randomized_robot import Observation
 from .rewards import RewardWeights
 from .walking import CommandRanges, WalkingEnv
 

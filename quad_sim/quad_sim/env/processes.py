@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..exceptions import SetupError, SimulationError
-from .observation import Floats
+from .randomized_robot import Floats
 from .walking import WalkingEnv
 
 Env = gymnasium.Env[Floats, Floats]
@@ -174,11 +174,7 @@ class ProcessVectorEnv(VectorEnv[Floats, Floats, NDArray[Any]]):
         return [None if seed is None else seed + index for index in range(self.num_envs)]
 
     def _answers(self) -> list[tuple[int, Any]]:
-        """Wait for all processes; return index and answer of those environments that have one.
-
-        Raises:
-            SimulationError: A process failed, or died.
-        """
+        """Wait for all processes; return index and answer of those environments that have one."""
         answers = [worker.answer() for worker in self._workers]
         for answer in answers:
             if isinstance(answer, str):

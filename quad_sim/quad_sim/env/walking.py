@@ -18,9 +18,8 @@ from quad_description.rotations import Vector
 
 from ..exceptions import SetupError
 from ..plant.servo import ServoModel, ServoParameters
-from .observation import Floats, Observation, row_of
 from .randomization import check_range, NO_RANDOMIZATION, Randomization, Range
-from .randomized_robot import PERIOD, RandomizedRobot
+from .randomized_robot import Floats, Observation, PERIOD, RandomizedRobot, row_of
 from .rewards import RewardWeights
 
 MAX_TILT = math.radians(70.0)  # as in the vendor's training (luwu_mjlab)
