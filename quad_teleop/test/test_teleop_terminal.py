@@ -74,21 +74,6 @@ def test_true_release(isolation: Isolation, robot: Robot) -> None:
         assert robot.velocities[-4:] == [FORWARD, STILL, STILL, STILL]
 
 
-def test_two_keys_are_never_two_speeds(isolation: Isolation, robot: Robot) -> None:
-    """Rolling from one key to the next: the newest counts, then the older, then none."""
-    with ScriptedTerminal(kitty=True) as terminal, teleop(terminal, isolation):
-        settle(robot, terminal)
-        terminal.key('i', 1)
-        count = robot.wait_for(FORWARD)
-        terminal.key('j', 1)
-        count = robot.wait_for((0.0, 0.0, 0.6), after=count)
-        terminal.key('j', 3)
-        robot.wait_for(FORWARD, after=count)
-        terminal.key('i', 3)
-        robot.wait_until_stopped()
-        assert set(robot.velocities) == {FORWARD, (0.0, 0.0, 0.6), STILL}
-
-
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
 def test_killed_while_moving(isolation: Isolation, robot: Robot, number: signal.Signals) -> None:
     """Ended by a signal with a key held: zeros leave, and the terminal is as it was."""
