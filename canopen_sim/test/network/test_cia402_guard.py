@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import struct
 
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
@@ -121,20 +121,15 @@ def test_an_encoder_without_reference_is_held_where_it_is() -> None:
     assert not [text for text in net.reported(Severity.ERROR) if 'stopping' in text]
 
 
-@pytest.mark.parametrize(
-    ('convert', 'least'),
-    [(Units.position_to_device, LEAST), (Units.effort_to_device, -(2**15))],
-)
-def test_the_smallest_number_of_an_object_fits(
-    convert: Callable[[Units, float], int], least: int
-) -> None:
+@pytest.mark.parametrize(('quantity', 'least'), [('position', LEAST), ('effort', -(2**15))])
+def test_the_smallest_number_of_an_object_fits(quantity: str, least: int) -> None:
     """One more below zero than above it, and not one beyond."""
-    units = Units(DriveConfig(scale_pos_to_dev=1.0))
-    assert convert(units, least) == least
-    assert convert(units, -least - 1) == -least - 1
+    scale = getattr(Units(DriveConfig(scale_pos_to_dev=1.0)), quantity)
+    assert scale.to_device(least) == least
+    assert scale.to_device(-least - 1) == -least - 1
     for beyond in (least - 1, -least):
         with pytest.raises(DriveError, match='more than the object can hold'):
-            convert(units, beyond)
+            scale.to_device(beyond)
 
 
 def test_a_drive_whose_cycle_fails_is_stopped_alone(monkeypatch: pytest.MonkeyPatch) -> None:
