@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 import math
+import sys
 
 from model_robots import chain, robot, ROBOTS, two_arms
 import numpy as np
 import pytest
 
-from arm_model import Clearances, RobotModel
+from arm_model import Array, Clearances, RobotModel
 
 ARMS = [*(robot(name) for name in ROBOTS), chain('zpyypz'), two_arms()]
 """The robots, a chain with sliding joints, and a tree."""
@@ -46,3 +48,21 @@ def test_no_distance_changes_faster_than_its_bounds_say(model: RobotModel) -> No
     for _ in range(100):
         for near in model.nearest(rng.uniform(lower, upper), math.inf, len(model.pairs)):
             assert (np.abs(near.gradient) <= bounds[near.pair] + 1e-9).all()
+
+
+def test_threads_that_ask_one_model_do_not_disturb_each_other() -> None:
+    """Each gets the answers that it gets from a model of its own, however they take turns."""
+    shared, places = robot('panda'), np.random.default_rng(7).uniform(0.0, 1.0, (4, 300, 7))
+
+    def answers(model: RobotModel, at: Array) -> list[list[float]]:
+        return [[near.distance for near in model.nearest(one, math.inf, 5)] for one in at]
+
+    alone = [answers(robot('panda'), at) for at in places]
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(len(places)) as threads:
+            together = list(threads.map(lambda at: answers(shared, at), places))
+    finally:
+        sys.setswitchinterval(interval)
+    assert together == alone

@@ -20,7 +20,7 @@ from arm_model import ModelError
 from arm_model.ros import GroupModels
 from arm_servo import check_parameters, CoreSettings, MotionCore
 from arm_servo.ros.group_motion import Offers
-from arm_servo.ros.parameter_check import check_names
+from arm_servo.ros.parameter_names import check_names
 from arm_servo.ros.parameter_sheet import ParameterSheet
 from arm_servo.ros.servo.parameters import declare_servo, ServoParameters
 from arm_servo.ros.topics_backend import build_motion

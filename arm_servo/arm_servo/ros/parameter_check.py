@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, TYPE_CHECKING
 
@@ -17,18 +17,6 @@ if TYPE_CHECKING:
 
 Declare = Callable[['Node'], object]  # declares the parameters of a node
 EVERY_NODE = '/**'  # name in a parameter file that stands for all nodes
-OF_OTHERS = (
-    *('publish_robot_description', 'publish_robot_description_semantic'),
-    *('robot_description_name', 'publish_dynamic_joint_states'),
-    *(
-        f'moveit_servo.{name}'
-        for name in (
-            *('check_octomap_collisions', 'command_out_topic', 'command_out_type', 'joint_topic'),
-            *('publish_joint_accelerations', 'scene_collision_proximity_threshold'),
-        )
-    ),
-)
-"""Parameters that have no effect on some nodes, and look like those that have."""
 
 
 def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -45,6 +33,7 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
     """
     from node_runner import ParameterError, refuse_misspelt
 
+    from .parameter_names import OF_OTHERS
     from .parameter_sheet import ParameterSheet
 
     problems = []
@@ -56,23 +45,6 @@ def check_parameters(models: GroupModels, document: Mapping[str, Any]) -> list[t
         except (ParameterError, ModelError) as error:
             problems.append((name, str(error)))
     return problems
-
-
-def check_names(nodes: Sequence[Node]) -> None:
-    """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
-
-    Configurations of MoveIt and ros2_control have many of the latter, and work as they are.
-
-    Raises:
-        ParameterError: A name looks like one that there is.
-    """
-    from node_runner import refuse_misspelt
-
-    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)}
-    unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
-    if unused:
-        names = ', '.join(sorted(unused))
-        nodes[0].get_logger().info(f'parameters without effect here: {names}')
 
 
 def _nodes(models: GroupModels, document: Mapping[str, Any]) -> dict[str, Declare]:
