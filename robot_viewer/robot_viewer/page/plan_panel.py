@@ -63,7 +63,8 @@ class PlanPanel:
         actions: tuple[PlanActions, SceneActions, Order],
     ) -> None:
         self._server, self._robot, self._tree = server, robot, tree
-        self._plan, self._scene, self._order = plan, scene, _ = actions
+        plan, scene, self._order = actions
+        self._plan, self._scene = plan, scene
         self._path = robot.path_of(tree.root)
         self._ghost: RobotScene | None = None
         self._links: frozenset[str] = frozenset()
