@@ -15,7 +15,6 @@ Vector = tuple[float, float, float]
 Slots = tuple[float, ...]
 
 NO_VALUES: Slots = (0.0,) * SLOTS
-_NAMES = {'euler1': 'raw_attitude', 'euler2': 'attitude'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +41,10 @@ class Feedback:
         Raises:
             CodecError: A value does not fit its field.
         """
-        values = {part.name: getattr(self, _name(part.name)) for part in STATE.fields}
+        values = {'euler1': self.raw_attitude, 'euler2': self.attitude}
+        values |= {
+            part.name: getattr(self, part.name) for part in STATE.fields if part.name not in values
+        }
         runs = {name: v if isinstance(v, tuple) else (v,) for name, v in values.items()}
         return Frame(Kind.PUSH, STATE.address, STATE.pack(**runs))
 
@@ -56,9 +58,6 @@ def decode_feedback(payload: bytes) -> Feedback:
         CodecError: The payload has another length.
     """
     runs: dict[str, Any] = STATE.unpack(payload)
-    return Feedback(**{_name(key): v if len(v) > 1 else v[0] for key, v in runs.items()})
-
-
-def _name(field: str) -> str:
-    """Return the attribute that a field of the table has here."""
-    return _NAMES.get(field, field)
+    raw_attitude, attitude = runs.pop('euler1'), runs.pop('euler2')
+    values = {name: run if len(run) > 1 else run[0] for name, run in runs.items()}
+    return Feedback(raw_attitude=raw_attitude, attitude=attitude, **values)
