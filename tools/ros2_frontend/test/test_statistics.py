@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Rates and bandwidths of made-up arrivals."""
+"""Rates, delays and bandwidths of made-up arrivals."""
 
 from __future__ import annotations
 
+from collections import deque
+
 import pytest
 
-from ros2_frontend.verbs.statistics import bandwidth, NANOSECONDS, Periods
+from ros2_frontend.verbs.statistics import bandwidth, delay_text, NANOSECONDS, Periods
 
 START = 1_700_000_000 * NANOSECONDS
 
@@ -38,6 +40,16 @@ def test_time_that_goes_back_starts_anew() -> None:
     reset, report, *_ = reports(10, arrivals)
     assert reset == 'time has reset, resetting counters'
     assert report.endswith('window: 2')
+
+
+def test_delay_reports_only_news() -> None:
+    """Nothing before the first message; then the mean; then that there is nothing new."""
+    delays, news = deque[int](maxlen=10), list[int]()
+    assert delay_text(delays, news) is None
+    news += [1_000_000, 3_000_000]
+    line = '\tmin: 0.001s max: 0.003s std dev: 0.00100s window: 2'
+    assert delay_text(delays, news) == f'average delay: 0.002\n{line}'
+    assert delay_text(delays, news) == 'no new messages'
 
 
 @pytest.mark.parametrize(

@@ -48,6 +48,16 @@ class Periods:
         return f'average rate: {rate:.3f}\n{spread(self._periods)}'
 
 
+def delay_text(delays: deque[int], news: list[int]) -> str | None:
+    """Move new delays in [ns] to the others; return what `topic delay` prints, None before any."""
+    if not news:
+        return 'no new messages' if delays else None
+    delays.extend(news)
+    news.clear()
+    mean = sum(delays) / len(delays) / NANOSECONDS
+    return f'average delay: {mean:.3f}\n{spread(delays)}'
+
+
 def bandwidth(samples: Collection[tuple[float, int]], now: float) -> str | None:
     """Return what `topic bw` prints of times in [s] and sizes in [byte]; None before two."""
     if len(samples) < 2:

@@ -17,7 +17,7 @@ from ..names import absolute
 from ..ros.graph import Graph, graph_verb
 from ..ros.qos import matching_profile, SUBSCRIPTION_QOS
 from .expression import compile_filter
-from .statistics import bandwidth, NANOSECONDS, Periods, spread
+from .statistics import bandwidth, delay_text, NANOSECONDS, Periods
 from .topic_types import class_of_topic
 
 _REPORT_PERIOD = 1.0  # [s]
@@ -111,13 +111,5 @@ def delay(graph: Graph, args: Namespace) -> None:
         if now := clock.now().nanoseconds:
             news.append(now - (stamp.sec * NANOSECONDS + stamp.nanosec))
 
-    def report() -> str | None:
-        if not news:
-            return 'no new messages' if delays else None
-        delays.extend(news)
-        news.clear()
-        mean = sum(delays) / len(delays) / NANOSECONDS
-        return f'average delay: {mean:.3f}\n{spread(delays)}'
-
     _subscribe(graph, args, take, raw=False)
-    _report(graph, report)
+    _report(graph, lambda: delay_text(delays, news))
