@@ -3,67 +3,30 @@
 """Build description of arm_servo."""
 
 from pathlib import Path
-import sys
+import runpy
 
-from setuptools import find_packages, setup
-
-# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
-FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
-
-EXECUTABLES = [
-    'motion_node = arm_servo.ros.motion_node:main',
-    'motion_controller = arm_servo.ros.motion_node:motion_controller',
-    'motion_master = arm_servo.ros.motion_node:motion_master',
-    'servo_node = arm_servo.ros.motion_node:servo_node',
-    'trajectory_controller = arm_servo.ros.motion_node:trajectory_controller',
-    'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
-    'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
-]
-
-CHECKOUT = Path(__file__).resolve().parents[1]
-
-
-def sibling(folder: str) -> str:
-    """Require a package of this checkout as it stands here, and never one of that name on PyPI.
-
-    A wheel is for the machine that built it: it names the folder. An sdist has no neighbours.
-    """
-    path = CHECKOUT / folder
-    if not path.is_dir():
-        raise SystemExit(f'{path} is missing: install from a checkout of the whole repository')
-    return f'{path.name} @ {path.as_uri()}'
-
-
-setup(
-    name='arm_servo',
-    version='0.1.0',
-    python_requires='>=3.10',
-    packages=find_packages(include=['arm_servo', 'arm_servo.*']),
-    package_data={'arm_servo': ['py.typed']},
-    data_files=[
-        ('share/ament_index/resource_index/packages', ['resource/arm_servo']),
-        ('share/arm_servo', ['package.xml']),
-    ],
-    install_requires=[
+SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
+runpy.run_path(str(SHARED))['setup_package'](
+    requires=[
         'daqp>=0.5',
         'numpy>=1.26',
         'pin>=3.3',
-        sibling('arm_canopen'),
-        sibling('arm_model'),
-        sibling('arm_trajectory'),
-        sibling('libraries/realtime_loop'),
-        sibling('libraries/urdf_reader'),
+        './arm_canopen',
+        './arm_model',
+        './arm_trajectory',
+        './realtime_loop',
+        './urdf_reader',
     ],
-    extras_require={
-        'test': ['pytest'],
-        'ros': [sibling('libraries/node_runner'), sibling('libraries/operator_input')],
+    extras={
+        'ros': ['./node_runner', './operator_input'],
     },
-    zip_safe=True,
-    maintainer='The arm and quad developers',
-    maintainer_email='developers@example.org',
-    description='Jogging and trajectories of an arm on one motion core',
-    license='Apache-2.0',
-    entry_points={
-        'console_scripts': EXECUTABLES if FOR_ROS else [],
-    },
+    programs=[
+        'motion_node = arm_servo.ros.motion_node:main',
+        'motion_controller = arm_servo.ros.motion_node:motion_controller',
+        'motion_master = arm_servo.ros.motion_node:motion_master',
+        'servo_node = arm_servo.ros.motion_node:servo_node',
+        'trajectory_controller = arm_servo.ros.motion_node:trajectory_controller',
+        'servo_gamepad = arm_servo.teleop.servo_gamepad:main',
+        'servo_keyboard_input = arm_servo.teleop.servo_keyboard_input:main',
+    ],
 )

@@ -3,52 +3,18 @@
 """Build description of quad_teleop."""
 
 from pathlib import Path
-import sys
+import runpy
 
-from setuptools import find_packages, setup
-
-# colcon runs one of these commands; pip asks for a wheel, and what needs `ros2 run` is not in it
-FOR_ROS = not {'develop', 'install'}.isdisjoint(sys.argv)
-
-EXECUTABLES = [
-    'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',
-    'teleop_gamepad = quad_teleop.nodes.teleop_gamepad:main',
-    'twist_mux = quad_teleop.nodes.twist_mux:main',
-]
-
-CHECKOUT = Path(__file__).resolve().parents[1]
-
-
-def sibling(folder: str) -> str:
-    """Require a package of this checkout as it stands here, and never one of that name on PyPI.
-
-    A wheel is for the machine that built it: it names the folder. An sdist has no neighbours.
-    """
-    path = CHECKOUT / folder
-    if not path.is_dir():
-        raise SystemExit(f'{path} is missing: install from a checkout of the whole repository')
-    return f'{path.name} @ {path.as_uri()}'
-
-
-setup(
-    name='quad_teleop',
-    version='0.1.0',
-    python_requires='>=3.10',
-    packages=find_packages(include=['quad_teleop', 'quad_teleop.*']),
-    package_data={'quad_teleop': ['py.typed']},
-    data_files=[
-        ('share/ament_index/resource_index/packages', ['resource/quad_teleop']),
-        ('share/quad_teleop', ['package.xml']),
-        ('share/quad_teleop/config', ['config/twist_mux.yaml']),
-    ],
-    install_requires=[sibling('libraries/operator_input'), sibling('quad_description')],
-    extras_require={'test': ['pytest'], 'ros': [sibling('libraries/node_runner')]},
-    zip_safe=True,
-    maintainer='The arm and quad developers',
-    maintainer_email='developers@example.org',
-    description='Keyboard and gamepad for a walking robot, and a multiplexer of velocity commands',
-    license='Apache-2.0',
-    entry_points={
-        'console_scripts': EXECUTABLES if FOR_ROS else [],
+SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
+runpy.run_path(str(SHARED))['setup_package'](
+    requires=['./operator_input', './quad_description'],
+    extras={
+        'ros': ['./node_runner'],
     },
+    programs=[
+        'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',
+        'teleop_gamepad = quad_teleop.nodes.teleop_gamepad:main',
+        'twist_mux = quad_teleop.nodes.twist_mux:main',
+    ],
+    folders=['config'],
 )

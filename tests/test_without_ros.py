@@ -157,6 +157,8 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     packages = [CHECKOUT / 'libraries', *(path.parent for path in CHECKOUT.glob('*/setup.py'))]
     for package in packages:
         shutil.copytree(package, source / package.name, ignore=NOT_SOURCE)
+    (source / 'tools').mkdir()
+    shutil.copy(CHECKOUT / 'tools' / 'setup_package.py', source / 'tools')
     folder = tmp_path_factory.mktemp('environment')
     subprocess.run([sys.executable, '-m', 'venv', '--without-pip', folder], check=True)
     kept = {'HOME', 'LANG', 'TMPDIR', 'UV_CACHE_DIR', 'SSL_CERT_FILE', 'XDG_CACHE_HOME'}

@@ -118,9 +118,9 @@ TABLES = {'programs': table_of_programs, 'interfaces': table_of_interfaces}
 
 def _executables(setup: Path) -> list[tuple[str, str, str]]:
     """Return name, module and function of each executable of a package."""
-    for node in ast.parse(setup.read_text(encoding='utf-8')).body:
+    for node in ast.walk(ast.parse(setup.read_text(encoding='utf-8'))):
         match node:
-            case ast.Assign(targets=[ast.Name(id='EXECUTABLES')], value=value):
+            case ast.keyword(arg='programs', value=value):
                 entries = ast.literal_eval(value)
                 parts = (re.split(r' = |:', entry) for entry in entries)
                 return [(name, module, function) for name, module, function in parts]
