@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 import sys
 
-from fake_programs import FakeRunner, imitate_colcon
+from fake_programs import FakeRunner, imitate_builders
 import pytest
 
 from workspace.environment import Environment
@@ -25,6 +25,19 @@ MANIFEST = """<package format="3">
   {group}
   <export><build_type>{build_type}</build_type></export>
 </package>
+"""
+SETUP = """from setuptools import find_packages, setup
+
+setup(
+    name='{name}',
+    version='1.2',
+    packages=find_packages(include=['{name}', '{name}.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/{name}']),
+        ('share/{name}', ['package.xml']),
+    ],
+    entry_points={{'console_scripts': ['run = {name}:main']}},
+)
 """
 
 
@@ -80,6 +93,11 @@ def add_package(layout: Layout) -> Callable[..., Path]:
                 build_type=build_type,
             )
         )
+        if build_type == 'ament_python':
+            (where / 'setup.py').write_text(SETUP.format(name=name))
+            for file in (f'{name}/__init__.py', f'resource/{name}'):
+                (where / file).parent.mkdir(parents=True, exist_ok=True)
+                (where / file).touch()
         return where
 
     return add
@@ -91,7 +109,7 @@ def fake(layout: Layout, lock: int) -> Callable[..., FakeRunner]:
 
     def make(fail_at: int = 0) -> FakeRunner:
         def effect(arguments: list[str]) -> None:
-            imitate_colcon(layout, arguments)
+            imitate_builders(layout, arguments)
             if 'venv' in arguments:
                 layout.venv_python.parent.mkdir()
                 layout.venv_python.touch()

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import json
+from pathlib import Path
 
 from workspace.layout import Layout
 from workspace.process import Runner
@@ -34,16 +36,24 @@ class FakeRunner(Runner):
         self.effect([str(argument) for argument in arguments])
 
 
-def imitate_colcon(layout: Layout, arguments: list[str]) -> None:
-    """Leave behind what colcon does for the packages that it is to build."""
-    if 'colcon' not in arguments:
-        return
-    begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')
-    for name in arguments[begin:end]:
-        share = layout.install / name / 'share'
-        for path in (share / name / 'package.xml', share / 'colcon-core' / 'packages' / name):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.touch()
-        (layout.build / name).mkdir(parents=True, exist_ok=True)
-        (layout.build / name / 'colcon_build.rc').write_text('0\n')
-    (layout.install / 'local_setup.bash').touch()
+def imitate_builders(layout: Layout, arguments: list[str]) -> None:
+    """Leave behind what colcon, or the builder of interfaces, does for the packages it builds."""
+    if 'colcon' in arguments:
+        begin, end = arguments.index('--packages-select') + 1, arguments.index('--cmake-args')
+        for name in arguments[begin:end]:
+            imitate_package(layout.install / name, name)
+            (layout.build / name).mkdir(parents=True, exist_ok=True)
+            (layout.build / name / 'colcon_build.rc').write_text('0\n')
+        (layout.install / 'local_setup.bash').touch()
+    elif arguments[1].endswith('interfaces.py'):
+        for name in json.loads(arguments[2])['packages']:
+            (layout.build / name).mkdir(parents=True, exist_ok=True)
+            imitate_package(layout.install, name)
+
+
+def imitate_package(prefix: Path, name: str) -> None:
+    """Install the mark and the manifest of a package."""
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    for path in (index / name, prefix / 'share' / name / 'package.xml'):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()

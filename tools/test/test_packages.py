@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from workspace.errors import UnknownPackageError
+from workspace.errors import WorkspaceError
 from workspace.layout import Layout, this_checkout
 from workspace.packages import find_packages, needed_packages, read_package, source_fingerprint
 from workspace.underlay import Underlay, UnderlayKind
@@ -94,7 +94,7 @@ def test_unknown_target_is_answered_with_the_known(
 ) -> None:
     """A wrong name is named, with those that there are."""
     add_package('arm')
-    with pytest.raises(UnknownPackageError, match=r'no package leg(?s:.*)arm'):
+    with pytest.raises(WorkspaceError, match=r'no package leg(?s:.*)arm'):
         needed_packages(find_packages(layout.root), ['leg'], empty)
 
 

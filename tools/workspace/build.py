@@ -1,24 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Builds with colcon what has changed, and only that."""
+"""Builds what has changed, and only that: by colcon on a system's ROS, by itself on wheels."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+import json
 import os
 from pathlib import Path
 import shutil
 
+from . import interfaces, link, shell
 from .errors import StepFailedError
 from .layout import Layout
 from .packages import Package, source_fingerprint
 from .process import Runner
-from .state import fingerprint, write_atomically
+from .state import fingerprint, fingerprint_files, write_atomically
 from .underlay import UnderlayKind
 
 PACKAGES_AT_A_TIME = 2
 STAMP = '.workspace-fingerprint'
+COLCON_LAYOUT = '.colcon_install_layout'
+"""File in which colcon notes whether packages share one prefix; ours on wheels do."""
 _NEWS = ('Starting >>>', 'Finished <<<', 'Failed')
 
 
@@ -45,13 +49,8 @@ class Builder:
     jobs: int
 
     @property
-    def cmake_arguments(self) -> list[str]:
-        """What every CMake package is configured with."""
-        arguments = ['-DBUILD_TESTING=OFF', f'-DPython3_EXECUTABLE={self.layout.venv_python}']
-        if self.kind is UnderlayKind.WHEELS:
-            include = self.layout.root / 'tools' / 'cmake' / 'c_type_support_only.cmake'
-            arguments.append(f'-DCMAKE_PROJECT_INCLUDE={include}')
-        return arguments
+    def _on_wheels(self) -> bool:
+        return self.kind is UnderlayKind.WHEELS
 
     def fingerprints(self, packages: Mapping[str, Package]) -> dict[str, str]:
         """Hash each package with the environment and with the interfaces that it is built on.
@@ -59,6 +58,8 @@ class Builder:
         Args:
             packages: Each after those that it needs.
         """
+        tools = (interfaces, link) if self._on_wheels else ()
+        how = fingerprint_files(Path(module.__file__ or '') for module in tools)
         hashes: dict[str, str] = {}
         for name, package in packages.items():
             below = [
@@ -66,19 +67,26 @@ class Builder:
                 for other in sorted(package.dependencies & hashes.keys())
                 if package.is_interface and packages[other].is_interface
             ]
-            arguments = self.cmake_arguments if package.build_type == 'ament_cmake' else []
-            source = source_fingerprint(package)
-            hashes[name] = fingerprint(self.base, *arguments, *below, source)
+            hashes[name] = fingerprint(self.base, how, *below, source_fingerprint(package))
         return hashes
 
     def stale(self, hashes: Mapping[str, str]) -> list[str]:
         """Name the packages that are not built, or built from something else."""
-        whole = (self.layout.install / 'local_setup.bash').is_file()
+        whole = (self.layout.install / 'local_setup.bash').is_file() and self._has_our_layout()
         return [name for name, value in hashes.items() if not whole or self._built(name) != value]
 
+    def _has_our_layout(self) -> bool:
+        """Return whether packages were installed as they are where ROS comes from there."""
+        path = self.layout.install / COLCON_LAYOUT
+        layout = path.read_text(encoding='utf-8').strip() if path.is_file() else ''
+        return (layout == 'merged') == self._on_wheels
+
+    def _manifest(self, name: str) -> Path:
+        install = self.layout.install
+        return (install if self._on_wheels else install / name) / 'share' / name / 'package.xml'
+
     def _built(self, name: str) -> str:
-        installed = self.layout.install / name / 'share' / name / 'package.xml'
-        return self._stamp(name)[1] if installed.is_file() else ''
+        return self._stamp(name)[1] if self._manifest(name).is_file() else ''
 
     def _stamp(self, name: str) -> tuple[str, str]:
         path = self.layout.build / name / STAMP
@@ -89,10 +97,26 @@ class Builder:
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove what was built of packages."""
+        install = self.layout.install
         for name in names:
             # the build folder first: it holds the stamp
-            for folder in (self.layout.build / name, self.layout.install / name):
-                shutil.rmtree(folder, ignore_errors=True)
+            shutil.rmtree(self.layout.build / name, ignore_errors=True)
+            shutil.rmtree(install / name, ignore_errors=True)
+            made = [install / folder / name for folder in ('include', 'lib', 'share', link.PYTHON)]
+            index = install / 'share' / 'ament_index' / 'resource_index'
+            made += [kind / name for kind in index.glob('*')]
+            made += (install / 'lib').glob(f'lib{name}__*.so')
+            made += (install / link.PYTHON).glob(f'{name}-*.dist-info')
+            made += [
+                path
+                for path in (install / link.PYTHON).glob('*')
+                if path.is_symlink() and path.readlink().parent.name == name
+            ]
+            for path in made:
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink(missing_ok=True)
 
     def leftovers(self, wanted: Iterable[str]) -> list[str]:
         """Name what is installed and of no use any more.
@@ -101,27 +125,36 @@ class Builder:
             wanted: The packages of the workspace that are not the underlay's.
         """
         keep = set(wanted)
-        marks = self.layout.install.glob('*/share/colcon-core/packages/*')
-        names = {mark.name for mark in marks}
+        marks = 'share/ament_index/resource_index/packages/*'
+        names = {mark.name for mark in self.layout.install.glob(self._prefixes + marks)}
         return sorted(
             name for name in names if name not in keep or self._stamp(name)[0] != self.base
         )
+
+    @property
+    def _prefixes(self) -> str:
+        return '' if self._on_wheels else '*/'
 
     def build(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
         """Build packages from nothing.
 
         Args:
-            runner: Starts colcon.
+            runner: Starts the programs that build.
             packages: All that are to be there afterwards, each after those that it needs.
             stale: Names of those to build.
 
         Raises:
-            StepFailedError: One of them does not build; the others keep their result.
+            WorkspaceError: One of them does not build; the others keep their result.
         """
         hashes = self.fingerprints(packages)
+        if not self._has_our_layout():
+            shutil.rmtree(self.layout.install, ignore_errors=True)
         self.remove(stale)
         try:
-            self._colcon(runner, packages, stale)
+            if self._on_wheels:
+                self._build_on_wheels(runner, packages, stale)
+            else:
+                self._colcon(runner, packages, stale)
         finally:
             for name in stale:
                 if self._succeeded(name):
@@ -133,22 +166,74 @@ class Builder:
 
     def _succeeded(self, name: str) -> bool:
         result = self.layout.build / name / 'colcon_build.rc'
-        return result.is_file() and result.read_text(encoding='utf-8').strip() == '0'
+        if result.is_file():
+            return result.read_text(encoding='utf-8').strip() == '0'
+        return self._on_wheels and self._manifest(name).is_file()
 
-    def _colcon(self, runner: Runner, packages: Mapping[str, Package], stale: list[str]) -> None:
-        workers = min(self.jobs, PACKAGES_AT_A_TIME)
+    def _build_on_wheels(
+        self, runner: Runner, packages: Mapping[str, Package], stale: list[str]
+    ) -> None:
+        install = self.layout.install
+        install.mkdir(exist_ok=True)
+        (install / 'COLCON_IGNORE').touch()
+        (install / COLCON_LAYOUT).write_text('merged\n', encoding='utf-8')
+        shell.write_install_scripts(self.layout.venv, install, install / link.PYTHON)
+        for_colcon = []
+        for name in stale:
+            if packages[name].build_type == 'ament_python':
+                link.link_package(packages[name], install, self.layout.venv_python)
+            elif not packages[name].is_interface:
+                for_colcon.append(name)
+        self._build_interfaces(runner, packages, stale)
+        if for_colcon:
+            self._colcon(runner, packages, for_colcon)
+            shell.write_install_scripts(self.layout.venv, install, install / link.PYTHON)
+
+    def _build_interfaces(
+        self, runner: Runner, packages: Mapping[str, Package], stale: list[str]
+    ) -> None:
+        names = [name for name in stale if packages[name].is_interface]
+        if not names:
+            return
+        request = {
+            'build': str(self.layout.build),
+            'install': str(self.layout.install),
+            'jobs': self.jobs,
+            'workers': self._workers,
+            'packages': {
+                name: {
+                    'folder': str(packages[name].folder),
+                    'needs': sorted(packages[name].dependencies & {*names}),
+                }
+                for name in names
+            },
+        }
+        runner.run(
+            'Building the interfaces',
+            [self.layout.venv_python, Path(interfaces.__file__), json.dumps(request)],
+            show=_NEWS,
+            # with it the interpreter starts once
+            extra={'LD_LIBRARY_PATH': str(self.layout.venv / 'lib')},
+        )
+
+    @property
+    def _workers(self) -> int:
+        return min(self.jobs, PACKAGES_AT_A_TIME)
+
+    def _colcon(self, runner: Runner, packages: Mapping[str, Package], names: list[str]) -> None:
         folders = [package.folder for package in packages.values()]
         colcon: list[str | Path] = [self.layout.venv_python, '-m', 'colcon']
         colcon += ['--log-base', self.layout.log, 'build', '--symlink-install']
+        colcon += ['--merge-install'] if self._on_wheels else []
         colcon += ['--build-base', self.layout.build, '--install-base', self.layout.install]
-        colcon += ['--parallel-workers', str(workers), '--event-handlers', 'console_direct-']
-        colcon += ['--paths', *folders, '--packages-select', *stale]
-        colcon += ['--cmake-args', *self.cmake_arguments]
+        colcon += ['--parallel-workers', str(self._workers), '--event-handlers', 'console_direct-']
+        colcon += ['--paths', *folders, '--packages-select', *names, '--cmake-args']
+        colcon += ['-DBUILD_TESTING=OFF', f'-DPython3_EXECUTABLE={self.layout.venv_python}']
         setup = self.layout.venv / 'local_setup.bash'
         runner.run(
             'Building the packages',
             ['bash', '-c', '. "$0" && exec "$@"', setup, *colcon],
-            show=lambda line: line.startswith(_NEWS),
+            show=_NEWS,
             # without it colcon adds a load limit, and on a busy machine compiles one by one
-            extra={'MAKEFLAGS': f'-j{max(1, self.jobs // workers)}'},
+            extra={'MAKEFLAGS': f'-j{max(1, self.jobs // self._workers)}'},
         )

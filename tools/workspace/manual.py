@@ -19,11 +19,7 @@ def mkdocs_command(layout: Layout) -> list[str | Path]:
 
 
 def build_manual(layout: Layout, environ: Mapping[str, str]) -> int:
-    """Build the site and print where it begins.
-
-    Returns:
-        0 when it was built, else 1.
-    """
+    """Build the site and print where it begins; return 0, or 1 when it fails."""
     environment = clean_environment(environ)
     done = subprocess.run(mkdocs_command(layout), cwd=layout.root, env=environment, check=False)
     if done.returncode:

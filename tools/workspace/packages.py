@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 import xml.etree.ElementTree as ET
 
-from .errors import UnknownPackageError
+from .errors import WorkspaceError
 from .state import fingerprint
 from .underlay import Underlay
 
@@ -19,6 +19,7 @@ INTERFACE_GROUP = 'rosidl_interface_packages'
 COPIES_FOLDER = 'interfaces'  # public packages that an underlay may have
 _NOT_SOURCE = {'__pycache__', 'build', 'install', 'log'}
 _PYTHON_BUILD_FILES = ('package.xml', 'setup.py', 'setup.cfg')
+_SHARED_SETUP = Path(__file__).parents[1] / 'setup_package.py'  # which every setup.py runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +83,7 @@ def needed_packages(
     *,
     tests: bool = False,
 ) -> dict[str, Package]:
-    """Take the targets and what they need, without what the underlay has.
+    """Take the targets and what they need, each after what it needs itself.
 
     Args:
         packages: All packages of the workspace.
@@ -90,11 +91,8 @@ def needed_packages(
         underlay: The ROS below; of a public package it has, our copy is not built.
         tests: With what their tests need, too.
 
-    Returns:
-        The packages, each after those that it needs.
-
     Raises:
-        UnknownPackageError: A target is not in the workspace.
+        WorkspaceError: A target is not in the workspace.
     """
     ordered: dict[str, Package] = {}
     visited: set[str] = set()
@@ -113,7 +111,7 @@ def needed_packages(
 
     for target in sorted(targets) or sorted(packages):
         if target not in packages:
-            raise UnknownPackageError(
+            raise WorkspaceError(
                 f'There is no package {target} in this workspace.',
                 f'It has: {", ".join(sorted(packages))}',
             )
@@ -140,7 +138,9 @@ def source_fingerprint(package: Package) -> str:
     count, but where they are does, and the names of the data files (which setup.py lists).
     """
     linked = package.build_type == 'ament_python'
-    parts: list[str | bytes] = [str(package.folder)] if linked else []
+    parts: list[str | bytes] = []
+    if linked:
+        parts = [str(package.folder), _SHARED_SETUP.read_bytes()]
     for path in _files(package.folder):
         name = str(path.relative_to(package.folder))
         if not linked or name in _PYTHON_BUILD_FILES:

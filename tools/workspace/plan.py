@@ -10,7 +10,7 @@ import time
 
 from .build import Builder, default_jobs
 from .environment import DEV, DOCS, Environment, Step
-from .errors import UnknownPackageError
+from .errors import WorkspaceError
 from .packages import find_packages, needed_packages
 from .process import Runner
 from .state import read_state
@@ -39,7 +39,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
     """List the steps from what is there to what is wanted.
 
     Raises:
-        UnknownPackageError: The workspace does not have a package or an extra that is wanted.
+        WorkspaceError: The workspace does not have a package or an extra that is wanted.
     """
     layout = environment.layout
     found = find_packages(layout.root)
@@ -49,7 +49,7 @@ def plan(environment: Environment, target: Target) -> list[Step]:
         names.append(DOCS)
     for extra in target.extras:
         if not (layout.requirements / f'{extra}.txt').is_file():
-            raise UnknownPackageError(
+            raise WorkspaceError(
                 f'There is no {extra}.txt in {layout.requirements}.',
                 f'`make pins` makes it from {extra}.in.',
             )

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 import re
@@ -56,7 +56,7 @@ class Runner:
         what: str,
         arguments: Sequence[Argument],
         *,
-        show: Callable[[str], bool] = lambda _line: False,
+        show: tuple[str, ...] = (),
         extra: Mapping[str, str] | None = None,
     ) -> None:
         """Run a program to its end.
@@ -64,7 +64,7 @@ class Runner:
         Args:
             what: What the program does, for messages.
             arguments: The program and its arguments.
-            show: Picks the lines of its output that a person wants to see.
+            show: How the lines of its output begin that a person wants to see.
             extra: Variables to add to the environment.
 
         Raises:
@@ -85,7 +85,7 @@ class Runner:
         ) as process:
             for line in process.stdout or ():
                 tail.append(line.rstrip())
-                if show(line):
+                if line.lstrip().startswith(show):
                     print(f'      {line.strip()}', flush=True)
         if process.returncode:
             output = '\n'.join(tail)

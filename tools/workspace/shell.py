@@ -12,9 +12,7 @@ from .state import write_atomically
 from .underlay import Underlay, UnderlayKind
 
 SHELLS = ('sh', 'bash', 'zsh')
-_HEAD = (
-    '# Written by the set-up (tools/workspace/shell.py); sourced by env.sh and install/setup.*\n'
-)
+_HEAD = '# Written by the set-up (tools/workspace/shell.py); sourced by env.sh\n'
 _PREPEND = """\
 _workspace_prepend() {
   eval "_workspace_old=\\${$1-}"
@@ -24,9 +22,8 @@ _workspace_prepend() {
   esac
 }
 """
-_TAIL = """\
-unset -f _workspace_prepend
-unset _workspace_old
+_UNSET = 'unset -f _workspace_prepend\nunset _workspace_old\n'
+_DISCOVERY = """\
 # a person's own choice counts; without one, DDS stays on this host
 export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
 """
@@ -58,51 +55,52 @@ os._exit(main())  # the end of the interpreter would take 0.2 s
 """
 
 
-def setup_script(venv: Path, underlay: Underlay, libraries: Sequence[Path], shell: str) -> str:
-    """Compose what a shell sources.
+def _prepend(*pairs: tuple[str, Path]) -> str:
+    lines = (f'_workspace_prepend {name} {quote(str(path))}\n' for name, path in pairs)
+    return f'{_PREPEND}{"".join(lines)}{_UNSET}'
+
+
+def write_setup_scripts(venv: Path, underlay: Underlay, libraries: Sequence[Path]) -> None:
+    """Write `local_setup.*` into the virtual environment, where colcon looks for them too.
 
     Args:
         venv: The virtual environment.
         underlay: The ROS below the workspace.
         libraries: Folders for the library path, where ROS comes from wheels.
-        shell: One of `SHELLS`.
     """
-    system = underlay.kind is UnderlayKind.SYSTEM
-    lines = [_HEAD, _PREPEND]
-    if system:
-        lines.append(f'. {quote(str(underlay.prefix / f"setup.{shell}"))}\n')
-    else:
-        lines.append(_LEAVE_SYSTEM_ROS)
-        wanted = [
-            ('AMENT_PREFIX_PATH', venv),
-            ('CMAKE_PREFIX_PATH', venv),
-            *(('LD_LIBRARY_PATH', folder) for folder in reversed(libraries)),
-        ]
-        lines += [f'_workspace_prepend {name} {quote(str(path))}\n' for name, path in wanted]
-        lines.append('export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3\n')
-    lines += [
-        f'_workspace_prepend PATH {quote(str(venv / "bin"))}\n',
-        f'export VIRTUAL_ENV={quote(str(venv))}\n',
-        _TAIL,
-    ]
-    return ''.join(lines)
-
-
-def write_setup_scripts(venv: Path, underlay: Underlay, libraries: Sequence[Path]) -> None:
-    """Write `local_setup.*` into the virtual environment, where colcon looks for them too."""
+    path = ('PATH', venv / 'bin')
+    wheels = [('AMENT_PREFIX_PATH', venv), ('CMAKE_PREFIX_PATH', venv)]
+    wheels += [('LD_LIBRARY_PATH', folder) for folder in reversed(libraries)]
     for shell in SHELLS:
-        script = setup_script(venv, underlay, libraries, shell)
-        write_atomically(venv / f'local_setup.{shell}', script)
+        if underlay.kind is UnderlayKind.SYSTEM:
+            text = f'. {quote(str(underlay.prefix / f"setup.{shell}"))}\n{_prepend(path)}'
+        else:
+            text = f'{_LEAVE_SYSTEM_ROS}{_prepend(*wheels, path)}'
+            text += 'export ROS_DISTRO=jazzy ROS_VERSION=2 ROS_PYTHON_VERSION=3\n'
+        text += f'export VIRTUAL_ENV={quote(str(venv))}\n'
+        write_atomically(venv / f'local_setup.{shell}', f'{_HEAD}{text}{_DISCOVERY}')
 
 
-def write_front_end(venv: Path, underlay: Underlay, folder: Path) -> None:
-    """Put our `ros2` on PATH, unless the ROS below has its own.
+def write_install_scripts(venv: Path, install: Path, python: Path) -> None:
+    """Write the scripts that colcon would write beside packages.
 
     Args:
         venv: The virtual environment.
-        underlay: The ROS below the workspace.
-        folder: Folder that holds the Python package `ros2_frontend`.
+        install: Where the packages are, on wheels.
+        python: The folder of their modules.
     """
+    names = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH')
+    folders = (('LD_LIBRARY_PATH', install / 'lib'), ('PYTHONPATH', python))
+    text = f'{_HEAD}{_prepend(*((name, install) for name in names), *folders)}'
+    for shell in SHELLS:
+        write_atomically(install / f'local_setup.{shell}', text)
+        both = (venv / f'local_setup.{shell}', install / f'local_setup.{shell}')
+        sourced = ''.join(f'. {quote(str(path))}\n' for path in both)
+        write_atomically(install / f'setup.{shell}', f'{_HEAD}{sourced}')
+
+
+def write_front_end(venv: Path, underlay: Underlay, folder: Path) -> None:
+    """Put our `ros2`, whose Python package is in a folder, on PATH unless the ROS has its own."""
     command = venv / 'bin' / 'ros2'
     if underlay.kind is UnderlayKind.SYSTEM and underlay.has_command('ros2'):
         command.unlink(missing_ok=True)

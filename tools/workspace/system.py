@@ -8,7 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 import shutil
 
-from .errors import MissingPackagesError, UnsupportedSystemError
+from .errors import WorkspaceError
+from .interfaces import COMPILERS
 from .interpreter import Interpreter
 from .underlay import PREFIX_VARIABLE, SYSTEM_PREFIX, Underlay, UnderlayKind
 
@@ -18,7 +19,7 @@ WHEEL_MACHINE = 'x86_64'  # the wheels exist for no other
 
 # any one of the programs does; the apt package that brings the usual one
 PROGRAMS: tuple[tuple[tuple[str, ...], str], ...] = (
-    (('c++', 'g++', 'clang++'), 'g++'),
+    (COMPILERS, 'g++'),
     (('git',), 'git'),
 )
 
@@ -37,29 +38,29 @@ SYSTEM_ROS_PACKAGES: tuple[str, ...] = (
 
 
 def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None:
-    """Refuse a system that no remedy on it can help.
+    """Refuse a machine, a Python or a place of the checkout that no remedy here can help.
 
     Raises:
-        UnsupportedSystemError: The machine, the Python or the checkout's place is not supported.
+        WorkspaceError: One of them is not supported.
     """
     if any(character.isspace() for character in str(root)):
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'The path of the checkout has a space in it: {root}',
             'CMake rules of ROS break on that. Move the checkout and run again.',
         )
     if not PYTHON_OLDEST <= python.version <= PYTHON_NEWEST:
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'Python {python.version[0]}.{python.version[1]} ({python.path}) is not supported.',
             f'Name one of Python 3.{PYTHON_OLDEST[1]} to 3.{PYTHON_NEWEST[1]}, '
             'as in: make PYTHON=python3.12',
         )
     if underlay.python_name not in {None, python.name}:
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'{underlay.prefix} is built for {underlay.python_name}, not for {python.name}.',
             f'Run again without PYTHON=..., or with an empty {PREFIX_VARIABLE} to use the wheels.',
         )
     if underlay.kind is UnderlayKind.WHEELS and python.machine != WHEEL_MACHINE:
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'There are no ROS wheels for {python.machine}, and no {SYSTEM_PREFIX}.',
             'On Ubuntu 24.04 install ROS 2 Jazzy (package ros-jazzy-ros-base) and run again;\n'
             f'a ROS in another folder is named with {PREFIX_VARIABLE}.',
@@ -67,11 +68,7 @@ def check_supported(underlay: Underlay, python: Interpreter, root: Path) -> None
 
 
 def _python_packages(python: Interpreter) -> list[str]:
-    """Name the apt packages that complete an interpreter.
-
-    Raises:
-        UnsupportedSystemError: It is incomplete and apt does not know it.
-    """
+    """Name the apt packages that complete an interpreter; refuse one that apt does not know."""
     missing = [
         f'{python.name}-{part}'
         for part, present in (('venv', python.has_venv), ('dev', python.has_headers))
@@ -79,7 +76,7 @@ def _python_packages(python: Interpreter) -> list[str]:
     ]
     if missing and not python.of_the_system:
         parts = ' and '.join(part.rpartition('-')[2] for part in missing)
-        raise UnsupportedSystemError(
+        raise WorkspaceError(
             f'{python.path} was installed without {parts} (venv with pip, or the C headers).',
             'Install it completely, or name another one, as in: make PYTHON=/usr/bin/python3',
         )
@@ -91,13 +88,7 @@ def missing_packages(
     python: Interpreter,
     which: Callable[[str], str | None] = shutil.which,
 ) -> tuple[str, ...]:
-    """Name every apt package that is missing.
-
-    Args:
-        underlay: The ROS to be used.
-        python: The interpreter to be used.
-        which: Finds a program on PATH.
-    """
+    """Name every apt package that is missing; `which` finds a program on PATH."""
     missing = [package for names, package in PROGRAMS if not any(map(which, names))]
     missing += _python_packages(python)
     if underlay.kind is UnderlayKind.SYSTEM:
@@ -113,10 +104,13 @@ def check(underlay: Underlay, python: Interpreter, root: Path) -> None:
     """Refuse a system that lacks something, naming all of it.
 
     Raises:
-        UnsupportedSystemError: See `check_supported`.
-        MissingPackagesError: Packages have to be installed.
+        WorkspaceError: It is not supported, or packages have to be installed.
     """
     check_supported(underlay, python, root)
     missing = missing_packages(underlay, python)
     if missing:
-        raise MissingPackagesError(missing)
+        count = 'package is' if len(missing) == 1 else 'packages are'
+        raise WorkspaceError(
+            f'{len(missing)} system {count} missing.',
+            f'Install with:\n  sudo apt-get install {" ".join(missing)}\nand run again.',
+        )

@@ -23,12 +23,7 @@ class UnderlayKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Underlay:
-    """A ROS installation below the workspace.
-
-    Attributes:
-        kind: Where it came from.
-        prefix: Its folder; for wheels the virtual environment.
-    """
+    """A ROS installation below the workspace; of wheels the prefix is the virtual environment."""
 
     kind: UnderlayKind
     prefix: Path

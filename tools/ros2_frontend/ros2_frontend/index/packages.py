@@ -47,7 +47,8 @@ def _remedy(package: str, workspace: Path) -> str:
     folders = ('.', 'libraries', 'interfaces')
     if not any((workspace / folder / package / 'package.xml').is_file() for folder in folders):
         return ''
-    if (workspace / 'install' / package).is_dir():
+    install = workspace / 'install'
+    if (install / package).is_dir() or (install / 'share' / package).is_dir():
         return '\nIt was built after this shell was set up: source env.sh'
     return '\nIt may not be built yet: make build, then source env.sh'
 
