@@ -76,8 +76,8 @@ def install() -> None:
 
     defaults: dict[tuple[int, str], object] = {}  # by node and name: the reader declares values
 
-    def default(reader: Any, made: tuple[str, object], _name: str, given: object) -> None:
-        defaults[id(reader._node), made[0]] = given  # this is about the inside
+    def default(reader: Any, _made: object, name: str, given: object, *_: object) -> None:
+        defaults[id(reader._node), reader._prefix + name] = given  # this is about the inside
 
     def after(owner: type, name: str, record: Callable[..., None]) -> None:
         original = getattr(owner, name)
