@@ -14,9 +14,9 @@ import struct
 import threading
 import time
 
+from arm_canopen import DriveState
 from arm_canopen.can import Frame
-from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
-from arm_canopen.standard.drive import drive_state, DriveState
+from arm_canopen.standard import drive_state, rpdo_default, tpdo_default
 from arm_model import JointLimits
 
 INCREMENTS = 1000.0

@@ -32,7 +32,7 @@ from std_msgs.msg import Float64MultiArray
 from arm_bringup.description import expand_xacro
 from arm_bringup.robots import installed_robots_folder
 from arm_canopen.can import Frame
-from arm_canopen.standard.cob_id import CobId
+from arm_canopen.standard import CobId
 from arm_model import Array, load_limits, RobotModel
 from arm_servo import JogRequest, MotionCore, SetPoint, TwistCommand
 from arm_servo.core.gateway import CommandGateway, start_worker

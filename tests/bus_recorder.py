@@ -8,8 +8,7 @@ import threading
 from typing import TYPE_CHECKING
 
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.drive import drive_state
+from arm_canopen.standard import CobId, drive_state
 
 if TYPE_CHECKING:
     from types import TracebackType

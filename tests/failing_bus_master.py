@@ -9,12 +9,11 @@ import sys
 import threading
 from typing import TYPE_CHECKING
 
+from arm_canopen import BusError, run_master
 from arm_canopen.can.socket_bus import SocketBus
-from arm_canopen.exceptions import BusError
-from arm_canopen.nodes.master import run_master
 
 if TYPE_CHECKING:
-    from arm_canopen.can.frame import Frame
+    from arm_canopen.can import Frame
 
 DOWN = 'the bus went down'
 

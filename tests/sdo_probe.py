@@ -7,9 +7,9 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
+from arm_canopen import DriveState
 from arm_canopen.can import Frame
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.drive import drive_state, DriveState
+from arm_canopen.standard import CobId, drive_state
 
 if TYPE_CHECKING:
     from arm_canopen.can import Bus

@@ -30,7 +30,7 @@ from simulated_arm import JOINTS
 from simulated_quad import SimulatedQuad
 
 from arm_canopen.can import open_bus
-from arm_canopen.standard.cob_id import CobId
+from arm_canopen.standard import CobId
 from quad_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

@@ -17,8 +17,7 @@ import pytest
 from servo_commands import SteppedWorker
 from virtual_network import VirtualNetwork
 
-from arm_canopen import MotionSource
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import MotionSource, OperationMode
 from arm_servo import DisplacementRequest, MotionCore
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.core.motion_queue import MotionCommand

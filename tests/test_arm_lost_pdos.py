@@ -18,8 +18,7 @@ import pytest
 from servo_commands import InlineWorker, outcome
 from virtual_network import VirtualNetwork
 
-from arm_canopen import MotionSource
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen import DriveState, MotionSource, OperationMode
 from arm_servo import MotionCore
 from arm_servo.core.gateway import CommandGateway
 from arm_servo.io.drive_source import DriveSource

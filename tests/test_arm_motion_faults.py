@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from isolation import Isolation
 
-    from arm_canopen.can.bus import Bus
+    from arm_canopen.can import Bus
 
 pytestmark = pytest.mark.scenario
 

@@ -16,8 +16,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 import pytest
 from simulated_arm import SimulatedArm
 
-from arm_canopen.can.frame_log import read_log
-from arm_canopen.standard.cob_id import CobId
+from arm_canopen.can import read_log
+from arm_canopen.standard import CobId
 from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

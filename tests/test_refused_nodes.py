@@ -21,7 +21,7 @@ from quad_controller import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError as QuadDescriptionError
 from quad_description.display import Display
-from quad_hardware.exceptions import HardwareError
+from quad_hardware import HardwareError
 from quad_hardware.nodes.hardware_node import HardwareNode
 from robot_viewer.nodes.robot_state_publisher import RobotStatePublisher
 

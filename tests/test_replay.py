@@ -18,7 +18,7 @@ from ros_client import RosClient
 from sensor_msgs.msg import JointState
 from simulated_arm import JOINTS, panda_bus, SimulatedArm
 
-from arm_canopen.can.frame_log import read_log
+from arm_canopen.can import read_log
 from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:

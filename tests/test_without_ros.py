@@ -19,7 +19,7 @@ import pytest
 from readme_folder import READMES, run_examples
 
 from arm_canopen import open_bus
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 
 pytestmark = [pytest.mark.slow, pytest.mark.xdist_group('without-ros')]
 

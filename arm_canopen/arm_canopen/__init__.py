@@ -3,8 +3,8 @@
 """CANopen master and CiA 402 drives, for ROS 2 and, as :class:`CanopenMaster`, without it.
 
 The names here are the public API. Those that need ROS, or take long, are loaded when they are
-used. Public besides, for tools and simulated devices: the modules of `standard`, `config` and
-`can`, `exceptions`, and what `master` names.
+used. Public besides, for tools and simulated devices: `standard`, `config` and `can`, and
+what `master` names.
 """
 
 from __future__ import annotations
@@ -17,7 +17,21 @@ from .cia402.motion import AxisFeedback, MotionSource, Setpoint
 from .cia402.refusal import Refusal, RefusalCause
 from .config import load_bus
 from .config.model import BusConfig, NodeConfig
-from .exceptions import CanopenError
+from .exceptions import (
+    BootError,
+    BusError,
+    CanopenError,
+    CodecError,
+    ConfigError,
+    DriveError,
+    LifecycleError,
+    LssError,
+    ObjectError,
+    OtherMasterError,
+    SdoAbortError,
+    SdoError,
+    SdoTimeoutError,
+)
 from .standard.drive import DriveState, OperationMode
 
 if TYPE_CHECKING:
@@ -30,20 +44,32 @@ if TYPE_CHECKING:
 
 __all__ = [
     'AxisFeedback',
+    'BootError',
     'BusConfig',
+    'BusError',
     'CanopenDevice',
     'CanopenDrive',
     'CanopenError',
     'CanopenMaster',
+    'CodecError',
+    'ConfigError',
+    'DriveError',
     'DriveState',
     'Event',
     'EventKind',
+    'LifecycleError',
+    'LssError',
     'MasterProcess',
     'MotionSource',
     'NodeConfig',
+    'ObjectError',
     'OperationMode',
+    'OtherMasterError',
     'Refusal',
     'RefusalCause',
+    'SdoAbortError',
+    'SdoError',
+    'SdoTimeoutError',
     'Setpoint',
     'Severity',
     'load_bus',

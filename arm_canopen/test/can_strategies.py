@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from arm_canopen.can.frame import EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
+from arm_canopen.can import EXTENDED_ID_MAX, Frame, STANDARD_ID_MAX
 
 payloads = st.binary(max_size=8)
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from arm_canopen import ConfigError
 from arm_canopen.config import BusConfig, load_bus, Problem
-from arm_canopen.exceptions import ConfigError
 
 ARTICLE_BUS = Path(__file__).parent / 'data' / 'panda' / 'bus.yml'
 TWO_AXES_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_two_axes.eds'

@@ -10,12 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from arm_canopen.config import load_eds
-from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig, SdoWrite
-from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.standard.cob_id import rpdo_default, tpdo_default
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.pdo import MappedObject
+from arm_canopen.config import BusConfig, load_eds, MasterConfig, NodeConfig, PdoConfig, SdoWrite
+from arm_canopen.standard import MappedObject, ObjectDictionary, rpdo_default, tpdo_default
 
 DRIVE_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 PERIOD = 0.01  # [s]

@@ -16,9 +16,9 @@ import can
 from can_addresses import free_virtual
 import pytest
 
+from arm_canopen import BusError
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.adapter import AdapterBus
-from arm_canopen.exceptions import BusError
 
 SLCAN_OPENING = 2.0  # [s] for which the driver of slcan sleeps
 

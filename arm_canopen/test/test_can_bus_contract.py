@@ -16,11 +16,10 @@ from can_addresses import free_multicast, free_virtual
 from can_receiving import DEADLINE, receive_count, unstamped
 import pytest
 
-from arm_canopen.can import Bus, Frame, open_bus
+from arm_canopen import BusError
+from arm_canopen.can import Bus, can_interfaces, Frame, open_bus
 from arm_canopen.can.adapter import AdapterBus
-from arm_canopen.can.interfaces import can_interfaces
 from arm_canopen.can.socket_bus import SocketBus
-from arm_canopen.exceptions import BusError
 
 Open: TypeAlias = Callable[[], Bus]
 VCAN = 'vcan0'

@@ -11,10 +11,8 @@ import threading
 
 import pytest
 
-from arm_canopen.can.bus_thread import BusThread
-from arm_canopen.can.frame import Frame
-from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.exceptions import BusError
+from arm_canopen import BusError
+from arm_canopen.can import BusThread, Frame, VirtualBus, VirtualWire
 
 pytestmark = pytest.mark.slow
 

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import Frame
-from arm_canopen.can.error_frames import error_text
+from arm_canopen.can import error_text, Frame
 
 
 @pytest.mark.parametrize(

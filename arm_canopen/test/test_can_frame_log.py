@@ -20,11 +20,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can import bus, Frame
+from arm_canopen import CodecError
+from arm_canopen.can import bus, Frame, LogWriter, read_buses, read_log
 from arm_canopen.can.adapter import from_message
 from arm_canopen.can.candump_format import log_channel, parse_line, read_lines
-from arm_canopen.can.frame_log import LogWriter, read_buses, read_log
-from arm_canopen.exceptions import CodecError
 
 EXAMPLES = [
     ('(1700000000.123456) can0 181#27060000', Frame(0x181, b'\x27\x06\x00\x00')),

@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import load_bus
-from arm_canopen.can import Frame
-from arm_canopen.can.frame_log import read_log
+from arm_canopen.can import Frame, read_log
 from arm_canopen.can.frame_ring import FrameRing
 from arm_canopen.library.bus_recording import BusRecording
 from black_box import BlackBox, BlackBoxSettings

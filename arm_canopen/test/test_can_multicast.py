@@ -16,10 +16,10 @@ from can_addresses import free_multicast
 from can_receiving import DEADLINE, receive_count, unstamped
 import pytest
 
+from arm_canopen import BusError
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.adapter import from_message, to_message
 from arm_canopen.can.multicast import _is_local, MulticastBus
-from arm_canopen.exceptions import BusError
 
 FRAMES = [
     Frame(0x000, b'\x01\x05'),

@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 import msgpack
 import pytest
 
-from arm_canopen.can import Frame
+from arm_canopen import CodecError
+from arm_canopen.can import Frame, STANDARD_ID_MAX
 from arm_canopen.can.adapter import from_message, to_message
-from arm_canopen.can.frame import STANDARD_ID_MAX
 from arm_canopen.can.multicast_format import decode, encode
-from arm_canopen.exceptions import CodecError
 
 
 def packed(**changes: object) -> bytes:

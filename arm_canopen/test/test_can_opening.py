@@ -13,9 +13,8 @@ import sys
 from can_addresses import free_virtual
 import pytest
 
-from arm_canopen.can import Frame, open_bus, opening, resolve_name
-from arm_canopen.can.interfaces import CanInterface
-from arm_canopen.exceptions import BusError
+from arm_canopen import BusError
+from arm_canopen.can import CanInterface, Frame, open_bus, opening, resolve_name
 
 MULTICAST = f'udp_multicast:239.74.7.2:{43113 + os.getuid() % 10_000}'
 

@@ -20,11 +20,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import CanopenMaster
-from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.can.interfaces import CanInterface, missing_interface_text
+from arm_canopen import BusError, CanopenMaster
+from arm_canopen.can import Bus, CanInterface, Frame, missing_interface_text, open_bus
 from arm_canopen.can.socketcan import failure_text, pack, SocketCanBus, unpack
-from arm_canopen.exceptions import BusError
 
 _numbers = itertools.count()
 

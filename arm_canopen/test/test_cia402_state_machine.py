@@ -8,13 +8,14 @@ from itertools import pairwise
 
 import pytest
 
+from arm_canopen import DriveState
 from arm_canopen.cia402.state_machine import (
     Command,
     fault_reset,
     next_command,
     TARGETS,
 )
-from arm_canopen.standard.drive import drive_state, DriveState
+from arm_canopen.standard import drive_state
 
 S = DriveState
 

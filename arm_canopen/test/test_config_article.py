@@ -8,9 +8,9 @@ import shutil
 from config_samples import ARTICLE_BUS, eds_text
 import pytest
 
+from arm_canopen import DriveState
 from arm_canopen.config import BusConfig, load_bus, PdoConfig, SdoWrite
-from arm_canopen.standard.cob_id import CAN_ID_MASK
-from arm_canopen.standard.drive import DriveState
+from arm_canopen.standard import CAN_ID_MASK
 
 SHIPPED_EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from config_samples import BUS, load_text
 import pytest
 
+from arm_canopen import ConfigError
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
-from arm_canopen.exceptions import ConfigError
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -13,6 +13,7 @@ from config_samples import DRIVE_ROWS, eds_text, load_text, Row
 import pytest
 import yaml
 
+from arm_canopen import ConfigError
 from arm_canopen.config import BusConfig
 from arm_canopen.config.keys import Key, Kind, Use
 from arm_canopen.config.sections import (
@@ -25,7 +26,6 @@ from arm_canopen.config.sections import (
     SECTIONS,
     TPDO_KEYS,
 )
-from arm_canopen.exceptions import ConfigError
 
 PAGE = Path(__file__).parents[1] / 'docs' / 'bus_yml.md'
 TITLES = {

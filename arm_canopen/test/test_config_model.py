@@ -22,14 +22,11 @@ from config_samples import (
 )
 import pytest
 
-from arm_canopen.config import Identity, NodeConfig, PdoConfig
+from arm_canopen import ConfigError, DriveState
+from arm_canopen.config import Identity, load_eds, MasterConfig, NodeConfig, PdoConfig
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.config.read.eds import load_eds
 from arm_canopen.config.sections import DeviceSettings, MasterSettings
-from arm_canopen.exceptions import ConfigError
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.drive import DriveState
+from arm_canopen.standard import DataType
 
 
 @pytest.mark.parametrize(

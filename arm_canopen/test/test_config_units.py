@@ -15,17 +15,15 @@ from drive_samples import (
 )
 import pytest
 
+from arm_canopen import ConfigError, DriveError, OperationMode
 from arm_canopen.cia402.modes import Mode
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.target_limits import check_target
 from arm_canopen.cia402.units import Units
-from arm_canopen.config import check_file
+from arm_canopen.config import check_file, DriveConfig
 from arm_canopen.config.model.checks import check_bus
 from arm_canopen.config.model.checks.drive_units import AxisUnits, rate_units, UnitRule
-from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.exceptions import ConfigError, DriveError
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import Index
 
 JOINT = 'joint1'
 POSITION, VELOCITY, TORQUE = (

@@ -10,8 +10,8 @@ from config_cases import added
 from config_samples import BUS, errors_of, load_text, TWO_AXES_EDS, write_bus
 import pytest
 
+from arm_canopen import DriveState
 from arm_canopen.config import check_file
-from arm_canopen.standard.drive import DriveState
 
 JOINT = 'joint1'
 

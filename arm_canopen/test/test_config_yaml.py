@@ -10,8 +10,8 @@ from config_cases import added
 from config_samples import BUS, errors_of, load_text, write_bus
 import pytest
 
+from arm_canopen import CanopenError, ConfigError
 from arm_canopen.config import load_bus
-from arm_canopen.exceptions import CanopenError, ConfigError
 
 
 @pytest.mark.parametrize(

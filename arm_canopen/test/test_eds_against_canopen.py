@@ -9,8 +9,7 @@ from config_samples import eds_text
 import pytest
 
 from arm_canopen.config import load_eds
-from arm_canopen.standard.datatypes import REAL_FORMATS
-from arm_canopen.standard.dictionary import ObjectEntry
+from arm_canopen.standard import ObjectEntry, REAL_FORMATS
 
 NODE_ID = 5
 SHIPPED = sorted((Path(__file__).parents[1] / 'eds').glob('*.eds'))

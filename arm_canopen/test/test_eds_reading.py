@@ -9,10 +9,10 @@ import textwrap
 from config_samples import DRIVE_ROWS, eds_text
 import pytest
 
+from arm_canopen import ConfigError
 from arm_canopen.config import Eds, load_eds
-from arm_canopen.exceptions import ConfigError
-from arm_canopen.standard.datatypes import DataType, Value
-from arm_canopen.standard.dictionary import AccessType
+from arm_canopen.standard import AccessType, DataType
+from arm_canopen.standard.datatypes import Value
 
 
 def read(folder: Path, text: str | bytes) -> Eds:

@@ -11,15 +11,8 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.config.read.eds_values import EdsValue, parse_integer, parse_value
-from arm_canopen.standard.datatypes import (
-    DataType,
-    decode,
-    encode,
-    integer_range,
-    SIGNED_BITS,
-    UNSIGNED_BITS,
-    Value,
-)
+from arm_canopen.standard import DataType, integer_range, SIGNED_BITS, UNSIGNED_BITS
+from arm_canopen.standard.datatypes import decode, encode, Value
 
 INTEGERS = [*SIGNED_BITS, *UNSIGNED_BITS]
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import pytest
 from urdf_reader import Mimic
 
-from arm_canopen.exceptions import CanopenError
+from arm_canopen import CanopenError
 from arm_canopen.joints.robot_joints import movable_joints, RobotJoint
 
 PARTS = """

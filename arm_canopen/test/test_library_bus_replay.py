@@ -12,11 +12,10 @@ import threading
 from config_samples import BUS, load_text
 import pytest
 
+from arm_canopen import DriveState, Event, EventKind, Severity
 from arm_canopen.can import Frame
 from arm_canopen.library.bus_replay import BusReplay, unknown_scales
-from arm_canopen.master.events import Event, EventKind, Severity
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard import NmtState
 from black_box import LogPlayer
 
 PERIOD = 0.01  # [s] of SYNC

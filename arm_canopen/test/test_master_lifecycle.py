@@ -10,7 +10,7 @@ from lifecycle_msgs.msg import State
 from lifecycle_msgs.msg import Transition as TransitionMessage
 import pytest
 
-from arm_canopen.exceptions import CanopenError, LifecycleError
+from arm_canopen import CanopenError, LifecycleError
 from arm_canopen.master.lifecycle import (
     LifecycleState,
     Managed,

@@ -10,22 +10,15 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.exceptions import CodecError
+from arm_canopen import CodecError
 from arm_canopen.master.object_access import (
     bytes_from_raw,
     number_from_raw,
     raw_from_bytes,
     raw_from_number,
 )
-from arm_canopen.standard.datatypes import (
-    byte_length,
-    DataType,
-    decode,
-    encode,
-    integer_range,
-    SIGNED_BITS,
-)
-from arm_canopen.standard.pdo import MappedObject
+from arm_canopen.standard import byte_length, DataType, integer_range, MappedObject, SIGNED_BITS
+from arm_canopen.standard.datatypes import decode, encode
 
 RAW = st.integers(0, 0xFFFF_FFFF)
 SMALL = [t for t in DataType if (byte_length(t) or 9) <= 4]

@@ -13,16 +13,14 @@ from types import SimpleNamespace
 
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.config.model import BusConfig
-from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.exceptions import BusError
+from arm_canopen import BusError
+from arm_canopen.can import Frame, VirtualBus, VirtualWire
+from arm_canopen.config import BusConfig, MasterConfig
 from arm_canopen.master import runner
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.cob_id import CobId
+from arm_canopen.standard import CobId
 
 TIMEOUT = 10.0  # [s] deadline for what takes milliseconds
 

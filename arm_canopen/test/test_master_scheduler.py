@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.exceptions import SdoError
+from arm_canopen import SdoError
 from arm_canopen.master.scheduler import Promise, Scheduler, Task
 
 Act: TypeAlias = Callable[[Scheduler, Promise[int]], None]

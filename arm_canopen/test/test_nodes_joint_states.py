@@ -20,8 +20,8 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from arm_canopen import CanopenError
 from arm_canopen.cia402.drive_view import DriveView
-from arm_canopen.exceptions import CanopenError
 from arm_canopen.nodes.joint_states import BusJointStates, DriveJointStates
 from arm_canopen.nodes.output_thread import OutputThread
 

@@ -15,15 +15,20 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.config.model import BusConfig
-from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.exceptions import BusError, CanopenError, DriveError
-from arm_canopen.library.canopen_master import CanopenMaster
-from arm_canopen.master.events import Event, EventKind, Severity
+from arm_canopen import (
+    BusError,
+    CanopenError,
+    CanopenMaster,
+    DriveError,
+    Event,
+    EventKind,
+    MasterProcess,
+    Severity,
+)
+from arm_canopen.can import VirtualBus, VirtualWire
+from arm_canopen.config import BusConfig, MasterConfig
 from arm_canopen.master.runner import NetworkThread
 from arm_canopen.nodes import master
-from arm_canopen.nodes.master_process import MasterProcess
 
 DEADLINE = 10.0  # [s] for what takes milliseconds
 CONFIG = BusConfig(Path('bus.yml'), MasterConfig(1, cycle_period=0.005), ())

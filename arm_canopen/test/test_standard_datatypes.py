@@ -9,19 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.datatypes import (
+from arm_canopen import CodecError
+from arm_canopen.standard import (
     bit_length,
     byte_length,
     DataType,
-    decode,
-    encode,
     FIXED_BITS,
     integer_range,
     SIGNED_BITS,
     UNSIGNED_BITS,
-    Value,
 )
+from arm_canopen.standard.datatypes import decode, encode, Value
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN, rpdo_default, tpdo_default
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
+from arm_canopen.standard import (
+    AccessType,
+    DataType,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    ObjectDictionary,
+    ObjectEntry,
+    rpdo_default,
+    tpdo_default,
+)
 
 pytestmark = pytest.mark.slow
 

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from arm_canopen import ObjectError
 from arm_canopen.config import load_eds
-from arm_canopen.exceptions import ObjectError
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.object_path import find_object, object_path
+from arm_canopen.standard import find_object, object_path, ObjectDictionary
 
 EDS = Path(__file__).parents[1] / 'eds' / 'cia402_drive.eds'
 

@@ -9,16 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.datatypes import (
+from arm_canopen import CodecError
+from arm_canopen.standard import (
     DataType,
     FIXED_BITS,
     integer_range,
+    MappedObject,
+    PDO_BITS_MAX,
+    PdoCodec,
     REAL_FORMATS,
     SIGNED_BITS,
 )
-from arm_canopen.standard.objects import PDO_BITS_MAX
-from arm_canopen.standard.pdo import MappedObject, Number, PdoCodec
+from arm_canopen.standard.pdo import Number
 
 pytestmark = pytest.mark.slow
 

@@ -8,24 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.sdo import (
-    Abort,
+from arm_canopen import CodecError
+from arm_canopen.standard import (
+    abort_text,
+    AbortCode,
+    DataType,
     decode_request,
     decode_response,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
-    fitted,
-    Request,
-    Response,
-    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo_abort import abort_text, AbortCode
+from arm_canopen.standard.sdo import Abort, fitted, Request, Response, Segment
 
 INDEX = st.integers(0, 0xFFFF)
 SUBINDEX = st.integers(0, 0xFF)

@@ -12,8 +12,7 @@ from model_robots import ready, robot
 import numpy as np
 from servo_commands import InlineWorker
 
-from arm_canopen import AxisFeedback, MotionSource, Setpoint
-from arm_canopen.standard.drive import DriveState
+from arm_canopen import AxisFeedback, DriveState, MotionSource, Setpoint
 from arm_model import Array, RobotModel
 from arm_servo import MotionCore
 from arm_servo.core.gateway import CommandGateway

@@ -18,9 +18,9 @@ from typing import Any
 
 import canopen
 
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 from arm_canopen.config import load_eds
-from arm_canopen.standard.sdo import DownloadRequest
+from arm_canopen.standard import DownloadRequest
 from canopen_sim import DeviceHost
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'

@@ -26,15 +26,12 @@ import canopen
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.can.plugin import ArmCanopenBus
-from arm_canopen.config import load_eds
-from arm_canopen.config.model import PdoConfig
+from arm_canopen.config import load_eds, PdoConfig
 from arm_canopen.master.process_image import ProcessImage, SyncRound
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.master.sdo_client import SdoClient
-from arm_canopen.standard.objects import is_controlword
-from arm_canopen.standard.pdo import MappedObject
-from canopen_sim.host import DeviceHost
-from canopen_sim.runner import DeviceRunner
+from arm_canopen.standard import is_controlword, MappedObject
+from canopen_sim import DeviceHost, DeviceRunner
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 NODE_ID = 2

@@ -6,14 +6,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 from arm_canopen.config.model.factor_group import FactorGroup
-from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.device_profile import drive_axes, is_drive
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.lss import UNCONFIGURED
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from arm_canopen.standard.objects import AXIS_OFFSET
+from arm_canopen.standard import (
+    AXIS_OFFSET,
+    CobId,
+    drive_axes,
+    is_drive,
+    NmtCommand,
+    NmtState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    ObjectDictionary,
+    UNCONFIGURED,
+)
 from arm_canopen.standard.sdo import Abort
 
 from .drive.drive import Drive

@@ -7,8 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import Enum
 
-from arm_canopen.standard.dictionary import object_address
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard import AbortCode, object_address
 
 DELAY = 0.5  # [s] default: longer than the SDO time-out of most masters
 

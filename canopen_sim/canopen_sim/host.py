@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.lss import UNCONFIGURED
+from arm_canopen.can import Frame
+from arm_canopen.standard import ObjectDictionary, UNCONFIGURED
 
 from .device import Device
 from .drive.rate import INCREMENTS_PER_SECOND, RateUnits

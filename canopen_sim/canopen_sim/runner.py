@@ -10,11 +10,9 @@ import logging
 import time
 from typing import TypeVar
 
-from arm_canopen.can.bus import Bus
-from arm_canopen.can.bus_thread import BusThread
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import BusError
-from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
+from arm_canopen import BusError
+from arm_canopen.can import Bus, BusThread, Frame
+from arm_canopen.standard import CobId, NODE_ID_MAX
 
 from .device import Device
 from .host import DeviceHost

@@ -8,25 +8,25 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveState
+from arm_canopen.can import Frame
 from arm_canopen.config import load_eds
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import drive_state, DriveState
-from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
-from arm_canopen.standard.sdo import (
-    Abort,
+from arm_canopen.standard import (
     decode_response,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
-    Response,
-    Segment,
+    drive_state,
+    nmt_frame,
+    NmtCommand,
+    NmtState,
+    ObjectDictionary,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from canopen_sim.device import Device
-from canopen_sim.drive.drive import Drive
+from arm_canopen.standard.sdo import Abort, Response, Segment
+from canopen_sim import Device, Drive
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 NODE_ID = 5

@@ -24,31 +24,29 @@ import pytest
 
 from arm_canopen import (
     AxisFeedback,
+    BootError,
+    BusError,
     CanopenDrive,
     CanopenMaster,
+    CodecError,
+    DriveError,
     DriveState,
     Event,
     EventKind,
     load_bus,
+    ObjectError,
     open_bus,
     OperationMode,
+    OtherMasterError,
     Refusal,
+    SdoAbortError,
     Severity,
 )
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 from arm_canopen.can.plugin import ArmCanopenBus
-from arm_canopen.exceptions import (
-    BootError,
-    BusError,
-    CodecError,
-    DriveError,
-    ObjectError,
-    OtherMasterError,
-    SdoAbortError,
-)
 from arm_canopen.master import other_master
-from arm_canopen.standard.dictionary import ObjectDictionary
-from canopen_sim.runner import DeviceRunner
+from arm_canopen.standard import ObjectDictionary
+from canopen_sim import DeviceRunner
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 from device_rig import EDS, ENABLE, FAULT_RESET, Rig, SHUTDOWN, SWITCH_ON
 import pytest
 
+from arm_canopen import DriveState
 from arm_canopen.config import load_eds
-from arm_canopen.standard.drive import DriveState
-from canopen_sim.fault import Fault
+from canopen_sim import Fault
 
 FAULTS = [fault for fault in Fault if fault.value.code]
 

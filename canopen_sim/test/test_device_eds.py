@@ -16,7 +16,7 @@ from device_rig import EDS, NODE_ID, Rig
 import pytest
 
 from arm_canopen.config import load_bus, load_eds, NodeConfig
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen.standard import NmtCommand
 from canopen_sim.drive.objects import DriveObjects
 from canopen_sim.objects.object_store import Integer, ObjectStore
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 from device_rig import NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.standard.emcy import Emergency
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen.standard import Emergency, NmtCommand
 from canopen_sim.services.emcy_producer import register_bits
 
 EMCY = 0x080 + NODE_ID

@@ -16,9 +16,9 @@ from isolation import Isolation
 import pytest
 
 from arm_canopen.can import Bus, open_bus
-from arm_canopen.standard.drive import Statusword
-from canopen_sim import DeviceRunner
-from canopen_sim.fault import Fault, FAULTS
+from arm_canopen.standard import Statusword
+from canopen_sim import DeviceRunner, Fault
+from canopen_sim.fault import FAULTS
 
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('arm_msgs')

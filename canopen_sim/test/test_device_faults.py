@@ -7,8 +7,8 @@ from __future__ import annotations
 from device_rig import ENABLE, NODE_ID, Rig, SHUTDOWN, SWITCH_ON
 import pytest
 
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen import DriveState
+from arm_canopen.standard import NmtCommand, NmtState
 
 MODES = (1, 3, 7, 8)
 LOSSES = (NmtCommand.STOP, NmtCommand.RESET_COMMUNICATION)

@@ -7,12 +7,10 @@ from __future__ import annotations
 from device_rig import drive_dictionary, NODE_ID, Rig
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen import DriveState
+from arm_canopen.can import Frame
+from arm_canopen.standard import DataType, NmtCommand, NmtState, ObjectDictionary, ObjectEntry
+from canopen_sim import Fault, FaultInjection
 
 GUARD = 0x700 + NODE_ID
 EMCY = 0x080 + NODE_ID

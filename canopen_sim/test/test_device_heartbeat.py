@@ -9,9 +9,8 @@ from itertools import pairwise
 from device_rig import NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen import DriveState
+from arm_canopen.standard import AbortCode, NmtCommand, NmtState
 
 OWN = 0x700 + NODE_ID
 EMCY = 0x080 + NODE_ID

@@ -13,10 +13,9 @@ from can_addresses import free_multicast, free_virtual
 from device_rig import drive_dictionary
 import pytest
 
+from arm_canopen import BusError
 from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.exceptions import BusError
-from arm_canopen.standard.nmt import NmtState
-from arm_canopen.standard.sdo import DownloadRequest
+from arm_canopen.standard import DownloadRequest, NmtState
 from canopen_sim import DeviceHost, DeviceRunner
 
 ARRIVAL = 10.0  # [s] a deadline, no measure

@@ -7,14 +7,11 @@ from __future__ import annotations
 from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from arm_canopen.standard.sdo import Abort, decode_response, UploadRequest
-from arm_canopen.standard.sdo_abort import AbortCode
-from canopen_sim.device import Device
-from canopen_sim.fault import Fault, FaultInjection
-from canopen_sim.host import DeviceHost
+from arm_canopen import DriveState
+from arm_canopen.can import Frame
+from arm_canopen.standard import AbortCode, decode_response, NmtCommand, NmtState, UploadRequest
+from arm_canopen.standard.sdo import Abort
+from canopen_sim import Device, DeviceHost, Fault, FaultInjection
 
 SDO_ANSWER = 0x580 + NODE_ID
 TPDO1 = 0x180 + NODE_ID

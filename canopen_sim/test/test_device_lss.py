@@ -12,10 +12,9 @@ import canopen
 from device_rig import drive_dictionary, NODE_ID, Rig, with_defaults
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from canopen_sim.fault import Fault, FaultInjection
-from canopen_sim.host import DeviceHost
+from arm_canopen.can import Frame
+from arm_canopen.standard import NmtCommand, NmtState
+from canopen_sim import DeviceHost, Fault, FaultInjection
 
 REQUEST, RESPONSE = 0x7E5, 0x7E4
 IDENTITY = (0x555, 0x1234, 0x10002, 0xCAFE)

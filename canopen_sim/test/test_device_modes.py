@@ -7,9 +7,8 @@ from __future__ import annotations
 from device_rig import drive_dictionary, ENABLE, RefusedError, Rig, with_defaults
 import pytest
 
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.nmt import NmtCommand
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen import OperationMode
+from arm_canopen.standard import AbortCode, NmtCommand
 
 REACHED = 0x400
 LIMIT = 0x800

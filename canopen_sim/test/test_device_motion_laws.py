@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from canopen_sim.fault import Fault
+from canopen_sim import Fault
 
 pytestmark = pytest.mark.slow
 

@@ -7,10 +7,9 @@ from __future__ import annotations
 from device_rig import NODE_ID, Rig
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.nmt import NmtCommand, NmtState
-from canopen_sim.device import Device
+from arm_canopen.can import Frame
+from arm_canopen.standard import NmtCommand, NmtState, ObjectDictionary
+from canopen_sim import Device
 
 PRE, OP, STOP = NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED
 START = NmtCommand.START

@@ -12,10 +12,9 @@ import pytest
 
 from arm_canopen import CanopenError
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard.lss import UNCONFIGURED
-from canopen_sim import simulated_devices
+from arm_canopen.standard import UNCONFIGURED
+from canopen_sim import DeviceRunner, simulated_devices
 from canopen_sim.node_id_check import NodeIdCheck
-from canopen_sim.runner import DeviceRunner
 
 TIMEOUT = 10.0  # [s]
 PANDA = Path(__file__).parents[2] / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'

@@ -7,9 +7,8 @@ from __future__ import annotations
 from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig, with_defaults
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.nmt import NmtCommand
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.can import Frame
+from arm_canopen.standard import AbortCode, NmtCommand
 
 DISABLED = 0x8000_0000
 NO_RTR = 0x4000_0000

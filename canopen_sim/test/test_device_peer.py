@@ -24,7 +24,7 @@ import pytest
 
 from arm_canopen.can import Frame, open_bus
 from arm_canopen.can.plugin import ArmCanopenBus
-from canopen_sim.runner import DeviceRunner
+from canopen_sim import DeviceRunner
 
 pytestmark = pytest.mark.slow
 

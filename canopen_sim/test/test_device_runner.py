@@ -14,10 +14,9 @@ from device_rig import drive_dictionary, NODE_ID, with_defaults
 import pytest
 
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.standard.cob_id import CobId, tpdo_default
-from arm_canopen.standard.nmt import nmt_frame, NmtCommand
-from canopen_sim import runner
-from canopen_sim.runner import DeviceRunner, newest_process_data
+from arm_canopen.standard import CobId, nmt_frame, NmtCommand, tpdo_default
+from canopen_sim import DeviceRunner, runner
+from canopen_sim.runner import newest_process_data
 
 TIMEOUT = 10.0  # [s]
 MASTER_ID = 1

@@ -10,15 +10,13 @@ import struct
 from device_rig import drive_dictionary, with_defaults
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import ConfigError
-from arm_canopen.standard.sdo import DownloadRequest
-from arm_canopen.standard.sdo_abort import AbortCode
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen import ConfigError
+from arm_canopen.can import Frame
+from arm_canopen.standard import AbortCode, DownloadRequest
+from canopen_sim import DeviceHost, Fault, FaultInjection
 from canopen_sim.faults.scenario import ScenarioPlayer, Step
 from canopen_sim.faults.scenario_file import load_scenario
 from canopen_sim.faults.text import parse_fault, split_settings
-from canopen_sim.host import DeviceHost
 
 DEVICES = {'joint1': 2, 'joint2': 3}
 EXAMPLES = sorted((Path(__file__).parents[1] / 'scenarios').glob('*.yaml'))

@@ -11,9 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, ObjectDictionary, ObjectEntry
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard import AbortCode, AccessType, DataType, ObjectDictionary, ObjectEntry
 
 STRING = 0x2000
 BIG = 0x2001

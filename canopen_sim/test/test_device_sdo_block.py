@@ -12,12 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import COB_ID_INVALID
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.sdo import decode_response, UploadRequest, UploadResponse
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AbortCode,
+    COB_ID_INVALID,
+    DataType,
+    decode_response,
+    ObjectDictionary,
+    ObjectEntry,
+    UploadRequest,
+    UploadResponse,
+)
 
 FILE = 0x2100
 FILE_NAME = struct.pack('<HB', FILE, 0)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
+from canopen_sim import ServoModel
 from canopen_sim.drive.axis import Axis
 from canopen_sim.drive.profile import (
     Limits,
@@ -20,7 +21,7 @@ from canopen_sim.drive.profile import (
     Point,
     Segment,
 )
-from canopen_sim.drive.servo import Servo, ServoModel
+from canopen_sim.drive.servo import Servo
 
 MODEL = ServoModel(lag=0.004, coasting=0.03)
 

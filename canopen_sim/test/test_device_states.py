@@ -17,9 +17,8 @@ from device_rig import (
 )
 import pytest
 
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import drive_state
-from arm_canopen.standard.drive import DriveState as State
+from arm_canopen import DriveState as State
+from arm_canopen.standard import drive_state, ObjectDictionary
 from canopen_sim.drive.states import decode_command, DriveCommand
 
 pytestmark = pytest.mark.slow

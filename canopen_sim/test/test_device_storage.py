@@ -10,13 +10,15 @@ from pathlib import Path
 from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.standard.cob_id import COB_ID_INVALID
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.nmt import NmtCommand
-from arm_canopen.standard.sdo_abort import AbortCode
-from canopen_sim.device import Device
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.standard import (
+    AbortCode,
+    COB_ID_INVALID,
+    DataType,
+    NmtCommand,
+    ObjectDictionary,
+    ObjectEntry,
+)
+from canopen_sim import Device, Fault, FaultInjection
 from canopen_sim.objects.parameter_memory import ParameterFile, ParameterMemory
 from canopen_sim.objects.parameter_storage import LOAD, SAVE
 

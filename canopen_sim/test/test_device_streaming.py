@@ -11,8 +11,8 @@ import random
 from device_rig import ENABLE, Rig
 import pytest
 
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen import DriveState
+from arm_canopen.standard import NmtCommand
 
 REACHED = 0x400
 LIMIT = 0x800

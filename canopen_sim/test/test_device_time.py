@@ -10,9 +10,7 @@ import struct
 from device_rig import drive_dictionary, NODE_ID, RefusedError, Rig
 import pytest
 
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
 
 NOON = datetime(2026, 11, 21, 12, 0, 0, 500_000, tzinfo=timezone.utc)
 

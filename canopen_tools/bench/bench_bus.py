@@ -25,12 +25,10 @@ import warnings
 
 import can
 
-from arm_canopen.can import Frame, open_bus
-from arm_canopen.can.frame_log import LogWriter
-from arm_canopen.can.interfaces import can_interfaces
+from arm_canopen import BusError
+from arm_canopen.can import can_interfaces, Frame, LogWriter, open_bus
 from arm_canopen.can.load import BusLoad
 from arm_canopen.can.multicast_format import decode, encode
-from arm_canopen.exceptions import BusError
 from canopen_tools.monitor import FrameDescriber
 
 FRAMES = 20_000

@@ -22,12 +22,9 @@ import sys
 from time import monotonic
 from types import FrameType
 
-from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.can.bus import wall_clock_offset
-from arm_canopen.can.frame_log import LogWriter, read_buses
-from arm_canopen.config import load_bus
-from arm_canopen.config.model import BusConfig
-from arm_canopen.exceptions import CanopenError, CodecError
+from arm_canopen import CanopenError, CodecError
+from arm_canopen.can import Bus, Frame, LogWriter, open_bus, read_buses, wall_clock_offset
+from arm_canopen.config import BusConfig, load_bus
 
 from .monitor import FrameDescriber, FrameFilter
 from .monitor.line_format import LineFormat, TimeStyle

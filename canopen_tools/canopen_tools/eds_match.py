@@ -7,11 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from arm_canopen.config.model.identity import Identity
-from arm_canopen.config.read.eds import Eds
-from arm_canopen.exceptions import CanopenError
-from arm_canopen.standard.device_profile import PROFILE_MASK, profile_number
-from arm_canopen.standard.objects import Index
+from arm_canopen import CanopenError
+from arm_canopen.config import Eds, Identity
+from arm_canopen.standard import Index, PROFILE_MASK, profile_number
 
 MAJOR_SHIFT = 16  # of 0x1018:03: above it is the revision of the behaviour (CiA 301, 7.5.2.19)
 

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import LssError
+from arm_canopen import LssError
+from arm_canopen.can import Frame
 from arm_canopen.master import Scheduler
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.lss import (
+from arm_canopen.standard import (
     ADDRESS_BITS,
     BIT_RATES,
     decode_lss,
@@ -27,6 +26,8 @@ from arm_canopen.standard.lss import (
     LssCommand,
     LssMessage,
     LssState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
     STANDARD_TABLE,
     UNCONFIGURED,
 )

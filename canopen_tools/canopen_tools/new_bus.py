@@ -12,16 +12,24 @@ from dataclasses import dataclass
 from itertools import groupby
 import json
 
+from arm_canopen import OperationMode
 from arm_canopen.config.model.factor_group import FACTOR_OBJECTS
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.resolve.pdo_mapping import is_fixed, mapping_slots
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.datatypes import bit_length
-from arm_canopen.standard.device_profile import drive_axes, profile_number
-from arm_canopen.standard.dictionary import object_address, ObjectEntry
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.objects import AXIS_OFFSET, Index, PDO_BITS_MAX
-from arm_canopen.standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
+from arm_canopen.standard import (
+    AXIS_OFFSET,
+    bit_length,
+    CYCLIC_MODES,
+    drive_axes,
+    Index,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    object_address,
+    ObjectEntry,
+    PDO_BITS_MAX,
+    profile_number,
+    TARGET_OBJECTS,
+)
 
 from .new_device import (
     contradiction,

@@ -8,14 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 import math
 
+from arm_canopen import CanopenError, OperationMode
+from arm_canopen.config import Eds
 from arm_canopen.config.model.checks.drive_units import is_coarse
 from arm_canopen.config.model.factor_group import FACTOR_OBJECTS, FactorGroup, UNSET
 from arm_canopen.config.model.si_unit import NamedUnit, position_unit, RPM
-from arm_canopen.config.read.eds import Eds
-from arm_canopen.exceptions import CanopenError
-from arm_canopen.standard.device_profile import is_drive
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import Index, is_drive
 
 TURN = 2.0 * math.pi
 """A turn in [rad]."""

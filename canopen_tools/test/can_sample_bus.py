@@ -6,11 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
-from arm_canopen.config.model.master import MasterConfig
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.pdo import MappedObject
+from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
+from arm_canopen.standard import DataType, MappedObject, ObjectDictionary, ObjectEntry
 
 DRIVE_OBJECTS = ObjectDictionary(
     [

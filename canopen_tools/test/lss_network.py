@@ -11,10 +11,10 @@ from typing import Any, TypeVar
 
 from device_rig import drive_dictionary, with_defaults
 
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 from arm_canopen.master import Promise, Scheduler
-from arm_canopen.standard.lss import LssAddress, UNCONFIGURED
-from canopen_sim.host import DeviceHost
+from arm_canopen.standard import LssAddress, UNCONFIGURED
+from canopen_sim import DeviceHost
 from canopen_tools.lss_master import LssMaster
 
 T = TypeVar('T')

@@ -10,7 +10,7 @@ from drive_samples import bus_config, drive_config, sdo_write, with_defaults
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig
+from arm_canopen.config import Identity, NodeConfig
 from arm_canopen.config.model.boot_plan import (
     boot_writes,
     BootWrite,
@@ -19,7 +19,6 @@ from arm_canopen.config.model.boot_plan import (
     HeldConsumers,
     WATCH_KEY,
 )
-from arm_canopen.config.model.identity import Identity
 from arm_canopen.master.configuration import Configurator, PDO_OBJECTS
 from canopen_tools.cli.diff import expected_defaults, expected_objects
 from canopen_tools.dcf.concise import device_writes

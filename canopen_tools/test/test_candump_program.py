@@ -18,9 +18,8 @@ from config_samples import write_bus
 import pytest
 from tool_environment import ENVIRONMENT
 
-from arm_canopen.can import Bus, Frame, open_bus
-from arm_canopen.can.frame_log import LogWriter, read_log
-from arm_canopen.exceptions import BusError
+from arm_canopen import BusError
+from arm_canopen.can import Bus, Frame, LogWriter, open_bus, read_log
 from canopen_tools import candump
 
 pytestmark = pytest.mark.slow

@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.can import Frame
-from arm_canopen.standard.sdo import (
+from arm_canopen.standard import (
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
-    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
+from arm_canopen.standard.sdo import Segment
 from canopen_tools.monitor import FrameDescriber
 from canopen_tools.monitor.object_names import ObjectNames
 from canopen_tools.monitor.sdo_follower import SdoFollower

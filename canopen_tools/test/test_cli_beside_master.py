@@ -15,13 +15,12 @@ from config_samples import ARTICLE_BUS
 from device_rig import EDS
 import pytest
 
+from arm_canopen import Event, EventKind, SdoError, Severity
 from arm_canopen.can import open_bus
 from arm_canopen.config import load_bus
-from arm_canopen.exceptions import SdoError
-from arm_canopen.master.events import Event, EventKind, Severity
 from arm_canopen.master.network import Network
 from arm_canopen.master.runner import NetworkThread
-from canopen_sim.runner import DeviceRunner
+from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 
 DEADLINE = 20.0  # [s]

@@ -17,8 +17,7 @@ import pytest
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.config import load_eds
-from canopen_sim.fault import Fault, FaultInjection
-from canopen_sim.runner import DeviceRunner
+from canopen_sim import DeviceRunner, Fault, FaultInjection
 from canopen_tools.cli.main import main
 
 pytestmark = pytest.mark.slow

@@ -12,8 +12,8 @@ from config_samples import eds_text, load_text, write_bus
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen.config import BusConfig, load_bus, load_eds
-from arm_canopen.config.model import SdoWrite
+from arm_canopen.config import BusConfig, load_bus, load_eds, SdoWrite
+from canopen_tools import lint_eds
 from canopen_tools.cli.diff import expected_objects
 from canopen_tools.cli.main import main
 from canopen_tools.dcf.concise import (
@@ -22,7 +22,6 @@ from canopen_tools.dcf.concise import (
     master_writes,
 )
 from canopen_tools.dcf.master import master_dcf
-from canopen_tools.eds_lint.lint import lint_eds
 
 PANDA = REPOSITORY / 'arm_bringup' / 'robots' / 'panda' / 'bus.yml'
 

@@ -19,9 +19,8 @@ from hypothesis import strategies as st
 import pytest
 from tool_environment import REPOSITORY
 
-from arm_canopen import CanopenMaster, load_bus
+from arm_canopen import CanopenMaster, load_bus, OperationMode
 from arm_canopen.config import check_file
-from arm_canopen.standard.drive import OperationMode
 from canopen_sim import simulated_devices
 from canopen_tools.cli.main import main
 

@@ -11,10 +11,9 @@ from drive_samples import bus_config
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config import BusConfig, load_bus
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.dictionary import ObjectDictionary
+from arm_canopen import Severity
+from arm_canopen.config import BusConfig, load_bus, NodeConfig
+from arm_canopen.standard import ObjectDictionary
 from canopen_tools.cli.diff import expected_objects
 from canopen_tools.dcf.concise import device_writes
 

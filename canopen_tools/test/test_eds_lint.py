@@ -15,8 +15,8 @@ from config_samples import DRIVE_ROWS, eds_text, write_bus
 import pytest
 from tool_environment import REPOSITORY
 
+from canopen_tools import EdsReport, lint_eds
 from canopen_tools.cli.main import main
-from canopen_tools.eds_lint.lint import EdsReport, lint_eds
 
 pytestmark = pytest.mark.slow
 

@@ -11,11 +11,11 @@ from config_samples import DRIVE_ROWS, eds_text, Row
 from device_rig import Rig
 import pytest
 
+from arm_canopen.config import load_eds
 from arm_canopen.config.findings import Findings
-from arm_canopen.config.read.eds import load_eds
 from arm_canopen.config.resolve.parameter_values import parameter_writes
-from arm_canopen.standard.device_profile import is_drive
-from canopen_tools.eds_lint.lint import EdsReport, lint_eds
+from arm_canopen.standard import is_drive
+from canopen_tools import EdsReport, lint_eds
 
 COMMON_ROWS = tuple(
     replace(row, default='5') if 0x1400 <= row.index < 0x1600 and not row.subindex else row

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen.can import Frame
-from arm_canopen.standard.lss import (
+from arm_canopen.standard import (
     BIT_RATES,
     decode_lss,
     fast_scan,

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from lss_network import LssNetwork
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import LssError
+from arm_canopen import LssError
+from arm_canopen.can import Frame
 from arm_canopen.master import Scheduler
-from arm_canopen.standard.lss import (
+from arm_canopen.standard import (
     BIT_RATES,
     lss_bytes,
     LSS_RESPONSE,

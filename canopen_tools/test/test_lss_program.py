@@ -15,8 +15,8 @@ import pytest
 
 from arm_canopen.can import Bus, Frame, open_bus
 from arm_canopen.config import load_eds
-from arm_canopen.standard.lss import LssState
-from canopen_sim.runner import DeviceRunner
+from arm_canopen.standard import LssState
+from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main
 
 pytestmark = pytest.mark.slow

@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import CanopenMaster, load_bus, open_bus
-from arm_canopen.config import load_eds
-from arm_canopen.config.model.identity import Identity
+from arm_canopen.config import Identity, load_eds
 from arm_canopen.config.model.si_unit import position_unit, POSITIONS, TIMES, velocity_unit
 from canopen_sim import DeviceRunner
 from canopen_tools.cli.main import main

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.standard.nmt import ConsumerHeartbeatTime
+from arm_canopen.standard import ConsumerHeartbeatTime
 from canopen_tools.monitor.value_text import value_text
 
 

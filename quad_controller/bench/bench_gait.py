@@ -13,17 +13,19 @@ from collections.abc import Callable
 import math
 from time import perf_counter
 
-from quad_controller import find_policy
+from quad_controller import (
+    Controller,
+    find_policy,
+    GaitGenerator,
+    GaitParameters,
+    load_policy,
+    PolicyOptions,
+    ServoModel,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.gait.body import UPRIGHT
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.servo_compensation import ServoModel
-from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.interface import PolicyInputs
-from quad_controller.policy.load import load_policy
-from quad_controller.policy.options import PolicyOptions
-from quad_controller.states.controller import Controller
-from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, JointSample, quadruped, robot_urdf, RobotState
 
 STEPS = 5000

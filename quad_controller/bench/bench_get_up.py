@@ -22,11 +22,8 @@ import os
 
 import numpy as np
 
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.states.controller import Controller
+from quad_controller import Controller, GaitParameters, State, StateParameters
 from quad_controller.states.get_up_poses import Lying, lying_on
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
 from quad_description import quadruped, robot_urdf
 from quad_description.rotations import down_in_body, normalized, Quaternion
 from quad_sim.physics import PhysicsBackend, Robot, Variation

@@ -8,12 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
+from quad_controller.gait.velocity import REST
 from quad_controller.policy.interface import Policy
-from quad_controller.states.controller import Controller
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
 from quad_description import Quadruped, quadruped, robot_urdf, RobotState
 from quad_sim.physics import PhysicsBackend, Robot
 

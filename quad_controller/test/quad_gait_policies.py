@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 from policy_export import export, Layers
 
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
+from quad_controller import GaitGenerator, GaitParameters
 from quad_controller.policy.contract.model import RecurrentState
 from quad_controller.policy.network import FLOAT, Floats, Port
 from quad_gait_rig import ROBOT

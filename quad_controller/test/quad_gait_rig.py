@@ -8,12 +8,8 @@ from dataclasses import replace
 import math
 
 from quad_builds import Build, urdf
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
+from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
-from quad_controller.states.controller import Controller
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, JointSample, quadruped, RobotState, Targets
 
 PERIOD = 0.02  # [s]

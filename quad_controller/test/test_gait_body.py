@@ -13,14 +13,20 @@ import numpy as np
 import pytest
 
 from quad_builds import urdf
-from quad_controller.exceptions import ParameterError
-from quad_controller.gait.body import BodyLimits, BodyPose, feet_in_body, Leveller, UPRIGHT
-from quad_controller.gait.generator import GaitGenerator, HeadingHold
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.schedule import Gait
-from quad_controller.gait.servo_compensation import ServoCompensation, ServoModel
+from quad_controller import (
+    BodyPose,
+    Gait,
+    GaitGenerator,
+    GaitParameters,
+    ParameterError,
+    ServoModel,
+    Velocity,
+)
+from quad_controller.gait.body import BodyLimits, feet_in_body, Leveller, UPRIGHT
+from quad_controller.gait.generator import HeadingHold
+from quad_controller.gait.servo_compensation import ServoCompensation
 from quad_controller.gait.stepping import Stepper
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.gait.velocity import REST
 from quad_description import quadruped
 from quad_description.rotations import Vector
 

@@ -13,18 +13,24 @@ import onnx
 import pytest
 import yaml
 
-from quad_controller import Controller, GaitParameters, StateParameters
+from quad_controller import (
+    Controller,
+    GaitParameters,
+    load_policy,
+    PolicyError,
+    PolicyOptions,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.attach_contract import run
-from quad_controller.exceptions import PolicyError
-from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.document import document_of, flatten, read_yaml
 from quad_controller.policy.contract.files import read_contract_file
 from quad_controller.policy.contract.model import RecurrentState
 from quad_controller.policy.interface import PolicyInputs
-from quad_controller.policy.load import load_policy, LoadedPolicy
+from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.options import GravitySource, PolicyOptions
+from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import normalized
 from quad_gait_policies import STAND

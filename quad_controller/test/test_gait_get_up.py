@@ -12,12 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.states.controller import Controller
+from quad_controller import Controller, GaitParameters, State, StateParameters
 from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES
 from quad_controller.states.get_up_poses import Lying, lying_on, RECOVERIES, Stage
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
 from quad_description.rotations import about, from_roll_pitch_yaw, Quaternion, rotate
 from quad_gait_policies import STAND

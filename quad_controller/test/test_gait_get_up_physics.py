@@ -12,10 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.states.controller import Controller
+from quad_controller import Controller, GaitParameters, StateParameters
 from quad_controller.states.get_up_poses import Lying, RECOVERIES, Stage
-from quad_controller.states.parameters import StateParameters
 from quad_description import LEGS
 from quad_sim.physics import Robot
 

@@ -10,12 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
+from quad_controller import Gait, GaitGenerator, GaitParameters, Velocity
 from quad_controller.gait.body import UPRIGHT
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.schedule import Gait, SCHEDULES
+from quad_controller.gait.schedule import SCHEDULES
 from quad_controller.gait.stepping import SwingLift
-from quad_controller.gait.velocity import Velocity
 from quad_gait_rig import ROBOT
 
 PERIOD = 0.02  # [s]

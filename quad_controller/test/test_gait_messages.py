@@ -19,16 +19,13 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import BatteryState, Imu, JointState
 
 from message_templates import FastReader
-from quad_controller.gait.parameters import GaitParameters
+from quad_controller import Controller, GaitParameters, Output, StateParameters
 from quad_controller.nodes.control_loop import ControlLoop
 from quad_controller.nodes.diagnostics import state_diagnostic
 from quad_controller.nodes.joint_reader import CommandFilter, JointReader
 from quad_controller.nodes.messages import body_pose, charge, IMU_NUMBERS, imu_sample
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
-from quad_controller.states.controller import Controller
-from quad_controller.states.parameters import StateParameters
-from quad_controller.states.status import Output
 from quad_description import ImuSample, JointSample, Targets
 from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 

@@ -25,8 +25,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
 from node_runner import LATCHED, ParameterError
-from quad_controller import replay_policy
-from quad_controller.exceptions import QuadControllerError
+from quad_controller import QuadControllerError, replay_policy
 from quad_controller.nodes.controller_node import ControllerNode
 from quad_description import DescriptionError, quadruped, robot_urdf
 from quad_description.rotations import about, IDENTITY, Quaternion

@@ -10,12 +10,15 @@ import math
 
 import pytest
 
-from quad_controller.gait.body import BodyPose
-from quad_controller.gait.parameters import AS_TUNED, GaitParameters, LOW_AND_WIDE
-from quad_controller.gait.servo_compensation import ServoModel
-from quad_controller.gait.velocity import Velocity
-from quad_controller.states.controller import Controller
-from quad_controller.states.parameters import StateParameters
+from quad_controller import (
+    BodyPose,
+    Controller,
+    GaitParameters,
+    ServoModel,
+    StateParameters,
+    Velocity,
+)
+from quad_controller.gait.parameters import AS_TUNED, LOW_AND_WIDE
 from quad_description import Backend, quadruped, RecordedBackend, robot_urdf, RobotState, Targets
 from quad_description.rotations import about_z, multiply, roll_pitch_yaw
 from quad_gait_physics import MODEL, PhysicsRig

@@ -14,17 +14,23 @@ import numpy as np
 from policy_export import export, Layers
 import pytest
 
-from quad_controller import find_policy
-from quad_controller.exceptions import ParameterError, PolicyError
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller import (
+    find_policy,
+    GaitGenerator,
+    GaitParameters,
+    load_policy,
+    ParameterError,
+    PolicyError,
+    PolicyOptions,
+    Velocity,
+)
+from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.mjlab import VENDOR
 from quad_controller.policy.interface import PolicyInputs
-from quad_controller.policy.load import load_policy, LoadedPolicy, validate_policy
+from quad_controller.policy.load import LoadedPolicy, validate_policy
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.observation import gravity
-from quad_controller.policy.options import GravitySource, ImuFrame, PolicyOptions
+from quad_controller.policy.options import GravitySource, ImuFrame
 from quad_description import ImuSample, JointSample
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, joined, metadata, STAND, TERMS, write_policy

@@ -14,24 +14,28 @@ import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
 
-from quad_controller import replay_policy
-from quad_controller.exceptions import ParameterError, PolicyError
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
+from quad_controller import (
+    Controller,
+    find_policy,
+    GaitGenerator,
+    GaitParameters,
+    load_policy,
+    Output,
+    ParameterError,
+    PolicyError,
+    PolicyOptions,
+    replay_policy,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.policy import onnx_file
-from quad_controller.policy.load import load_policy
-from quad_controller.policy.options import GravitySource, PolicyOptions
+from quad_controller.policy.options import GravitySource
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy.shipped import find_policy
 from quad_controller.policy.statistics import ObservationStatistics, STATISTICS_KEY
 from quad_controller.recording.recorder import Recorder, TOPIC
 from quad_controller.recording.replay import feed, read_recording, statistics_of
 from quad_controller.recording.run import PolicyRun
 from quad_controller.recording.step import definition, FIELDS, pack, record_of, StepTiming, unpack
-from quad_controller.states.controller import Controller
-from quad_controller.states.parameters import StateParameters
-from quad_controller.states.status import Output
 from quad_description import JointSample, robot_urdf, RobotState
 from quad_gait_physics import MODEL
 from quad_gait_rig import PERIOD, ROBOT, STANDING, UPRIGHT

@@ -11,14 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.exceptions import ParameterError
-from quad_controller.gait.body import BodyPose
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
-from quad_controller.states.controller import Controller
-from quad_controller.states.modes import Answer, Fault, MODES, State
-from quad_controller.states.parameters import StateParameters
+from quad_controller import (
+    Answer,
+    BodyPose,
+    Controller,
+    GaitGenerator,
+    GaitParameters,
+    MODES,
+    ParameterError,
+    State,
+    StateParameters,
+    Velocity,
+)
+from quad_controller.states.modes import Fault
 from quad_description import (
     DescriptionError,
     ImuSample,

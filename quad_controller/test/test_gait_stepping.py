@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 from quad_builds import urdf
+from quad_controller import Gait, GaitGenerator, GaitParameters, Velocity
 from quad_controller.gait.body import UPRIGHT
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.schedule import Gait, SCHEDULES
+from quad_controller.gait.schedule import SCHEDULES
 from quad_controller.gait.stepping import hermite, Stepper
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.gait.velocity import REST
 from quad_description import quadruped
 
 pytestmark = pytest.mark.slow

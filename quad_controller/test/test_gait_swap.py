@@ -8,17 +8,19 @@ from dataclasses import replace
 
 import pytest
 
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
+from quad_controller import (
+    Controller,
+    find_policy,
+    GaitGenerator,
+    GaitParameters,
+    load_policy,
+    PolicyOptions,
+    State,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
-from quad_controller.policy.load import load_policy
-from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy.shipped import find_policy
-from quad_controller.states.controller import Controller
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted

@@ -26,22 +26,24 @@ from progress import Progress
 import pytest
 from trained_contract import contract_of, metadata_of, PERIOD
 
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
+from quad_controller import (
+    Controller,
+    GaitGenerator,
+    GaitParameters,
+    PolicyOptions,
+    StateParameters,
+    Velocity,
+)
 from quad_controller.policy.check import check_contract
 from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.declared import read_declared
 from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.policy_check.conditions import Conditions
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.trial import Candidate
-from quad_controller.states.controller import Controller
-from quad_controller.states.parameters import StateParameters
 from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_policies import FakeNetwork, random_layers

@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
+from quad_controller import find_policy, Velocity
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.velocity import REST, Velocity
+from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.model import CommandRanges, Gains
 from quad_controller.policy.gains import gain_rows, ServoResponse
-from quad_controller.policy.shipped import find_policy
 from quad_controller.policy_check.arenas import (
     PatientBackend,
     PhysicsArena,
@@ -54,7 +54,7 @@ from quad_controller.policy_check.walk import WalkingRobot
 from quad_description import RecordedBackend, RobotState
 from quad_gait_policies import joined, metadata, write_policy
 from quad_gait_rig import ROBOT
-from quad_hardware.exceptions import NoAnswerError
+from quad_hardware import NoAnswerError
 from quad_sim import CommandTiming
 from quad_sim.physics import Metered
 

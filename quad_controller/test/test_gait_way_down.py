@@ -11,12 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.gait.generator import GaitGenerator
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.velocity import Velocity
-from quad_controller.states.controller import Controller
-from quad_controller.states.modes import State
-from quad_controller.states.parameters import StateParameters
+from quad_controller import (
+    Controller,
+    GaitGenerator,
+    GaitParameters,
+    State,
+    StateParameters,
+    Velocity,
+)
 from quad_description import ImuSample
 from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted, UPRIGHT
 

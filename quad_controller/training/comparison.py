@@ -10,8 +10,8 @@ import shutil
 
 from progress import Progress
 
+from quad_controller import Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.velocity import Velocity
 from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.main import run as check_policy

@@ -23,12 +23,11 @@ from trained_contract import (
     walking_values,
 )
 
+from quad_controller import PolicyOptions, Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.gait.velocity import Velocity
 from quad_controller.policy.contract.model import PolicyContract, RecurrentState, Source
 from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.network import Floats, Port
-from quad_controller.policy.options import PolicyOptions
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets

@@ -6,11 +6,9 @@ from __future__ import annotations
 
 import math
 
-from quad_controller.gait.body import BodyPose, feet_in_body
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.schedule import Gait
+from quad_controller import BodyPose, Gait, GaitParameters, Velocity
+from quad_controller.gait.body import feet_in_body
 from quad_controller.gait.stepping import arc, hermite, SwingLift
-from quad_controller.gait.velocity import Velocity
 from quad_description import Quadruped, Targets
 from quad_description.rotations import Vector
 

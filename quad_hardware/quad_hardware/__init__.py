@@ -6,4 +6,23 @@ Conventions: ``now`` and all times are on the steady clock in [s], unless they a
 servo angles are in [deg] by motor id on the side of the board, joints in [rad] elsewhere.
 """
 
+from .exceptions import (
+    CodecError,
+    CommandError,
+    HardwareError,
+    LinkError,
+    NoAnswerError,
+    RecordingError,
+)
+
+__all__ = [
+    'CodecError',
+    'CommandError',
+    'HardwareError',
+    'LinkError',
+    'NoAnswerError',
+    'RecordingError',
+]
+
+
 __version__ = '0.1.0'

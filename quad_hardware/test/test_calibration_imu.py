@@ -28,14 +28,13 @@ from quad_description.rotations import (
     Vector,
     yaw_of,
 )
+from quad_hardware import CommandError
 from quad_hardware.calibration.imu import find_mounting, Readings, Stance
 from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import imu_parameters, read_parameters
 from quad_hardware.calibration.robot import ImuReading
-from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
+from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting
 from quad_hardware.estimation.filters import STANDARD_GRAVITY
-from quad_hardware.estimation.imu_mounting import ImuMounting
-from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS, V1
 from quad_hardware.report import Report

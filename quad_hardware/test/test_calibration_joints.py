@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from quad_calibration_script import Script
+from quad_hardware import CommandError
 from quad_hardware.calibration import robot
 from quad_hardware.calibration.main import run_calibrate
 from quad_hardware.calibration.parameter_file import read_parameters, write_parameters
@@ -25,7 +26,6 @@ from quad_hardware.calibration.wizard import (
     with_direction,
     with_limits,
 )
-from quad_hardware.exceptions import CommandError
 from quad_hardware.joints import JointServo
 from quad_hardware.protocol import Protocol, V1, V2
 from quad_pty_peer import PtyPeer

@@ -25,22 +25,23 @@ from quad_description.rotations import (
     rotate,
     Vector,
 )
-from quad_hardware.estimation import Estimator, EstimatorSettings, ImuMounting, RateSource
+from quad_hardware.estimation import (
+    Battery,
+    BoardWatch,
+    Estimator,
+    EstimatorSettings,
+    ImuMounting,
+    RateSource,
+)
 from quad_hardware.estimation.filters import (
     AttitudeRate,
-    Battery,
     BatteryFilter,
     CHARGE_REPORTS,
     gravity_from_acceleration,
     GravityCheck,
     JointRate,
 )
-from quad_hardware.estimation.plausibility import (
-    BoardWatch,
-    MAX_REFUSALS,
-    Plausibility,
-    SampleClock,
-)
+from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility, SampleClock
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import DEVICE_TIME_WRAP, Report

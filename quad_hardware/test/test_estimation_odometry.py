@@ -15,14 +15,9 @@ import pytest
 
 from quad_description import FootPose, movable_joints, quadruped, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, IDENTITY, yaw_of
-from quad_hardware.estimation import Estimator, EstimatorSettings
-from quad_hardware.estimation.odometry import (
-    ContactSource,
-    ground_normal,
-    LegOdometry,
-    OdometrySettings,
-)
-from quad_hardware.exceptions import CommandError
+from quad_hardware import CommandError
+from quad_hardware.estimation import Estimator, EstimatorSettings, OdometrySettings
+from quad_hardware.estimation.odometry import ContactSource, ground_normal, LegOdometry
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import Report

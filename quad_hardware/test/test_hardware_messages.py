@@ -31,8 +31,7 @@ from quad_description.rotations import (
     yaw_of,
 )
 from quad_description.rotations import Quaternion as Rotation
-from quad_hardware.estimation import Battery, Health, OdometryState
-from quad_hardware.estimation.estimator import Estimator, EstimatorSettings
+from quad_hardware.estimation import Battery, Estimator, EstimatorSettings, Health, OdometryState
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
 from quad_hardware.estimation.odometry import ContactSource
 from quad_hardware.joints import CommandCounters, JointMap, servo_of

@@ -12,7 +12,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from node_runner import ParameterError
-from quad_hardware.exceptions import HardwareError
+from quad_hardware import HardwareError
 from quad_hardware.nodes.parameters import declare_parameters, NodeSettings
 
 WRONG = {

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.exceptions import CommandError
+from quad_hardware import CommandError
 from quad_hardware.joints import CommandLimiter, JointMap, LimiterSettings, servo_of
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))

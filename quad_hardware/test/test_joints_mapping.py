@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, robot_urdf
-from quad_hardware.exceptions import CommandError
+from quad_hardware import CommandError
 from quad_hardware.joints import JointMap, JointServo, servo_of
 from quad_hardware.link.v1_dialect import V1Dialect
 from quad_hardware.link.v2_dialect import V2Dialect

@@ -14,9 +14,8 @@ from typing import Any
 import pytest
 import serial
 
-from quad_hardware.exceptions import LinkError
-from quad_hardware.link import Driver, LinkOptions, LinkState, SerialPort
-from quad_hardware.link.dialect import Dialect
+from quad_hardware import LinkError
+from quad_hardware.link import Dialect, Driver, LinkOptions, LinkState, SerialPort
 from quad_hardware.link.v1_dialect import V1Dialect
 from quad_hardware.link.v2_dialect import V2Dialect
 from quad_hardware.protocol import Code, Frame, Kind, LEG_MOTORS, Protocol, V1, V2

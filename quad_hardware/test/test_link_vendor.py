@@ -15,7 +15,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from xgo_lib2 import feedback
 
-from quad_hardware.exceptions import CommandError, LinkError
+from quad_hardware import CommandError, LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState
 from quad_hardware.link.session import open_session
 from quad_hardware.nodes import parameters

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_hardware.exceptions import CodecError
+from quad_hardware import CodecError
 from quad_hardware.protocol import (
     ACTION_RESET,
     Code,

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from quad_hardware.exceptions import CodecError
+from quad_hardware import CodecError
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,

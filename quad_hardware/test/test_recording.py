@@ -15,7 +15,7 @@ import pytest
 
 from quad_description import ImuSample, RobotState
 from quad_description.rotations import from_roll_pitch_yaw
-from quad_hardware.exceptions import LinkError, RecordingError
+from quad_hardware import LinkError, RecordingError
 from quad_hardware.link import LinkState
 from quad_hardware.protocol import Fault, Model
 from quad_hardware.recording import (

@@ -13,10 +13,10 @@ import threading
 import pytest
 
 from quad_description import movable_joints, robot_urdf, RobotState
+from quad_hardware import RecordingError
 from quad_hardware.backend import recorded_in
 from quad_hardware.estimation import EstimatorSettings, ImuMounting, OdometryState
 from quad_hardware.estimation.odometry import ContactSource
-from quad_hardware.exceptions import RecordingError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions, LinkState
 from quad_hardware.protocol import Protocol, V1, V2

@@ -12,8 +12,8 @@ import time
 import pytest
 
 from quad_description import movable_joints, Pose, pose_positions, robot_urdf
+from quad_hardware import CommandError, NoAnswerError
 from quad_hardware.backend import SerialBackend
-from quad_hardware.exceptions import CommandError, NoAnswerError
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions
 from quad_hardware.protocol import LEG_MOTORS, Protocol, V1, V2

@@ -12,7 +12,7 @@ import select
 import time
 from typing import TYPE_CHECKING
 
-from quad_hardware.exceptions import CodecError, HardwareError, NoAnswerError
+from quad_hardware import CodecError, HardwareError, NoAnswerError
 from quad_hardware.link import connect, send_request
 from quad_hardware.protocol import (
     ANGLE_SPANS,

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quad_hardware.exceptions import CodecError
+from quad_hardware import CodecError
 from quad_hardware.protocol import (
     decode_feedback,
     Feedback,

@@ -14,7 +14,8 @@ import pytest
 
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
 from quad_description.rotations import from_roll_pitch_yaw, rotate
-from quad_hardware.estimation.odometry import LegOdometry, OdometrySettings, OdometryState
+from quad_hardware.estimation import OdometrySettings, OdometryState
+from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import Terrain
 from quad_sim.physics import Robot
 from quad_sim.plant.terrain import FLAT

@@ -57,6 +57,7 @@ def lint(layout: Layout, environ: Mapping[str, str]) -> int:
         [bin_folder / 'hadolint', '--config', docker / 'hadolint.yaml', docker / 'Dockerfile'],
         [bin_folder / 'check-jsonschema', *COMPOSE_SCHEMA, layout.root / 'compose.yaml'],
         mkdocs_command(layout),
+        [bin_folder / 'python', '-m', 'workspace.front_doors', '--want', '60'],
     ]
     for name, folders in type_check_units(layout.root).items():
         cache = layout.root / '.mypy_cache' / name

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen.standard.drive import Controlword, STATE_WORDS, Statusword
-from arm_canopen.standard.drive import DriveState as State
+from arm_canopen import DriveState as State
+from arm_canopen.standard import Controlword, STATE_WORDS, Statusword
 
 from ..fault import Fault
 from ..objects.object_store import ObjectStore

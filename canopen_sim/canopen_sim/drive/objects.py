@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.objects import AXIS_OFFSET, Index
-from arm_canopen.standard.target_objects import TARGET_OBJECTS
+from arm_canopen import OperationMode
+from arm_canopen.standard import AXIS_OFFSET, Index, TARGET_OBJECTS
 
 from ..objects.object_store import Integer, ObjectStore
 from .profile import Limits

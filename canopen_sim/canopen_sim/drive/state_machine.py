@@ -9,10 +9,10 @@ from enum import Enum
 from functools import partial
 from typing import TypeVar
 
+from arm_canopen import DriveState as State
+from arm_canopen import OperationMode
+from arm_canopen.standard import AbortCode
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.drive import DriveState as State
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from ..fault import Fault
 from ..objects.object_store import Integer, refusal

@@ -7,7 +7,7 @@ from __future__ import annotations
 from enum import auto, Enum
 from typing import NamedTuple
 
-from arm_canopen.standard.drive import DriveState as State
+from arm_canopen import DriveState as State
 
 FAULT_RESET_BIT = 0x80
 

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from arm_canopen.standard.dictionary import object_address
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import Index, object_address
 
 from ..fault import Fault, FaultInjection
 from ..objects.object_store import ObjectStore

@@ -12,7 +12,7 @@ import random
 import struct
 from typing import NamedTuple
 
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 from arm_canopen.standard.sdo import Abort
 
 from ..fault import Fault, FaultInjection, Service

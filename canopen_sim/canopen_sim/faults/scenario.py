@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen import DriveState
+from arm_canopen.standard import NmtState
 
 from ..device import Device
 from ..fault import Fault, FaultInjection

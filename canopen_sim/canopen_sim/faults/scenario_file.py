@@ -29,6 +29,7 @@ from collections.abc import Callable, Mapping
 import os
 from typing import TypeVar
 
+from arm_canopen import DriveState
 from arm_canopen.config.findings import Findings, RefusedError
 from arm_canopen.config.read.document import (
     Item,
@@ -38,8 +39,7 @@ from arm_canopen.config.read.document import (
     YamlMap,
 )
 from arm_canopen.config.read.scalars import describe, integer, number, scalar
-from arm_canopen.standard.drive import DriveState
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard import NmtState
 
 from ..fault import Fault, FaultInjection, FAULTS
 from .scenario import Event, Step

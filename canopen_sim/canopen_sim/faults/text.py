@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 import difflib
 import re
 
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard import AbortCode
 
 from ..fault import Fault, FaultInjection, FAULTS
 

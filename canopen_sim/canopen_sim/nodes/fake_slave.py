@@ -11,10 +11,9 @@ import sys
 from ament_index_python.packages import get_package_share_directory
 from rclpy.node import Node
 
+from arm_canopen import CanopenError
 from arm_canopen.config import load_eds
-from arm_canopen.exceptions import CanopenError
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.lss import UNCONFIGURED
+from arm_canopen.standard import NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
 from node_runner import ParameterReader
 
 from ..host import DeviceHost

@@ -9,8 +9,8 @@ import sys
 
 from rclpy.node import Node
 
+from arm_canopen import CanopenError
 from arm_canopen.config import BusConfig, load_bus
-from arm_canopen.exceptions import CanopenError
 from node_runner import ParameterReader
 
 from ..host import DeviceHost

@@ -14,7 +14,7 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from arm_canopen.exceptions import BusError
+from arm_canopen import BusError
 from arm_msgs.srv import InjectFault
 
 from ..device import Device

@@ -11,8 +11,8 @@ import threading
 
 from rclpy.node import Node
 
+from arm_canopen import CanopenError
 from arm_canopen.can import open_bus
-from arm_canopen.exceptions import CanopenError
 from node_runner import (
     declare_thread_priority,
     log_as,

@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID
+from arm_canopen.standard import (
+    AbortCode,
+    CAN_ID_MASK,
+    COB_ID_EXTENDED,
+    COB_ID_INVALID,
+    ObjectEntry,
+)
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.dictionary import ObjectEntry
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from .object_store import Integer, refusal
 

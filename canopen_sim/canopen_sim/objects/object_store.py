@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.datatypes import (
+from arm_canopen import CodecError, SdoAbortError
+from arm_canopen.standard import (
+    abort_text,
+    AbortCode,
     byte_length,
     DataType,
-    decode,
-    encode,
     integer_range,
+    object_address,
+    ObjectDictionary,
+    ObjectEntry,
     REAL_FORMATS,
-    Value,
 )
-from arm_canopen.standard.dictionary import object_address, ObjectDictionary, ObjectEntry
+from arm_canopen.standard.datatypes import decode, encode, Value
 from arm_canopen.standard.pdo import Number
-from arm_canopen.standard.sdo_abort import abort_text, AbortCode
 
 STRING_BYTES_MAX = 65_536  # [byte] longest string or domain that a client may write
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from arm_canopen.exceptions import SdoAbortError
+from arm_canopen import SdoAbortError
+from arm_canopen.standard import AbortCode, Index
 from arm_canopen.standard.datatypes import encode, Value
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from .object_store import Integer, ObjectStore, refusal, Variable
 from .parameter_memory import ParameterMemory

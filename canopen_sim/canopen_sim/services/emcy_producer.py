@@ -7,12 +7,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
+from arm_canopen.can import Frame
+from arm_canopen.standard import AbortCode, CAN_ID_MASK, COB_ID_INVALID, Emergency, Index
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.emcy import Emergency
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from ..objects.cob_id_rules import check_cob_id
 from ..objects.object_store import Integer, ObjectStore, refusal

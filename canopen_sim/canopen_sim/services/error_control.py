@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Sequence
 from typing import Protocol
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.nmt import NmtState
-from arm_canopen.standard.objects import Index
+from arm_canopen.can import Frame
+from arm_canopen.standard import Index, NmtState
 
 from ..objects.object_store import ObjectStore
 from .emcy_producer import EmcyProducer

@@ -7,12 +7,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CobId
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AbortCode,
+    CobId,
+    ConsumerHeartbeatTime,
+    Index,
+    NmtState,
+    parse_heartbeat,
+)
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.nmt import ConsumerHeartbeatTime, NmtState, parse_heartbeat
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from ..objects.object_store import Integer, ObjectStore, refusal
 from ..timed import NEVER

@@ -6,25 +6,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.lss import (
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
     ADDRESS_BITS,
     BIT_RATES,
     decode_lss,
     fast_scan,
     FastScan,
+    Index,
     lss_bytes,
     lss_number,
     LSS_RESPONSE,
     LssCommand,
     LssMessage,
     LssState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
     STANDARD_TABLE,
     UNCONFIGURED,
-    WHOLE_NUMBER,
 )
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard.lss import WHOLE_NUMBER
 
 from ..objects.object_store import ObjectStore
 from ..objects.parameter_memory import ParameterMemory

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX
-from arm_canopen.standard.nmt import (
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
     ALL_NODES,
+    CobId,
     COMMANDED_STATES,
     NmtCommand,
     NmtState,
+    NODE_ID_MAX,
     parse_nmt,
     RESETS,
 )

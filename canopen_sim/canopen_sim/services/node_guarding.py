@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.nmt import NmtState
-from arm_canopen.standard.objects import Index
+from arm_canopen.can import Frame
+from arm_canopen.standard import CobId, Index, NmtState
 
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER

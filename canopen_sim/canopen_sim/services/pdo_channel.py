@@ -12,13 +12,21 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, RTR_FORBIDDEN
-from arm_canopen.standard.datatypes import bit_length, Value
-from arm_canopen.standard.dictionary import ObjectEntry
-from arm_canopen.standard.objects import PDO_BITS_MAX
-from arm_canopen.standard.pdo import mapped_place, MappedObject, PdoCodec, SYNCHRONOUS_MAX
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen import CodecError, SdoAbortError
+from arm_canopen.standard import (
+    AbortCode,
+    bit_length,
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    mapped_place,
+    MappedObject,
+    ObjectEntry,
+    PDO_BITS_MAX,
+    PdoCodec,
+    RTR_FORBIDDEN,
+    SYNCHRONOUS_MAX,
+)
+from arm_canopen.standard.datatypes import Value
 
 from ..objects.cob_id_rules import check_cob_id
 from ..objects.object_store import ObjectStore, refusal, Scalar, Variable

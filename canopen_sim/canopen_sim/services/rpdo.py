@@ -6,11 +6,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, ObjectEntry
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
-from arm_canopen.standard.pdo import SYNCHRONOUS_MAX
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AccessType,
+    DataType,
+    Index,
+    ObjectEntry,
+    PDO_COUNT_MAX,
+    SYNCHRONOUS_MAX,
+)
 
 from ..objects.object_store import make_variable, ObjectStore, Variable
 from ..timed import NEVER

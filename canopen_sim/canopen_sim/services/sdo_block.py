@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import struct
 
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard import AbortCode
 from arm_canopen.standard.sdo_block import (
     ACKNOWLEDGE_UPLOAD,
     block_frames,

@@ -12,22 +12,21 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import struct
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.sdo import (
-    Abort,
+from arm_canopen import CodecError, SdoAbortError
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AbortCode,
     decode_request,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
     EXPEDITED_MAX,
-    Segment,
     SEGMENT_MAX,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo_abort import AbortCode
+from arm_canopen.standard.sdo import Abort, Segment
 from arm_canopen.standard.sdo_block import CLIENT_DOWNLOAD, CLIENT_UPLOAD
 
 from ..objects.object_store import ObjectStore, refusal, STRING_BYTES_MAX

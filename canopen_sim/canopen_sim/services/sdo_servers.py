@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId
-from arm_canopen.standard.objects import Index
+from arm_canopen.can import Frame
+from arm_canopen.standard import CAN_ID_MASK, COB_ID_INVALID, CobId, Index
 
 from ..objects.cob_id_rules import check_cob_id
 from ..objects.object_store import ObjectStore

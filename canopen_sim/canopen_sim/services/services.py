@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.lss import LSS_REQUEST
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen.can import Frame
+from arm_canopen.standard import CobId, LSS_REQUEST, NmtState
 
 from ..fault import Service
 from ..faults.line import Traffic

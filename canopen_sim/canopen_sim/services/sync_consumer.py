@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.cob_id import CAN_ID_MASK, CobId, SYNC_PRODUCER
+from arm_canopen.can import Frame
+from arm_canopen.standard import AbortCode, CAN_ID_MASK, CobId, Index, SYNC_PRODUCER
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from ..objects.cob_id_rules import check_can_id
 from ..objects.object_store import ObjectStore, refusal

@@ -8,13 +8,17 @@ from collections.abc import Callable
 import contextlib
 from datetime import datetime, timedelta
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import CAN_ID_MASK, TIME_CONSUMER, TIME_PRODUCER
+from arm_canopen import CodecError
+from arm_canopen.can import Frame
+from arm_canopen.standard import (
+    AbortCode,
+    CAN_ID_MASK,
+    decode_time_of_day,
+    Index,
+    TIME_CONSUMER,
+    TIME_PRODUCER,
+)
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import AbortCode
-from arm_canopen.standard.time_of_day import decode_time_of_day
 
 from ..objects.cob_id_rules import check_can_id, FRAME_BITS
 from ..objects.object_store import ObjectStore, refusal

@@ -6,10 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.dictionary import ObjectEntry
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
-from arm_canopen.standard.pdo import SYNCHRONOUS_MAX
+from arm_canopen.can import Frame
+from arm_canopen.standard import Index, ObjectEntry, PDO_COUNT_MAX, SYNCHRONOUS_MAX
 
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER

@@ -11,10 +11,9 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen import DriveState, OperationMode, Severity
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.drive.drive import Drive as SimulatedDrive
+from canopen_sim import Drive as SimulatedDrive
 
 JOINT, NODE_ID = 'joint1', 2
 RAMP = 1.0  # [s] of a quick stop from full speed to rest

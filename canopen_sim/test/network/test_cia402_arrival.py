@@ -10,12 +10,10 @@ from drive_samples import bus_config, drive_config, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import AxisFeedback, Refusal
+from arm_canopen import AxisFeedback, DriveError, OperationMode, Refusal
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.exceptions import DriveError
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.drive import OperationMode
-from canopen_sim.drive.servo import ServoModel
+from canopen_sim import ServoModel
 
 pytestmark = pytest.mark.slow
 

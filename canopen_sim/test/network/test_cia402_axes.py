@@ -11,10 +11,9 @@ from drive_samples import DRIVE_EDS
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen import DriveError, DriveState, OperationMode
 from arm_canopen.config import load_bus
-from arm_canopen.exceptions import DriveError
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.objects import AXIS_OFFSET, Index
+from arm_canopen.standard import AXIS_OFFSET, Index
 
 EDS = DRIVE_EDS.with_name('cia402_two_axes.eds')
 BUS = f"""

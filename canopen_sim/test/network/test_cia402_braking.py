@@ -8,7 +8,7 @@ from drive_samples import PERIOD, SCALE
 from moving_drive import JOINT, MovingDrive, RAMP, STANDING
 import pytest
 
-from arm_canopen.standard.drive import DriveState
+from arm_canopen import DriveState
 
 pytestmark = pytest.mark.slow
 

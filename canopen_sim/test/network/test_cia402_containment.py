@@ -13,13 +13,19 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import AxisFeedback, Refusal, RefusalCause
+from arm_canopen import (
+    AxisFeedback,
+    CodecError,
+    DriveError,
+    DriveState,
+    OperationMode,
+    Refusal,
+    RefusalCause,
+    Severity,
+)
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import CodecError, DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.config import NodeConfig
+from arm_canopen.standard import DataType
 
 pytestmark = pytest.mark.slow
 

@@ -13,8 +13,7 @@ from drive_samples import bus_config, drive_config, pdo, PERIOD, SCALE, sdo_writ
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import AxisFeedback, Refusal, RefusalCause, Setpoint
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import AxisFeedback, OperationMode, Refusal, RefusalCause, Setpoint
 
 JOINT = 'joint1'
 NODE_ID = 2

@@ -12,13 +12,11 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE, sdo_write
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import RefusalCause
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveState, OperationMode, RefusalCause, Severity
+from arm_canopen.can import Frame
 from arm_canopen.cia402.following_watch import Following, FollowingWatch
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import DriveState, OperationMode, Statusword
+from arm_canopen.config import NodeConfig
+from arm_canopen.standard import ObjectDictionary, Statusword
 
 pytestmark = pytest.mark.slow
 

@@ -11,14 +11,18 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.cia402.motion import AxisFeedback
-from arm_canopen.cia402.refusal import Refusal, RefusalCause
+from arm_canopen import (
+    AxisFeedback,
+    DriveError,
+    DriveState,
+    OperationMode,
+    Refusal,
+    RefusalCause,
+    Severity,
+)
+from arm_canopen.can import Frame
 from arm_canopen.cia402.units import Units
-from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.config import DriveConfig
 
 pytestmark = pytest.mark.slow
 

@@ -11,12 +11,11 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, pdo, PERIOD, 
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveError, DriveState, OperationMode, Severity
+from arm_canopen.can import Frame
 from arm_canopen.cia402.position_modes import Move
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import Controlword, DriveState, OperationMode, Statusword
+from arm_canopen.standard import Controlword, Statusword
 
 pytestmark = pytest.mark.slow
 

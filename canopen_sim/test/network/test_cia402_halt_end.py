@@ -18,11 +18,10 @@ from hypothesis import strategies as st
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveError, OperationMode, Severity
+from arm_canopen.can import Frame
 from arm_canopen.cia402.halt import UNDER_HALT_TIME
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import Controlword, OperationMode, Statusword
+from arm_canopen.standard import Controlword, Statusword
 
 pytestmark = pytest.mark.slow
 

@@ -10,11 +10,10 @@ from drive_samples import bus_config, drive_config, sdo_write
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
+from arm_canopen import DriveError, Severity
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.nmt import NmtCommand
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.standard import NmtCommand
+from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 

@@ -8,11 +8,9 @@ from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.cia402.motion import Setpoint
+from arm_canopen import DriveError, DriveState, OperationMode, Setpoint
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import DriveError
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen.config import NodeConfig
 
 pytestmark = pytest.mark.slow
 

@@ -8,14 +8,12 @@ from drive_samples import PERIOD, SCALE
 from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveError, DriveState, EventKind, OperationMode, Severity
+from arm_canopen.can import Frame
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.exceptions import DriveError
 from arm_canopen.library.canopen_master import leave_device
-from arm_canopen.master.events import EventKind, Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen.standard import NmtCommand
 
 pytestmark = pytest.mark.slow
 

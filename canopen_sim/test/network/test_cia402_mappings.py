@@ -22,10 +22,9 @@ from hypothesis import strategies as st
 import pytest
 from virtual_network import Sent, START, VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig, PdoConfig
-from arm_canopen.standard.cob_id import CobId, rpdo_default
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.pdo import PdoCodec, SYNCHRONOUS_MAX
+from arm_canopen import OperationMode
+from arm_canopen.config import NodeConfig, PdoConfig
+from arm_canopen.standard import CobId, PdoCodec, rpdo_default, SYNCHRONOUS_MAX
 
 pytestmark = pytest.mark.slow
 

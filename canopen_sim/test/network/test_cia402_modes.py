@@ -24,15 +24,13 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import DriveError, DriveState, OperationMode, Severity
+from arm_canopen.can import Frame
 from arm_canopen.cia402.homing import HomingProgress
 from arm_canopen.cia402.position_modes import Move, QUEUE_MAX
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.config.model.drive import DriveConfig, RecoveryPolicy
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.config import DriveConfig, NodeConfig
+from arm_canopen.config.model.drive import RecoveryPolicy
+from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 

@@ -25,9 +25,8 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import DriveError
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen import DriveError, DriveState, OperationMode
+from arm_canopen.can import Frame
 
 pytestmark = pytest.mark.slow
 

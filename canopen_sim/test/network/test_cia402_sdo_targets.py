@@ -13,14 +13,19 @@ from drive_samples import bus_config, drive_config, every_mode, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import (
+    DriveError,
+    DriveState,
+    OperationMode,
+    SdoAbortError,
+    SdoTimeoutError,
+    Severity,
+)
+from arm_canopen.can import Frame
 from arm_canopen.cia402.position_modes import Move
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import DriveError, SdoAbortError, SdoTimeoutError
-from arm_canopen.master.events import Severity
+from arm_canopen.config import NodeConfig
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.fault import Fault, FaultInjection
+from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow
 

@@ -12,9 +12,7 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import AxisFeedback, Refusal, RefusalCause
-from arm_canopen.exceptions import DriveError
-from arm_canopen.standard.drive import DriveState, OperationMode
+from arm_canopen import AxisFeedback, DriveError, DriveState, OperationMode, Refusal, RefusalCause
 
 pytestmark = pytest.mark.slow
 

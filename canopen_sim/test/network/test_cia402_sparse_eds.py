@@ -12,13 +12,11 @@ from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen import DriveError, OperationMode, Severity
 from arm_canopen.config import load_bus, load_eds
 from arm_canopen.config.model.boot_plan import BootWrite
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen.standard import ObjectDictionary
 
 pytestmark = pytest.mark.slow
 

@@ -22,11 +22,11 @@ from hypothesis import given, strategies
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
+from arm_canopen import OperationMode
+from arm_canopen.can import Frame
 from arm_canopen.cia402.drive_view import VelocityEstimate, WINDOW
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import Controlword, OperationMode
+from arm_canopen.config import NodeConfig
+from arm_canopen.standard import Controlword, ObjectDictionary
 
 JOINT = 'joint1'
 NODE_ID = 2

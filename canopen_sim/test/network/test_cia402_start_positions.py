@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import BusConfig, CanopenError
+from arm_canopen import BusConfig, CanopenError, OperationMode
 from arm_canopen.config import load_bus
-from arm_canopen.standard.drive import OperationMode
-from canopen_sim.host import DeviceHost
+from canopen_sim import DeviceHost
 from canopen_sim.simulation import add_devices
 
 pytestmark = pytest.mark.slow

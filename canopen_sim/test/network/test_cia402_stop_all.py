@@ -9,11 +9,11 @@ from moving_drive import JOINT, MovingDrive, STANDING
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen import DriveState, OperationMode
 from arm_canopen.cia402.stop_all import stop_all, StopReport
 from arm_canopen.master.remote_node import BootPhase
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.nmt import NmtCommand
-from canopen_sim.drive.drive import Drive as SimulatedDrive
+from arm_canopen.standard import NmtCommand
+from canopen_sim import Drive as SimulatedDrive
 
 pytestmark = pytest.mark.slow
 

@@ -11,13 +11,12 @@ from drive_samples import PERIOD, SCALE
 from moving_drive import JOINT, MovingDrive, NODE_ID, RAMP, STANDING
 import pytest
 
+from arm_canopen import DriveError, DriveState
 from arm_canopen.cia402.drive_objects import DriveObjects
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX
-from arm_canopen.exceptions import DriveError
 from arm_canopen.library.canopen_master import leave_device
 from arm_canopen.nodes.diagnostics import drive_diagnostic
-from arm_canopen.standard.drive import DriveState
 
 pytestmark = pytest.mark.slow
 

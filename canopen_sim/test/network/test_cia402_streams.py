@@ -11,12 +11,10 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
+from arm_canopen import DriveError, DriveState, OperationMode, Severity
 from arm_canopen.cia402.status import drive_status
 from arm_canopen.config.model.drive import RecoveryPolicy
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.drive import DriveState, OperationMode
 
 pytestmark = pytest.mark.slow
 

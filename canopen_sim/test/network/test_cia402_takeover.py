@@ -11,9 +11,8 @@ from drive_samples import bus_config, drive_config, every_mode
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.nmt import NmtCommand
+from arm_canopen import DriveState, OperationMode, Severity
+from arm_canopen.standard import NmtCommand
 
 pytestmark = pytest.mark.slow
 

@@ -18,13 +18,9 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.cia402.motion import Setpoint
-from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.exceptions import DriveError
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import DriveError, OperationMode, Setpoint, Severity
+from arm_canopen.config import DriveConfig
+from arm_canopen.standard import DataType, ObjectDictionary, ObjectEntry
 
 JOINT = 'joint1'
 

@@ -28,21 +28,23 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import Refusal, RefusalCause
-from arm_canopen.can.frame import Frame
-from arm_canopen.cia402.motion import Setpoint
-from arm_canopen.config.model import SdoWrite
-from arm_canopen.config.model.identity import Identity
-from arm_canopen.exceptions import DriveError, SdoError
-from arm_canopen.master.events import EventKind, Severity
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.nmt import NmtCommand
-from canopen_sim.device import Device
-from canopen_sim.drive.drive import Drive as SimulatedDrive
-from canopen_sim.fault import Fault as Deviation
-from canopen_sim.fault import FaultInjection
+from arm_canopen import (
+    DriveError,
+    DriveState,
+    EventKind,
+    OperationMode,
+    Refusal,
+    RefusalCause,
+    SdoError,
+    Setpoint,
+    Severity,
+)
+from arm_canopen.can import Frame
+from arm_canopen.config import Identity, SdoWrite
+from arm_canopen.standard import DataType, NmtCommand, ObjectDictionary, ObjectEntry
+from canopen_sim import Device, FaultInjection
+from canopen_sim import Drive as SimulatedDrive
+from canopen_sim import Fault as Deviation
 
 pytestmark = pytest.mark.slow
 

@@ -18,12 +18,10 @@ from scripted_device import (
 )
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.config.model.identity import Identity
-from arm_canopen.master.events import EventKind, Severity
+from arm_canopen import EventKind, Severity
+from arm_canopen.config import Identity, NodeConfig
 from arm_canopen.master.remote_node import BootPhase, RemoteNode
-from arm_canopen.standard.dictionary import AccessType, ObjectDictionary
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen.standard import AccessType, NmtState, ObjectDictionary
 
 NODE = 'io'
 NODE_ID = 9

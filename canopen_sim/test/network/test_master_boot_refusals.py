@@ -13,9 +13,10 @@ from scripted_device import object_bytes, ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig, SourceLocation
-from arm_canopen.master.events import Severity
-from arm_canopen.standard.nmt import NmtState
+from arm_canopen import Severity
+from arm_canopen.config import NodeConfig
+from arm_canopen.config.model import SourceLocation
+from arm_canopen.standard import NmtState
 
 TOO_HIGH = 0x0609_0031  # Elmo's answer to 0x1016
 NO_SUBINDEX = 0x0609_0011  # node-canopen's

@@ -20,12 +20,11 @@ from scripted_device import (
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import CanopenError
-from arm_canopen.master.events import Severity
+from arm_canopen import CanopenError, Severity
+from arm_canopen.can import Frame
+from arm_canopen.config import NodeConfig
 from arm_canopen.master.remote_node import BootPhase
-from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen.standard import NmtCommand, NmtState
 
 CONFIGURED = {
     (0x1400, 1): 0x205,

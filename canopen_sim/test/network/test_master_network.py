@@ -11,14 +11,18 @@ from drive_samples import bus_config, drive_config, pdo, PERIOD, sdo_write
 import pytest
 from virtual_network import FRAME_TIME, VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import SdoAbortError, SdoTimeoutError
-from arm_canopen.master.events import EventKind, Severity
+from arm_canopen import EventKind, SdoAbortError, SdoTimeoutError, Severity
+from arm_canopen.can import Frame
 from arm_canopen.master.network import NEVER, UPDATE_SHARE
 from arm_canopen.master.status import node_status
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.nmt import nmt_frame, NmtCommand, NmtState
+from arm_canopen.standard import (
+    DataType,
+    nmt_frame,
+    NmtCommand,
+    NmtState,
+    ObjectDictionary,
+    ObjectEntry,
+)
 from canopen_sim import Fault, FaultInjection
 
 pytestmark = pytest.mark.slow

@@ -10,10 +10,8 @@ from drive_samples import bus_config, drive_config
 import pytest
 from virtual_network import Sent, START, VirtualNetwork
 
-from arm_canopen.exceptions import BusError
-from arm_canopen.master.events import EventKind, Severity
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen import BusError, EventKind, Severity
+from arm_canopen.standard import CobId, NmtCommand, NmtState
 
 pytestmark = pytest.mark.slow
 

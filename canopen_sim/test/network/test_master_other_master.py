@@ -10,10 +10,8 @@ from drive_samples import bus_config, drive_config
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.can.virtual import VirtualBus, VirtualWire
-from arm_canopen.exceptions import OtherMasterError
-from arm_canopen.master.events import Severity
+from arm_canopen import OtherMasterError, Severity
+from arm_canopen.can import Frame, VirtualBus, VirtualWire
 from arm_canopen.master.other_master import (
     describe,
     listen,

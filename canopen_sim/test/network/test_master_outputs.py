@@ -21,12 +21,11 @@ from drive_samples import (
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.config.model import NodeConfig
+from arm_canopen import BusError, CanopenError, CodecError, OperationMode
+from arm_canopen.config import NodeConfig
 from arm_canopen.config.model.checks import check_bus
-from arm_canopen.exceptions import BusError, CanopenError, CodecError
-from arm_canopen.standard.drive import OperationMode
-from arm_canopen.standard.nmt import NmtCommand
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.standard import NmtCommand
+from canopen_sim import Fault, FaultInjection
 
 MODULE = 'module'
 NODE_ID = 5

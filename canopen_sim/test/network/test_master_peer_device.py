@@ -16,8 +16,8 @@ import canopen
 from drive_samples import bus_config, drive_config, DRIVE_EDS
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import NodeConfig
+from arm_canopen.can import Frame
+from arm_canopen.config import NodeConfig
 
 NODE_ID = 2
 NAME = 'stranger'

@@ -13,10 +13,10 @@ from scripted_device import object_bytes, ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.master.events import EventKind
+from arm_canopen import EventKind
+from arm_canopen.can import Frame
 from arm_canopen.master.remote_node import DropBackoff, LONGEST_PAUSE, STABLE_TIME
-from arm_canopen.standard.nmt import NmtCommand, NmtState
+from arm_canopen.standard import NmtCommand, NmtState
 
 OPERATING_TIME = 0.15  # [s] before it falls back
 EMCY = bytes((0x30, 0x81, 0x11, 0, 0, 0, 0, 0))  # 0x8130: life guard or heartbeat error

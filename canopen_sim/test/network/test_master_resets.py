@@ -8,10 +8,10 @@ from drive_samples import bus_config, drive_config
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.master.events import Severity
+from arm_canopen import Severity
+from arm_canopen.can import Frame
 from arm_canopen.master.remote_node import RESET_TIME
-from arm_canopen.standard.nmt import nmt_frame, NmtCommand, RESETS
+from arm_canopen.standard import nmt_frame, NmtCommand, RESETS
 
 pytestmark = pytest.mark.slow
 

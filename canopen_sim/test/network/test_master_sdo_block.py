@@ -12,13 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import BusError, SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen import BusError, SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen.can import Frame
 from arm_canopen.master.scheduler import Scheduler
 from arm_canopen.master.sdo_block_client import BURST
 from arm_canopen.master.sdo_client import BLOCK_MIN, SdoClient
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from arm_canopen.standard import DataType, ObjectDictionary, ObjectEntry
 from canopen_sim.objects.object_store import ObjectStore
 from canopen_sim.services.sdo_server import SdoServer
 

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 import pytest
 from sdo_byte_server import NO_OBJECT, SdoByteServer
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.exceptions import BusError, SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen import BusError, SdoAbortError, SdoError, SdoTimeoutError
+from arm_canopen.can import Frame
 from arm_canopen.master.scheduler import Promise, Scheduler
 from arm_canopen.master.sdo_client import SdoClient
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
+from arm_canopen.standard import DataType, ObjectDictionary, ObjectEntry
 from canopen_sim.objects.object_store import ObjectStore
 from canopen_sim.services.sdo_server import SdoServer
 

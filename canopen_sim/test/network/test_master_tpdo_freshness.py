@@ -13,18 +13,16 @@ from drive_samples import bus_config, drive_config, DRIVE_EDS, SCALE, with_defau
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen import RefusalCause
-from arm_canopen.config import load_bus
-from arm_canopen.config.model import BusConfig, NodeConfig, SourceLocation
+from arm_canopen import DriveState, OperationMode, RefusalCause, Severity
+from arm_canopen.config import BusConfig, load_bus, NodeConfig
+from arm_canopen.config.model import SourceLocation
 from arm_canopen.config.model.boot_plan import boot_writes
 from arm_canopen.config.model.checks import check_bus
 from arm_canopen.config.model.tpdo_freshness import with_event_timer
-from arm_canopen.master.events import Severity
 from arm_canopen.master.process_image import ReceivedTpdo, SyncRound
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import DriveState, OperationMode
-from canopen_sim.drive.drive import Drive as SimulatedDrive
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.standard import ObjectDictionary
+from canopen_sim import Drive as SimulatedDrive
+from canopen_sim import Fault, FaultInjection
 
 JOINT, NODE_ID = 'joint1', 2
 TPDOS = {0x180 + NODE_ID, 0x280 + NODE_ID}

@@ -12,17 +12,15 @@ from drive_samples import bus_config, drive_config, pdo, sdo_write, with_default
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import NodeConfig
-from arm_canopen.exceptions import CodecError
+from arm_canopen import CodecError, EventKind, Severity
+from arm_canopen.can import Frame
+from arm_canopen.config import NodeConfig
 from arm_canopen.master.emergency_log import EmergencyLog
-from arm_canopen.master.events import EventKind, Severity
 from arm_canopen.master.life_signs import Guarding
 from arm_canopen.master.network import Network
 from arm_canopen.master.status import node_status
-from arm_canopen.standard.emcy import Emergency
-from arm_canopen.standard.time_of_day import decode_time_of_day, encode_time_of_day
-from canopen_sim.fault import Fault, FaultInjection
+from arm_canopen.standard import decode_time_of_day, Emergency, encode_time_of_day
+from canopen_sim import Fault, FaultInjection
 
 GUARD_TIME = 0.05  # [s]
 

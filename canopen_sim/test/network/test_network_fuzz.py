@@ -10,9 +10,9 @@ from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
 from virtual_network import VirtualNetwork
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.standard.drive import DriveState, OperationMode
-from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState
+from arm_canopen import DriveState, OperationMode
+from arm_canopen.can import Frame
+from arm_canopen.standard import ALL_NODES, NmtCommand, NmtState
 
 pytestmark = pytest.mark.slow
 

@@ -15,20 +15,18 @@ from dataclasses import dataclass, field
 import struct
 from typing import Any, Protocol
 
-from arm_canopen.can.frame import checked, Frame
+from arm_canopen import BusError, Event, OperationMode, Severity
+from arm_canopen.can import Frame
+from arm_canopen.can.frame import checked
 from arm_canopen.cia402.drive import Drive
 from arm_canopen.cia402.drive_commands import DriveCommands
 from arm_canopen.cia402.motion_group import MotionGroup
-from arm_canopen.config.model import BusConfig
-from arm_canopen.exceptions import BusError
-from arm_canopen.master.events import Event, Severity
+from arm_canopen.config import BusConfig
 from arm_canopen.master.network import Network
 from arm_canopen.master.scheduler import Promise
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.drive import OperationMode
-from canopen_sim.device import Device
+from arm_canopen.standard import ObjectDictionary
+from canopen_sim import Device, ServoModel
 from canopen_sim.drive.rate import INCREMENTS_PER_SECOND, RateUnits
-from canopen_sim.drive.servo import ServoModel
 
 FRAME_TIME = 0.00012  # [s] a frame of 8 bytes at 1 Mbit/s
 START = 100.0  # [s] of virtual steady time; not 0, which means "never" in places

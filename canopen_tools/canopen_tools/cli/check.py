@@ -17,7 +17,7 @@ from arm_canopen.config.model.checks.drive_units import (
     UnitRule,
 )
 from arm_canopen.config.model.checks.traffic import LoadEstimate, Traffic
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import Index
 
 from .arguments import bitrate, SubParsers
 from .output import counted, print_line, print_problem, print_table, RED, YELLOW

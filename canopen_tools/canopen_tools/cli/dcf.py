@@ -7,8 +7,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from arm_canopen.config import load_bus
-from arm_canopen.config.model import SdoWrite
+from arm_canopen.config import load_bus, SdoWrite
 
 from ..dcf.concise import device_writes, encode_concise, master_writes
 from ..dcf.master import master_dcf

@@ -8,19 +8,17 @@ import argparse
 from collections.abc import Iterator
 from contextlib import suppress
 
+from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import open_bus
-from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen.config import BusConfig, NodeConfig
 from arm_canopen.config.model.boot_plan import (
     BootWrite,
     consumer_to_read,
     held_after_boot,
     HeldConsumers,
 )
-from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.datatypes import DataType, encode
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo_abort import abort_text
+from arm_canopen.standard import abort_text, DataType, Index, ObjectDictionary
+from arm_canopen.standard.datatypes import encode
 
 from ..monitor.object_names import ObjectNames
 from ..monitor.value_text import data_text

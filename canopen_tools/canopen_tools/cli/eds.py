@@ -7,8 +7,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from arm_canopen.config import Eds
 from arm_canopen.config.model.pdo_direction import RPDO, TPDO
-from arm_canopen.config.read.eds import Eds
 
 from ..eds_lint.lint import EdsReport, lint_eds
 from .arguments import SubParsers

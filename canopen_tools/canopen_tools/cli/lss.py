@@ -8,12 +8,18 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from arm_canopen import LssError, SdoAbortError, SdoTimeoutError
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.exceptions import LssError, SdoAbortError, SdoTimeoutError
-from arm_canopen.standard.cob_id import CobId
-from arm_canopen.standard.lss import BIT_RATES, LssAddress, LssState, UNCONFIGURED
-from arm_canopen.standard.nmt import NmtState, parse_heartbeat
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import (
+    BIT_RATES,
+    CobId,
+    Index,
+    LssAddress,
+    LssState,
+    NmtState,
+    parse_heartbeat,
+    UNCONFIGURED,
+)
 
 from ..lss_master import LssMaster, TIMEOUT
 from .arguments import (

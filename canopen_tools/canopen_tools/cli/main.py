@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 
-from arm_canopen.exceptions import CanopenError
+from arm_canopen import CanopenError
 
 from ..ros_arguments import split_ros_arguments
 from . import check, dcf, diff, eds, first_motion, lss, new, objects, scan

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 import re
 
+from arm_canopen import ConfigError, SdoError
 from arm_canopen.can import open_bus
+from arm_canopen.config import Eds, Identity, load_eds
 from arm_canopen.config.model.factor_group import FACTOR_ADDRESSES
-from arm_canopen.config.model.identity import Identity
-from arm_canopen.config.read.eds import Eds, load_eds
-from arm_canopen.exceptions import ConfigError, SdoError
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import Index
 
 from ..eds_match import (
     eds_identity,

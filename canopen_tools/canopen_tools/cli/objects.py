@@ -6,12 +6,10 @@ from __future__ import annotations
 
 import argparse
 
+from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import open_bus
 from arm_canopen.config.read.object_text import bytes_from_text, text_from_bytes
-from arm_canopen.exceptions import CodecError, SdoAbortError
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectEntry
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import DataType, Index, ObjectEntry
 from arm_canopen.standard.sdo import fitted
 
 from ..monitor.object_names import ObjectNames

@@ -8,17 +8,21 @@ import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
+from arm_canopen import SdoError
 from arm_canopen.can import Frame, open_bus
-from arm_canopen.config import load_bus
-from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.config.model.identity import Identity, IDENTITY_OBJECTS
-from arm_canopen.exceptions import SdoError
+from arm_canopen.config import BusConfig, Identity, load_bus, NodeConfig
+from arm_canopen.config.model.identity import IDENTITY_OBJECTS
 from arm_canopen.master import SdoClient
-from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.device_profile import DeviceProfile, PROFILE_MASK
-from arm_canopen.standard.nmt import NmtState
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.sdo import UploadRequest
+from arm_canopen.standard import (
+    CobId,
+    DeviceProfile,
+    Index,
+    NmtState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    PROFILE_MASK,
+    UploadRequest,
+)
 
 from ..lss_master import LssMaster
 from .arguments import add_bus_arguments, seconds, SubParsers

@@ -13,11 +13,16 @@ from time import monotonic
 from typing import Any, TypeVar
 
 from arm_canopen.can import Bus, Frame
-from arm_canopen.config.model import BusConfig
+from arm_canopen.config import BusConfig
 from arm_canopen.master import MasterFrames, Promise, Scheduler, SdoClient
-from arm_canopen.standard.cob_id import CobId, NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.dictionary import ObjectDictionary
-from arm_canopen.standard.nmt import NmtState, parse_heartbeat
+from arm_canopen.standard import (
+    CobId,
+    NmtState,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    ObjectDictionary,
+    parse_heartbeat,
+)
 
 from .output import warn
 

@@ -8,15 +8,19 @@ import argparse
 from dataclasses import dataclass
 from functools import cache
 
-from arm_canopen.config import load_bus, load_eds
-from arm_canopen.config.model import BusConfig, NodeConfig
+from arm_canopen import ObjectError
+from arm_canopen.config import BusConfig, load_bus, load_eds, NodeConfig
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
-from arm_canopen.exceptions import ObjectError
-from arm_canopen.standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import ObjectDictionary, ObjectEntry
-from arm_canopen.standard.object_path import find_object, NUMBER
-from arm_canopen.standard.objects import slow_timeout
+from arm_canopen.standard import (
+    DataType,
+    find_object,
+    NODE_ID_MAX,
+    NODE_ID_MIN,
+    ObjectDictionary,
+    ObjectEntry,
+    slow_timeout,
+)
+from arm_canopen.standard.object_path import NUMBER
 
 from ..monitor.object_names import ObjectNames
 from .arguments import UsageError

@@ -11,13 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 import struct
 
-from arm_canopen.config.model import BusConfig, NodeConfig, SdoWrite
+from arm_canopen.config import BusConfig, NodeConfig, SdoWrite
 from arm_canopen.config.model.boot_plan import boot_writes, BootWrite
 from arm_canopen.config.model.pdo_direction import RPDO, TPDO
-from arm_canopen.standard.cob_id import COB_ID_INVALID
-from arm_canopen.standard.datatypes import DataType, encode
-from arm_canopen.standard.dictionary import ObjectEntry
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+from arm_canopen.standard import COB_ID_INVALID, DataType, Index, ObjectEntry, PDO_COUNT_MAX
+from arm_canopen.standard.datatypes import encode
 
 COUNT = struct.Struct('<I')
 ENTRY = struct.Struct('<HBI')

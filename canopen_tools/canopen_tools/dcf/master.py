@@ -12,19 +12,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from arm_canopen.config.model import BusConfig, NodeConfig, PdoConfig
-from arm_canopen.config.model.master import MasterConfig
+from arm_canopen import CodecError
+from arm_canopen.config import BusConfig, MasterConfig, NodeConfig, PdoConfig
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.sections import U16_MAX
 from arm_canopen.config.units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import COB_ID_INVALID, CobId, SYNC_PRODUCER, TIME_PRODUCER
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, object_address
-from arm_canopen.standard.lss import BIT_RATES_KBIT
-from arm_canopen.standard.nmt import ConsumerHeartbeatTime
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
-from arm_canopen.standard.pdo import MappedObject
+from arm_canopen.standard import (
+    AccessType,
+    BIT_RATES_KBIT,
+    COB_ID_INVALID,
+    CobId,
+    ConsumerHeartbeatTime,
+    DataType,
+    Index,
+    MappedObject,
+    object_address,
+    PDO_COUNT_MAX,
+    SYNC_PRODUCER,
+    TIME_PRODUCER,
+)
 
 from .network import network_objects
 from .text import dcf_text, DcfArray, DcfEntry, DcfObject, DcfRecord

@@ -6,11 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.config.model.master import MasterConfig
+from arm_canopen.config import BusConfig, MasterConfig, NodeConfig
 from arm_canopen.config.units import MILLISECONDS
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, ObjectCode
+from arm_canopen.standard import AccessType, DataType, ObjectCode
 
 from .text import DcfArray, DcfEntry, DcfObject, DcfRecord
 

@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import AccessType, ObjectCode
+from arm_canopen.standard import AccessType, DataType, ObjectCode
 
 from ..eds_lint.lists import LISTS, proper_list
 

@@ -12,19 +12,20 @@ from dataclasses import dataclass
 import os
 from pathlib import Path
 
+from arm_canopen import ConfigError
+from arm_canopen.config import Eds, load_eds, Problem
 from arm_canopen.config.findings import Findings, Place
-from arm_canopen.config.read.eds import Eds, load_eds, read_eds_text
+from arm_canopen.config.read.eds import read_eds_text
 from arm_canopen.config.read.eds_ini import IniFile, IniSection, read_ini
-from arm_canopen.exceptions import ConfigError, Problem
-from arm_canopen.standard.datatypes import bit_length
-from arm_canopen.standard.device_profile import is_drive
-from arm_canopen.standard.dictionary import (
+from arm_canopen.standard import (
     AccessType,
+    bit_length,
+    Index,
+    is_drive,
     object_address,
     ObjectDictionary,
     ObjectEntry,
 )
-from arm_canopen.standard.objects import Index
 
 from .lists import check_info, check_lists
 from .pdos import check_pdo_objects

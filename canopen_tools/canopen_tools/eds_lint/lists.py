@@ -10,9 +10,7 @@ from arm_canopen.config.findings import Findings, Place
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
 from arm_canopen.config.read.eds_ini import IniFile, IniSection
 from arm_canopen.config.read.eds_values import parse_integer
-from arm_canopen.standard.dictionary import object_address, ObjectDictionary
-from arm_canopen.standard.lss import BIT_RATES_KBIT
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import BIT_RATES_KBIT, Index, object_address, ObjectDictionary
 
 MANDATORY_INDICES = (Index.DEVICE_TYPE, Index.ERROR_REGISTER, Index.IDENTITY)
 MANUFACTURER = range(0x2000, 0x6000)  # CiA 301, table 40

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
+from arm_canopen.config import Eds
 from arm_canopen.config.findings import Findings, Place
 from arm_canopen.config.model.pdo_direction import Direction, RPDO, TPDO
-from arm_canopen.config.read.eds import DUMMY_TYPES, Eds
+from arm_canopen.config.read.eds import DUMMY_TYPES
 from arm_canopen.config.resolve.pdo_mapping import eds_mapping
-from arm_canopen.standard.cob_id import COB_ID_INVALID, PREDEFINED_MAX
-from arm_canopen.standard.dictionary import object_address, ObjectEntry
+from arm_canopen.standard import COB_ID_INVALID, object_address, ObjectEntry, PREDEFINED_MAX
 
 
 def check_pdo_objects(eds: Eds, findings: Findings) -> None:

@@ -8,10 +8,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeAlias
 
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.device_profile import DeviceProfile, is_drive, profile_number
-from arm_canopen.standard.dictionary import AccessType, ObjectDictionary
-from arm_canopen.standard.objects import Index
+from arm_canopen.standard import (
+    AccessType,
+    DataType,
+    DeviceProfile,
+    Index,
+    is_drive,
+    ObjectDictionary,
+    profile_number,
+)
 
 
 class Role(Enum):

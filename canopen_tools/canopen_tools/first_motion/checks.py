@@ -8,12 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 import math
 
-from arm_canopen import CanopenMaster, OperationMode
-from arm_canopen.config.model.drive import DriveConfig
+from arm_canopen import CanopenMaster, DriveError, ObjectError, OperationMode, SdoError
+from arm_canopen.config import DriveConfig
 from arm_canopen.config.model.factor_group import FactorGroup
-from arm_canopen.exceptions import DriveError, ObjectError, SdoError
-from arm_canopen.standard.objects import AXIS_OFFSET, Index
-from arm_canopen.standard.target_objects import CYCLIC_MODES
+from arm_canopen.standard import AXIS_OFFSET, CYCLIC_MODES, Index
 from first_motion import FASTEST, JointKind, too_few_increments
 
 TURNS_MAX = 20.0  # turns from 0 beyond which a position is hardly one of an arm

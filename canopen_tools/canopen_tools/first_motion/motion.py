@@ -12,10 +12,17 @@ import os
 from pathlib import Path
 import time
 
-from arm_canopen import CanopenDrive, CanopenError, CanopenMaster, DriveState, Event, Severity
-from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.exceptions import BootError
-from arm_canopen.standard.target_objects import CYCLIC_MODES
+from arm_canopen import (
+    BootError,
+    CanopenDrive,
+    CanopenError,
+    CanopenMaster,
+    DriveState,
+    Event,
+    Severity,
+)
+from arm_canopen.config import DriveConfig
+from arm_canopen.standard import CYCLIC_MODES
 from first_motion import (
     FOLLOWING,
     JointKind,

@@ -9,10 +9,9 @@ import math
 import time
 from typing import TypeAlias
 
-from arm_canopen import CanopenError, CanopenMaster
-from arm_canopen.config.model.drive import DriveConfig
-from arm_canopen.exceptions import DriveError, ObjectError, SdoError
-from arm_canopen.standard.objects import AXIS_OFFSET, Index
+from arm_canopen import CanopenError, CanopenMaster, DriveError, ObjectError, SdoError
+from arm_canopen.config import DriveConfig
+from arm_canopen.standard import AXIS_OFFSET, Index
 from first_motion import MotionPlan
 
 from .slow_motion import PERMIT, SlowMotion

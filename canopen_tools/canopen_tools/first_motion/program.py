@@ -11,7 +11,7 @@ import signal
 import sys
 
 from arm_canopen import BusConfig, load_bus, NodeConfig
-from arm_canopen.config.model.drive import DriveConfig
+from arm_canopen.config import DriveConfig
 from first_motion import (
     AxisScales,
     BusEditError,

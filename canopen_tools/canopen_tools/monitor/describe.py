@@ -7,16 +7,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
-from arm_canopen.can.error_frames import error_text
-from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import BusConfig, NodeConfig
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID, CobId, NODE_ID_MAX
-from arm_canopen.standard.emcy import Emergency
-from arm_canopen.standard.lss import LSS_REQUEST, LSS_RESPONSE, LssMessage
-from arm_canopen.standard.nmt import ALL_NODES, NmtCommand, NmtState, parse_heartbeat
-from arm_canopen.standard.objects import Index
-from arm_canopen.standard.time_of_day import decode_time_of_day
+from arm_canopen import CodecError
+from arm_canopen.can import error_text, Frame
+from arm_canopen.config import BusConfig, NodeConfig
+from arm_canopen.standard import (
+    ALL_NODES,
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    CobId,
+    decode_time_of_day,
+    Emergency,
+    Index,
+    LSS_REQUEST,
+    LSS_RESPONSE,
+    LssMessage,
+    NmtCommand,
+    NmtState,
+    NODE_ID_MAX,
+    parse_heartbeat,
+)
 
 from .description import Description, FrameKind
 from .object_names import ObjectNames

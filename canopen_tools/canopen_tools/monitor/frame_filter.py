@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import re
 from typing import TypeAlias
 
-from arm_canopen.can.frame import EXTENDED_ID_MAX, Frame
+from arm_canopen.can import EXTENDED_ID_MAX, Frame
 
 from .description import Description, FrameKind
 

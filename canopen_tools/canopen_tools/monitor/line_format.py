@@ -7,7 +7,7 @@ from __future__ import annotations
 from datetime import datetime
 from enum import Enum
 
-from arm_canopen.can.frame import Frame
+from arm_canopen.can import Frame
 
 from .description import Description, FrameKind
 

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-from arm_canopen.standard.datatypes import DataType
-from arm_canopen.standard.dictionary import object_address, ObjectDictionary
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
+from arm_canopen.standard import DataType, Index, object_address, ObjectDictionary, PDO_COUNT_MAX
 
 _PDO_RECORDS: tuple[tuple[Index, str], ...] = (
     (Index.RPDO_COMMUNICATION, 'RPDO{} communication'),

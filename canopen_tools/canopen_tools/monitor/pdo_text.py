@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from arm_canopen.can.frame import Frame
-from arm_canopen.config.model import NodeConfig, PdoConfig
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.dictionary import object_address
-from arm_canopen.standard.pdo import PdoCodec
+from arm_canopen import CodecError
+from arm_canopen.can import Frame
+from arm_canopen.config import NodeConfig, PdoConfig
+from arm_canopen.standard import object_address, PdoCodec
 
 from .description import Description, FrameKind
 from .object_names import ObjectNames

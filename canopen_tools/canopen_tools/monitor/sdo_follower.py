@@ -9,22 +9,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.sdo import (
-    Abort,
+from arm_canopen import CodecError
+from arm_canopen.standard import (
+    abort_text,
     decode_request,
     decode_response,
     DownloadRequest,
     DownloadResponse,
     DownloadSegmentResponse,
     FRAME_BYTES,
-    Response,
-    Segment,
     UploadRequest,
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo_abort import abort_text
+from arm_canopen.standard.sdo import Abort, Response, Segment
 
 from .object_names import ObjectNames
 from .sdo_block import BlockFollower

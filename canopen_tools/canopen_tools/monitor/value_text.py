@@ -6,15 +6,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from arm_canopen.exceptions import CodecError
-from arm_canopen.standard.cob_id import CAN_ID_MASK, COB_ID_INVALID
-from arm_canopen.standard.datatypes import DataType, decode, Value
-from arm_canopen.standard.dictionary import object_address
-from arm_canopen.standard.drive import Controlword, drive_state, mode_title
-from arm_canopen.standard.emcy import error_code_text, error_register_text
-from arm_canopen.standard.nmt import ConsumerHeartbeatTime
-from arm_canopen.standard.objects import Index, PDO_COUNT_MAX
-from arm_canopen.standard.pdo import mapped_place
+from arm_canopen import CodecError
+from arm_canopen.standard import (
+    CAN_ID_MASK,
+    COB_ID_INVALID,
+    ConsumerHeartbeatTime,
+    Controlword,
+    DataType,
+    drive_state,
+    error_code_text,
+    error_register_text,
+    Index,
+    mapped_place,
+    mode_title,
+    object_address,
+    PDO_COUNT_MAX,
+)
+from arm_canopen.standard.datatypes import decode, Value
 from arm_canopen.standard.sdo import fitted
 
 CONTROLWORD_COMMANDS: tuple[tuple[int, int, str], ...] = (

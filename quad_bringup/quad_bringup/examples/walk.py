@@ -28,8 +28,7 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from process_supervisor import CallError, parse_with_ros, RosOptions, SupervisorError, USAGE_ERROR
 from process_supervisor.arguments import seconds_from
 from process_supervisor.demo import Demo, make_table, run_demo, signed
-from quad_controller.gait.parameters import GaitParameters
-from quad_controller.gait.schedule import Gait
+from quad_controller import Gait, GaitParameters
 from quad_description import LEGS
 from quad_description.rotations import tilt_of, yaw_of
 from quad_msgs.msg import JointCommand

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import time
 
 from quad_description import Backend, robot_urdf, RobotState
+from quad_hardware import CommandError, HardwareError, NoAnswerError
 from quad_hardware.backend import robot_at
-from quad_hardware.exceptions import CommandError, HardwareError, NoAnswerError
 from quad_hardware.protocol import V2
 from quad_sim import (
     CommandTiming,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import math
 
 from quad_description.rotations import Vector
-from quad_hardware.exceptions import CodecError
+from quad_hardware import CodecError
 from quad_hardware.protocol import Access, Code, Feedback, Frame, Kind, Refusal, V2
 
 from ..plant.state import Measurement

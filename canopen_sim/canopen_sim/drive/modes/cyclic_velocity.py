@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import OperationMode
 
 from ..profile import Limits
 from .streamed import Streamed

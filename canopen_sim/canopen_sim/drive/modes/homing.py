@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen.standard.drive import Controlword, OperationMode, Statusword
+from arm_canopen import OperationMode
+from arm_canopen.standard import Controlword, Statusword
 
 from ...timed import NEVER
 from ..axis import Axis

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Protocol
 
-from arm_canopen.standard.drive import OperationMode, Statusword
+from arm_canopen import OperationMode
+from arm_canopen.standard import Statusword
 
 from ...timed import NEVER
 from ..axis import Axis

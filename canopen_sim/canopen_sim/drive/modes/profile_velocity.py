@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen.standard.drive import OperationMode, Statusword
+from arm_canopen import OperationMode
+from arm_canopen.standard import Statusword
 
 from ..axis import Axis
 from ..objects import DriveObjects, MILLISECOND

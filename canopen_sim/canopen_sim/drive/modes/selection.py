@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Container
 
+from arm_canopen.standard import AbortCode
 from arm_canopen.standard.datatypes import Value
-from arm_canopen.standard.sdo_abort import AbortCode
 
 from ...fault import Fault
 from ...objects.object_store import refusal

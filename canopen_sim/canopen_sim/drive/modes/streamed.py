@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from arm_canopen.standard.drive import Statusword
+from arm_canopen.standard import Statusword
 
 from ..axis import Axis
 from ..objects import DriveObjects

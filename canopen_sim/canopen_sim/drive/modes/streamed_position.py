@@ -10,7 +10,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections import deque
 
-from arm_canopen.standard.drive import Controlword, OperationMode, Statusword
+from arm_canopen import OperationMode
+from arm_canopen.standard import Controlword, Statusword
 
 from ..axis import Axis
 from ..objects import DriveObjects, NO_WINDOW, PERIOD_MIN

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import OperationMode
 
 from ...timed import NEVER
 from ..axis import Axis

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 
-from arm_canopen.standard.drive import OperationMode
+from arm_canopen import OperationMode
 
 from ..axis import Axis
 from ..objects import DriveObjects
