@@ -238,8 +238,8 @@ def _declare(node: Node) -> Parameters:
         'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]; one '
         'for each bus.yml, with commas',
     )
-    for name in ('master_config', 'master_bin'):
-        read.text(name, '', 'accepted for ros2_canopen; not needed')
+    read.text('master_config', '', 'accepted for ros2_canopen; not needed')
+    read.text('master_bin', '', 'accepted for ros2_canopen; not needed')
     parameters = Parameters(
         bus_configs=configs.split(','),
         can_names=can_names.split(','),

@@ -23,6 +23,8 @@ OF_OTHERS = (
 )
 """Parameters that have no effect on some nodes, and look like those that have."""
 
+OF_PROGRAM = {'backend', 'jogging', 'trajectories'}  # read by motion_node before its nodes
+
 
 def check_names(nodes: Sequence[Node]) -> None:
     """Refuse misspelt parameters of the nodes of a program, and log once those of none of them.
@@ -32,7 +34,7 @@ def check_names(nodes: Sequence[Node]) -> None:
     Raises:
         ParameterError: A name looks like one that there is.
     """
-    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)}
+    unknown = {name for node in nodes for name in refuse_misspelt(node, OF_OTHERS)} - OF_PROGRAM
     unused = [name for name in unknown if not any(node.has_parameter(name) for node in nodes)]
     if unused:
         names = ', '.join(sorted(unused))
