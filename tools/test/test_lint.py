@@ -27,7 +27,10 @@ done
 echo "seen by $1"
 """
 
-QUIET = ('lint-imports', 'vulture', 'codespell', 'hadolint', 'check-jsonschema', 'mkdocs')
+QUIET = (
+    *('lint-imports', 'vulture', 'codespell', 'hadolint', 'check-jsonschema', 'mkdocs'),
+    'python',
+)
 
 
 def install(root: Path, script: str) -> Layout:
