@@ -121,9 +121,8 @@ class SerialTap:
     def _steps(self, since: float) -> Iterator[float]:
         for before, after in itertools.pairwise(list(self.targets)):
             if after.time >= since:
-                # a busy bridge sends the newest command instead of one or two that still wait
-                waited = round((after.time - before.time) / PERIOD)
-                periods = waited if waited in {2, 3} else 1
+                # a busy bridge sends the newest command instead of one that still waits
+                periods = 2 if 1.5 < (after.time - before.time) / PERIOD < 2.5 else 1
                 for motor in before.angles.keys() & after.angles.keys():
                     yield abs(after.angles[motor] - before.angles[motor]) / periods
 

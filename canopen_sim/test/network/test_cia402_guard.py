@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 
 GOOD, ODD = 'joint1', 'joint2'
 NODE_IDS = {GOOD: 2, ODD: 3}
-LEAST = -(2**31)  # smallest INTEGER32; many encoders say so while they have no reference
+INTEGER32_MIN = -(2**31)  # smallest INTEGER32; many encoders say so while they have no reference
 
 
 def pair(mode: OperationMode, **scales: float) -> VirtualNetwork:
@@ -75,7 +75,7 @@ def assert_served(net: VirtualNetwork) -> None:
 
 
 @pytest.mark.parametrize('mode', [OperationMode.PROFILE_POSITION, OperationMode.CYCLIC_POSITION])
-@pytest.mark.parametrize(('position', 'velocity'), [(None, LEAST), (LEAST, None)])
+@pytest.mark.parametrize(('position', 'velocity'), [(None, INTEGER32_MIN), (INTEGER32_MIN, None)])
 def test_odd_values_of_a_disabled_drive_harm_nobody(
     mode: OperationMode, position: int | None, velocity: int | None
 ) -> None:
@@ -98,7 +98,7 @@ def test_factors_that_are_not_reciprocal_harm_nobody() -> None:
 
 
 @pytest.mark.parametrize('mode', [OperationMode.CYCLIC_POSITION, OperationMode.CYCLIC_VELOCITY])
-@pytest.mark.parametrize('velocity', [LEAST, -50_000])
+@pytest.mark.parametrize('velocity', [INTEGER32_MIN, -50_000])
 def test_a_wrong_actual_velocity_moves_nothing(mode: OperationMode, velocity: int) -> None:
     """An axis that stands is not braked from a speed that only 0x606C claims."""
     net = pair(mode)
@@ -116,16 +116,18 @@ def test_an_encoder_without_reference_is_held_where_it_is() -> None:
     """The smallest position is a legal target: what is preloaded is what the drive says."""
     net = pair(OperationMode.CYCLIC_POSITION)
     net.do(ODD, 'disable')
-    report_actual(net, LEAST, 0)
+    report_actual(net, INTEGER32_MIN, 0)
     net.run(0.1)
     assert 'Operation enabled' in net.do(ODD, 'enable')
     sent = net.frames(0x300 + NODE_IDS[ODD], since=net.now - 0.05)
-    assert {struct.unpack_from('<i', data)[0] for data in sent} == {LEAST}
+    assert {struct.unpack_from('<i', data)[0] for data in sent} == {INTEGER32_MIN}
     assert_served(net)
     assert not [text for text in net.reported(Severity.ERROR) if 'stopping' in text]
 
 
-@pytest.mark.parametrize(('quantity', 'least'), [('position', LEAST), ('effort', -(2**15))])
+@pytest.mark.parametrize(
+    ('quantity', 'least'), [('position', INTEGER32_MIN), ('effort', -(2**15))]
+)
 def test_the_smallest_number_of_an_object_fits(quantity: str, least: int) -> None:
     """One more below zero than above it, and not one beyond."""
     scale = getattr(Units(DriveConfig(scale_pos_to_dev=1.0)), quantity)
