@@ -7,10 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
-from typing import NamedTuple, TYPE_CHECKING
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from typing_extensions import Self
+from .code_with_text import CodeWithText
 
 LSS_REQUEST = 0x7E5  # COB-ID from the master
 LSS_RESPONSE = 0x7E4  # COB-ID from the slaves
@@ -40,17 +39,8 @@ WHOLE_NUMBER = 0x80  # BitCheck of fast scan: all unconfigured devices answer, a
 ADDRESS_BITS = 32  # of each of the four numbers
 
 
-class LssCommand(IntEnum):
+class LssCommand(CodeWithText):
     """Command specifiers, each with its service in words as ``text``."""
-
-    text: str
-
-    def __new__(cls, code: int, text: str = '') -> Self:
-        """Make a member of a row; a member by its code alone has the text of its row."""
-        member = int.__new__(cls, code)
-        member._value_ = code
-        member.text = text
-        return member
 
     SWITCH_GLOBAL = 0x04, 'switch state global'
     CONFIGURE_NODE_ID = 0x11, 'configure node id'

@@ -4,24 +4,11 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
+from .code_with_text import CodeWithText
 
 
-class AbortCode(IntEnum):
+class AbortCode(CodeWithText):
     """SDO abort codes, each with its meaning as ``text``."""
-
-    text: str
-
-    def __new__(cls, code: int, text: str = '') -> Self:
-        """Make a member of a row; a member by its code alone has the text of its row."""
-        member = int.__new__(cls, code)
-        member._value_ = code
-        member.text = text
-        return member
 
     TOGGLE_BIT = 0x0503_0000, 'toggle bit not alternated'
     TIMED_OUT = 0x0504_0000, 'SDO protocol timed out'
