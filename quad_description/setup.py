@@ -7,7 +7,7 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'xacro>=2'],
+    requires=['PyYAML>=6', 'xacro>=2', './urdf_reader'],
     extras={
         'ros': ['./node_runner'],
     },

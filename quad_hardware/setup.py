@@ -7,7 +7,14 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['pyserial>=3.5', 'PyYAML>=6', './black_box', './dds_network', './quad_description'],
+    requires=[
+        'pyserial>=3.5',
+        'PyYAML>=6',
+        './black_box',
+        './dds_network',
+        './quad_description',
+        './urdf_reader',
+    ],
     extras={
         'ros': ['./message_templates', './node_runner'],
     },

@@ -14,6 +14,7 @@ runpy.run_path(str(SHARED))['setup_package'](
         './process_supervisor',
         './quad_description',
         './quad_hardware',
+        './urdf_reader',
     ],
     extras={
         'ros': ['./node_runner'],

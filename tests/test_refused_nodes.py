@@ -19,7 +19,6 @@ from arm_canopen.nodes.joint_state_publisher import JointStatePublisher
 from node_runner import ParameterError
 from quad_controller import QuadControllerError
 from quad_controller.nodes.controller_node import ControllerNode
-from quad_description import DescriptionError as QuadDescriptionError
 from quad_description.display import Display
 from quad_hardware import HardwareError
 from quad_hardware.nodes.hardware_node import HardwareNode
@@ -32,7 +31,6 @@ ERRORS = (
     HardwareError,
     QuadControllerError,
     DescriptionError,
-    QuadDescriptionError,
 )
 
 

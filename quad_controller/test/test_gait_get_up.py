@@ -16,7 +16,7 @@ from quad_controller import Controller, GaitParameters, State, StateParameters
 from quad_controller.states.get_up import BLIND_DEADLINE, MAX_TRIES
 from quad_controller.states.get_up_poses import Lying, lying_on, RECOVERIES, Stage
 from quad_description import ImuSample, PRESETS, quadruped, robot_urdf
-from quad_description.rotations import about, from_roll_pitch_yaw, Quaternion, rotate
+from quad_description.rotations import about, from_rpy, Quaternion, rotate
 from quad_gait_policies import STAND
 from quad_gait_rig import ARM_ROBOT, FOLDED, PERIOD, Rig, ROBOT, tilted, UPRIGHT
 
@@ -75,8 +75,8 @@ angles = st.floats(-math.pi, math.pi)
 @given(roll=angles, pitch=angles, yaw=angles)
 def test_left_and_right_are_mirror_images(roll: float, pitch: float, yaw: float) -> None:
     """And the heading does not matter; each attitude has a side within 55 degrees of down."""
-    down = ImuSample(from_roll_pitch_yaw(roll, pitch, yaw), None, None).down
-    mirrored = ImuSample(from_roll_pitch_yaw(-roll, pitch, 0.0), None, None).down
+    down = ImuSample(from_rpy(roll, pitch, yaw), None, None).down
+    mirrored = ImuSample(from_rpy(-roll, pitch, 0.0), None, None).down
     ranked = sorted(map(abs, down))
     if ranked[2] - ranked[1] > 1e-6:  # on the edge between two sides it may be either
         assert lying_on(mirrored) is lying_on(down).mirrored
@@ -85,7 +85,7 @@ def test_left_and_right_are_mirror_images(roll: float, pitch: float, yaw: float)
         Lying.RIGHT: (0.0, -1.0, 0.0), Lying.NOSE: (1.0, 0.0, 0.0), Lying.TAIL: (-1.0, 0.0, 0.0),
     }[lying_on(down)]  # fmt: skip
     assert sum(a * b for a, b in zip(below, down, strict=True)) >= 1 / math.sqrt(3) - 1e-9
-    world = rotate(from_roll_pitch_yaw(roll, pitch, yaw), below)
+    world = rotate(from_rpy(roll, pitch, yaw), below)
     assert world[2] <= -1 / math.sqrt(3) + 1e-9
 
 

@@ -13,11 +13,13 @@ Where the feet are, and the joints for where they shall be::
 Conventions: joint vectors are in the order of the URDF's movable joints in [rad]; points are in
 base_link in [m], x ahead, y left, z up; quaternions are x, y, z, w.
 
-Public, besides the names below: the modules :mod:`.rotations` and :mod:`.urdf`.
+Public, besides the names below: the module :mod:`.rotations`.
 """
 
+from urdf_reader import DescriptionError
+
 from .backend import Backend, RecordedBackend
-from .exceptions import DescriptionError, PresetError
+from .exceptions import PresetError
 from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, LegSolution, solve
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .poses import Pose, pose_positions, STREAM_TIMEOUT

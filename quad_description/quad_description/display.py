@@ -14,10 +14,10 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
+from urdf_reader import DescriptionError
 
 from node_runner import destroyed_when_refused, LATCHED, ParameterReader, refuse_misspelt, run_node
 
-from .exceptions import DescriptionError
 from .kinematics.quadruped import quadruped
 from .poses import Pose, pose_positions
 from .presets import PRESETS, robot_urdf

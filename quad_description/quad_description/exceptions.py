@@ -4,18 +4,13 @@
 
 ::
 
-    DescriptionError (ValueError)     a description cannot be made, or a URDF is not usable
+    DescriptionError (ValueError)     of urdf_reader: a description cannot be made or used
     └── PresetError                   there is no such preset; lists what there is
 """
 
 from __future__ import annotations
 
-
-class DescriptionError(ValueError):
-    """A description cannot be made, or a URDF that was handed in is not usable.
-
-    Scenarios: a trunk without mass, malformed XML, a movable joint without limits.
-    """
+from urdf_reader import DescriptionError
 
 
 class PresetError(DescriptionError):

@@ -9,9 +9,10 @@ import math
 from pathlib import Path
 from typing import Any, Final
 
+from urdf_reader import DescriptionError
 import yaml
 
-from .exceptions import DescriptionError, PresetError
+from .exceptions import PresetError
 
 MODEL = Path(__file__).parent / 'model'
 """Folder with the xacro files and their numbers."""

@@ -3,17 +3,34 @@
 """Rotations as unit quaternions (x, y, z, w), from the body to the world.
 
 Roll, pitch and yaw turn about fixed axes x, y, z, in this order (REP 103). Angles are in [rad].
-Plain floats, no arrays: one rotation of one vector costs a tenth of what numpy takes.
+What arms need as well is of urdf_reader.
 """
 
 from __future__ import annotations
 
 import math
 
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from urdf_reader import about, from_rpy, multiply, Quaternion, rotate, Vector
+from urdf_reader import NO_ROTATION as IDENTITY
 
-IDENTITY: Quaternion = (0.0, 0.0, 0.0, 1.0)
+__all__ = [
+    'IDENTITY',
+    'Quaternion',
+    'Vector',
+    'about',
+    'about_z',
+    'axes_from_rpy',
+    'conjugate',
+    'down_in_body',
+    'from_rpy',
+    'multiply',
+    'normalized',
+    'roll_pitch_yaw',
+    'rotate',
+    'rotation_vector',
+    'tilt_of',
+    'yaw_of',
+]
 
 
 def normalized(rotation: Quaternion) -> Quaternion:
@@ -27,20 +44,7 @@ def normalized(rotation: Quaternion) -> Quaternion:
     return x / length, y / length, z / length, w / length
 
 
-def from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return the rotation by roll, then pitch, then yaw."""
-    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
-    sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
-    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
-
-
-def axes_from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> tuple[Vector, ...]:
+def axes_from_rpy(roll: float, pitch: float, yaw: float) -> tuple[Vector, ...]:
     """Return the body's axes in the world; quicker than :func:`rotate` for several vectors."""
     sr, cr = math.sin(roll), math.cos(roll)
     sp, cp = math.sin(pitch), math.cos(pitch)
@@ -78,12 +82,6 @@ def down_in_body(rotation: Quaternion) -> Vector:
     return 2 * (w * y - x * z), -2 * (y * z + w * x), 2 * (x * x + y * y) - 1.0
 
 
-def about(axis: Vector, angle: float) -> Quaternion:
-    """Return the rotation by an angle about a unit vector."""
-    sine = math.sin(angle / 2)
-    return sine * axis[0], sine * axis[1], sine * axis[2], math.cos(angle / 2)
-
-
 def about_z(angle: float) -> Quaternion:
     """Return the rotation by an angle about the vertical."""
     return 0.0, 0.0, math.sin(angle / 2), math.cos(angle / 2)
@@ -93,30 +91,6 @@ def conjugate(rotation: Quaternion) -> Quaternion:
     """Return the inverse of a rotation."""
     x, y, z, w = rotation
     return -x, -y, -z, w
-
-
-def multiply(second: Quaternion, first: Quaternion) -> Quaternion:
-    """Return the rotation that does ``first``, then ``second``."""
-    ax, ay, az, aw = second
-    bx, by, bz, bw = first
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-def rotate(rotation: Quaternion, vector: Vector) -> Vector:
-    """Return in the world a vector of the body."""
-    x, y, z, w = rotation
-    vx, vy, vz = vector
-    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return (
-        vx + w * tx + y * tz - z * ty,
-        vy + w * ty + z * tx - x * tz,
-        vz + w * tz + x * ty - y * tx,
-    )
 
 
 def rotation_vector(rotation: Quaternion) -> Vector:

@@ -8,7 +8,8 @@ import argparse
 from collections.abc import Sequence
 import sys
 
-from .exceptions import DescriptionError
+from urdf_reader import DescriptionError
+
 from .presets import PRESETS, robot_urdf
 
 

@@ -13,10 +13,10 @@ import pytest
 from quad_description.rotations import (
     about,
     about_z,
-    axes_from_roll_pitch_yaw,
+    axes_from_rpy,
     conjugate,
     down_in_body,
-    from_roll_pitch_yaw,
+    from_rpy,
     multiply,
     normalized,
     Quaternion,
@@ -29,7 +29,7 @@ from quad_description.rotations import (
 )
 
 ANGLES = st.floats(-3.1, 3.1)
-ROTATIONS = st.builds(from_roll_pitch_yaw, ANGLES, st.floats(-1.5, 1.5), ANGLES)
+ROTATIONS = st.builds(from_rpy, ANGLES, st.floats(-1.5, 1.5), ANGLES)
 VECTORS = st.tuples(*[st.floats(-10, 10)] * 3)
 
 
@@ -43,12 +43,12 @@ def test_rotations_are_a_group_that_acts(a: Quaternion, b: Quaternion, v: Vector
 @given(ANGLES, st.floats(-1.5, 1.5), ANGLES, VECTORS)
 def test_angles_turn_about_fixed_axes(roll: float, pitch: float, yaw: float, v: Vector) -> None:
     """First x, then y, then z (REP 103); the yaw comes back."""
-    rotation = from_roll_pitch_yaw(roll, pitch, yaw)
-    step = rotate(from_roll_pitch_yaw(roll, 0, 0), v)
-    step = rotate(from_roll_pitch_yaw(0, pitch, 0), step)
+    rotation = from_rpy(roll, pitch, yaw)
+    step = rotate(from_rpy(roll, 0, 0), v)
+    step = rotate(from_rpy(0, pitch, 0), step)
     assert rotate(rotation, v) == pytest.approx(rotate(about_z(yaw), step), abs=1e-9)
     assert math.remainder(yaw_of(rotation) - yaw, math.tau) == pytest.approx(0, abs=1e-9)
-    axes = axes_from_roll_pitch_yaw(roll, pitch, yaw)
+    axes = axes_from_rpy(roll, pitch, yaw)
     units = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     for axis, unit in zip(axes, units, strict=True):
         assert axis == pytest.approx(rotate(rotation, unit), abs=1e-9)
@@ -66,7 +66,7 @@ def test_a_rotation_vector_is_axis_times_angle(vector: Vector) -> None:
 @given(ANGLES, st.floats(-1.5, 1.5), ANGLES, st.floats(0.9, 1.1))
 def test_angles_come_back(roll: float, pitch: float, yaw: float, length: float) -> None:
     """Also of a quaternion that is not quite one."""
-    x, y, z, w = from_roll_pitch_yaw(roll, pitch, yaw)
+    x, y, z, w = from_rpy(roll, pitch, yaw)
     rotation = normalized((length * x, length * y, length * z, length * w))
     for found, angle in zip(roll_pitch_yaw(rotation), (roll, pitch, yaw), strict=True):
         assert math.remainder(found - angle, math.tau) == pytest.approx(0.0, abs=1e-6)

@@ -20,7 +20,7 @@ from quad_description import movable_joints, robot_urdf
 from quad_description.rotations import (
     conjugate,
     down_in_body,
-    from_roll_pitch_yaw,
+    from_rpy,
     multiply,
     Quaternion,
     rotate,
@@ -46,7 +46,7 @@ SIGNS: list[Vector] = [(x, y, z) for x, y, z in itertools.product((1.0, -1.0), r
 MOUNTINGS = st.builds(
     ImuMounting,
     st.builds(
-        from_roll_pitch_yaw,
+        from_rpy,
         st.sampled_from([0.0, math.pi]),
         st.just(0.0),
         st.sampled_from([quarter * math.pi / 2 for quarter in range(4)]),
@@ -54,7 +54,7 @@ MOUNTINGS = st.builds(
     st.sampled_from(SIGNS),
     st.sampled_from(SIGNS),
 )
-YAWED = ImuMounting(from_roll_pitch_yaw(0.0, 0.0, math.pi))  # as in the vendor's simulation
+YAWED = ImuMounting(from_rpy(0.0, 0.0, math.pi))  # as in the vendor's simulation
 
 
 def angles_of(rotation: Quaternion) -> Vector:
@@ -86,10 +86,10 @@ def held(mounting: ImuMounting, tilt: float = 20.0, yaw: float = 0.3) -> dict[St
     """What is reported while a person holds the robot as asked, with a hand that is not exact."""
     angle, odd = math.radians(tilt), 0.05
     bodies = {
-        Stance.LEVEL: from_roll_pitch_yaw(odd, -odd, yaw),
-        Stance.NOSE_DOWN: from_roll_pitch_yaw(-odd, angle, yaw + 0.1),
-        Stance.RIGHT_DOWN: from_roll_pitch_yaw(angle, odd, yaw - 0.1),
-        Stance.TURNED_LEFT: from_roll_pitch_yaw(0.0, odd, yaw + 0.8),
+        Stance.LEVEL: from_rpy(odd, -odd, yaw),
+        Stance.NOSE_DOWN: from_rpy(-odd, angle, yaw + 0.1),
+        Stance.RIGHT_DOWN: from_rpy(angle, odd, yaw - 0.1),
+        Stance.TURNED_LEFT: from_rpy(0.0, odd, yaw + 0.8),
     }
     return {stance: report(mounting, body) for stance, body in bodies.items()}
 
@@ -105,7 +105,7 @@ def test_what_is_found_turns_reports_into_the_attitude_of_the_body(
     found = find_mounting(readings)
     assert found.checked
     for roll, pitch, turn in [(0.3, 0.0, 0.0), (0.0, -0.3, 1.0), (-0.2, 0.2, -2.0)]:
-        body = from_roll_pitch_yaw(roll, pitch, turn)
+        body = from_rpy(roll, pitch, turn)
         seen = report(mounting, body)
         attitude = found.attitude(seen.attitude)
         assert down_in_body(attitude) == pytest.approx(down_in_body(body), abs=1e-6)
@@ -115,7 +115,7 @@ def test_what_is_found_turns_reports_into_the_attitude_of_the_body(
             felt = found.acceleration(seen.acceleration)
             assert [-x for x in felt] == pytest.approx(down, abs=1e-6)
     level, turned = (
-        yaw_of(found.attitude(report(mounting, from_roll_pitch_yaw(0.0, 0.0, angle)).attitude))
+        yaw_of(found.attitude(report(mounting, from_rpy(0.0, 0.0, angle)).attitude))
         for angle in (0.0, 0.5)
     )
     assert math.remainder(turned - level, math.tau) == pytest.approx(0.5, abs=1e-6)
@@ -131,7 +131,7 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
     urdf = robot_urdf('lite')
     joints = JointMap(servo_of(joint) for joint in movable_joints(urdf))
     estimator = Estimator(urdf, joints, EstimatorSettings(mounting=mounting))
-    body, turning = from_roll_pitch_yaw(0.2, -0.3, 1.0), (0.5, -1.0, 2.0)
+    body, turning = from_rpy(0.2, -0.3, 1.0), (0.5, -1.0, 2.0)
     seen = report(mounting, body)
     rates = signed(mounting.rate_signs, rotate(conjugate(mounting.rotation), turning))
     reported = Report(
@@ -211,11 +211,11 @@ def turned(
     }
     readings, start = held(mounting), ways[Stance.LEVEL]
     for stance, end in ways.items():
-        states, before = [], from_roll_pitch_yaw(*start)
+        states, before = [], from_rpy(*start)
         for tick in range(90):  # a second to turn, and a while to hold
             share = min(tick / 50, 1.0)
             roll, pitch, yaw = (a + share * (b - a) for a, b in zip(start, end, strict=True))
-            body = from_roll_pitch_yaw(roll, pitch, yaw)
+            body = from_rpy(roll, pitch, yaw)
             vector = rotation_vector(multiply(conjugate(before), body))
             felt = rotate(conjugate(mounting.rotation), vector)
             x, y, z = (

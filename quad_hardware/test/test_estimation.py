@@ -18,7 +18,7 @@ from quad_description.rotations import (
     about_z,
     conjugate,
     down_in_body,
-    from_roll_pitch_yaw,
+    from_rpy,
     IDENTITY,
     multiply,
     Quaternion,
@@ -47,7 +47,7 @@ from quad_hardware.protocol import LEG_MOTORS
 from quad_hardware.report import DEVICE_TIME_WRAP, Report
 
 ANGLES = st.floats(-3.1, 3.1)
-ROTATIONS = st.builds(from_roll_pitch_yaw, ANGLES, st.floats(-1.5, 1.5), ANGLES)
+ROTATIONS = st.builds(from_rpy, ANGLES, st.floats(-1.5, 1.5), ANGLES)
 VECTORS = st.tuples(*[st.floats(-10, 10)] * 3)
 STATE = Report(
     arrival=0.0,

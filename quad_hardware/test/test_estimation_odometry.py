@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import pytest
 
 from quad_description import FootPose, movable_joints, quadruped, robot_urdf
-from quad_description.rotations import from_roll_pitch_yaw, IDENTITY, yaw_of
+from quad_description.rotations import from_rpy, IDENTITY, yaw_of
 from quad_hardware import CommandError
 from quad_hardware.estimation import Estimator, EstimatorSettings, OdometrySettings
 from quad_hardware.estimation.odometry import ContactSource, ground_normal, LegOdometry
@@ -44,9 +44,9 @@ def test_a_rolling_foot_counts(yaw: float) -> None:
     odometry = LegOdometry(OdometrySettings(), 0.01)
     places = [(0.1, 0.1, -0.1), (0.1, -0.1, -0.1), (-0.1, 0.1, -0.1), (-0.1, -0.1, -0.1)]
     for tick in range(51):
-        turned = from_roll_pitch_yaw(0.0, tick * 0.01, 0.0)
+        turned = from_rpy(0.0, tick * 0.01, 0.0)
         poses = [FootPose(place, turned) for place in places]
-        state = odometry.update(tick * PERIOD, poses, from_roll_pitch_yaw(0.0, 0.0, yaw))
+        state = odometry.update(tick * PERIOD, poses, from_rpy(0.0, 0.0, yaw))
     assert state.x == pytest.approx(0.5 * 0.01, rel=1e-3)
     assert state.y == pytest.approx(0.0, abs=1e-9)
     assert state.height == pytest.approx(0.11)
@@ -63,7 +63,7 @@ def test_both_feet_of_a_diagonal_stand_on_a_slope(degrees: float) -> None:
             for leg, (x, y) in enumerate(((0.1, 0.1), (0.1, -0.1), (-0.1, 0.1), (-0.1, -0.1)))
         ]
         odometry.command(tick * PERIOD, feet)
-        attitude = from_roll_pitch_yaw(0.0, pitched, 0.0)
+        attitude = from_rpy(0.0, pitched, 0.0)
         poses = [FootPose(foot, IDENTITY) for foot in feet]
         state = odometry.update(tick * PERIOD, poses, attitude)
         if tick > 20 and tick % 10 == 5:

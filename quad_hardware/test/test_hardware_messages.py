@@ -23,7 +23,7 @@ from tf2_msgs.msg import TFMessage
 from message_templates import MessageTemplate, SerializedTemplate
 from quad_description import FEET, ImuSample, JointSample, movable_joints, robot_urdf
 from quad_description.rotations import (
-    from_roll_pitch_yaw,
+    from_rpy,
     IDENTITY,
     multiply,
     rotate,
@@ -54,7 +54,7 @@ DEVIATIONS = Deviations(orientation=0.02, rate=0.15, gyro=0.02, acceleration=0.3
 COMMANDED = ContactSource.COMMANDED_HEIGHT
 PLACE = OdometryState(1.0, 2.0, 0.11, IDENTITY, 0.2, 0.05, 3.0, (True,) * 4, COMMANDED)
 IMU = ImuSample(IDENTITY, (0.1, 0.2, 0.3), (0.0, 0.0, 9.8), rate_differentiated=True)
-ROTATIONS = st.builds(from_roll_pitch_yaw, *[st.floats(-1.2, 1.2)] * 3)
+ROTATIONS = st.builds(from_rpy, *[st.floats(-1.2, 1.2)] * 3)
 
 
 @given(ROTATIONS, st.sampled_from([FRAMES, PARENT]))

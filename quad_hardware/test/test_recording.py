@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_description import ImuSample, RobotState
-from quad_description.rotations import from_roll_pitch_yaw
+from quad_description.rotations import from_rpy
 from quad_hardware import LinkError, RecordingError
 from quad_hardware.link import LinkState
 from quad_hardware.protocol import Fault, Model
@@ -219,7 +219,7 @@ def looks(
 ) -> list[str]:
     """Return what begins in some reports; the clock is that of arrival and of the board [s]."""
     arrival, device = clock
-    imu = ImuSample(from_roll_pitch_yaw(roll, 0.0, 0.0), None, None)
+    imu = ImuSample(from_rpy(roll, 0.0, 0.0), None, None)
     begun = []
     for number in range(count):
         report = Report(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import pytest
 
 from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
-from quad_description.rotations import from_roll_pitch_yaw, rotate
+from quad_description.rotations import from_rpy, rotate
 from quad_hardware.estimation import OdometrySettings, OdometryState
 from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import Terrain
@@ -70,7 +70,7 @@ def walk(
         time = tick * PERIOD
         measured = [q + rng.gauss(0, math.radians(0.1)) for q in robot.joint_positions.tolist()]
         attitude = [angle + rng.gauss(0, math.radians(0.1)) for angle in robot.imu.roll_pitch_yaw]
-        state = odometry.update(time, ROBOT.foot_poses(measured), from_roll_pitch_yaw(*attitude))
+        state = odometry.update(time, ROBOT.foot_poses(measured), from_rpy(*attitude))
         right += sum(map(operator.eq, state.standing, robot.foot_contacts))
         ramp = min(time / 0.5, 1.0)
         speed = velocity[0] * ramp, velocity[1] * ramp

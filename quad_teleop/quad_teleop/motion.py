@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import auto, Enum
 
-from quad_description.rotations import from_roll_pitch_yaw, Quaternion
+from quad_description.rotations import from_rpy, Quaternion
 
 from .exceptions import SettingError
 
@@ -112,7 +112,7 @@ class BodyPose:
 
     def quaternion(self) -> Quaternion:
         """Return the attitude as a unit quaternion (x, y, z, w)."""
-        return from_roll_pitch_yaw(self.roll, self.pitch, self.yaw)
+        return from_rpy(self.roll, self.pitch, self.yaw)
 
 
 NEUTRAL = BodyPose()

@@ -8,7 +8,6 @@ the nodes are in :mod:`.nodes`. Descriptions are read by urdf_reader.
 """
 
 from .joint_watch import JointWatch
-from .link_poses import joint_transform
 from .state_publisher import (
     FrameTransform,
     MessageProblem,
@@ -24,5 +23,4 @@ __all__ = [
     'MessageProblem',
     'Settings',
     'StatePublisher',
-    'joint_transform',
 ]

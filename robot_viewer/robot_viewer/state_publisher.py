@@ -14,13 +14,13 @@ import math
 
 from urdf_reader import (
     Joint,
+    joint_position,
+    joint_transform,
     JointKind,
     KinematicTree,
     MOVABLE,
     Transform,
 )
-
-from .link_poses import joint_position, joint_transform
 
 HIGHEST_FREQUENCY = 1000.0
 """Greatest ``publish_frequency`` in [Hz] (robot_state_publisher 3.3.3)."""

@@ -19,18 +19,16 @@ import pytest
 from rclpy.node import Node
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import String
-from urdf_reader import from_rpy, read_urdf, Vector
+from urdf_reader import centre_of_mass, from_rpy, link_poses, read_urdf, Vector
 from viewer_rig import in_domain, ViewerRig
 
 from node_runner import LATCHED
 from quad_msgs.msg import FootContacts
-from robot_viewer.link_poses import link_poses
 from robot_viewer.nodes.body import Body
 from robot_viewer.page.body_panel import BodyPanel, DOWN_COLOR
 from robot_viewer.page.robot_page import RobotPage
 from robot_viewer.page.standing import (
     battery_text,
-    centre_of_mass,
     Contacts,
     feet_of,
     horizon_html,

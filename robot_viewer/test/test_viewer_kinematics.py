@@ -13,12 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio
 import pytest
-from urdf_reader import about, KinematicTree, multiply, read_urdf, rotate
+from urdf_reader import about, joint_transform, KinematicTree, multiply, read_urdf, rotate
 from urdf_robots import random_urdfs
 
 from robot_viewer import (
     FrameTransform,
-    joint_transform,
     Settings,
     StatePublisher,
 )

@@ -8,9 +8,26 @@ description here: the model of an arm, publishers of joint states and of /tf, br
 
 from .exceptions import DescriptionError, MeshFileError, XacroError
 from .groups import find_group, JointGroup
+from .kinematics import (
+    centre_of_mass,
+    joint_position,
+    joint_transform,
+    link_poses,
+    parents_first,
+)
 from .mesh_files import find_mesh, find_package, mesh_unit
 from .srdf import EndEffector, Group, Pair, parse_srdf, SemanticDescription
-from .transforms import about, from_rpy, multiply, Quaternion, rotate, Transform, Vector
+from .transforms import (
+    about,
+    compose,
+    from_rpy,
+    multiply,
+    NO_ROTATION,
+    Quaternion,
+    rotate,
+    Transform,
+    Vector,
+)
 from .urdf import (
     Joint,
     JointKind,
@@ -26,6 +43,7 @@ from .xacro_files import expand_xacro
 
 __all__ = [
     'MOVABLE',
+    'NO_ROTATION',
     'DescriptionError',
     'EndEffector',
     'Group',
@@ -45,13 +63,19 @@ __all__ = [
     'Vector',
     'XacroError',
     'about',
+    'centre_of_mass',
+    'compose',
     'expand_xacro',
     'find_group',
     'find_mesh',
     'find_package',
     'from_rpy',
+    'joint_position',
+    'joint_transform',
+    'link_poses',
     'mesh_unit',
     'multiply',
+    'parents_first',
     'parse_srdf',
     'read_urdf',
     'rotate',

@@ -4,7 +4,8 @@
 
 Conventions, here and in the whole package: translations are (x, y, z) in [m]; quaternions are
 (x, y, z, w), as in geometry_msgs; a transform *a to b* maps coordinates in b to coordinates in a
-(the pose of b in a), as in tf2, where a is ``header.frame_id`` and b ``child_frame_id``.
+(the pose of b in a), as in tf2, where a is ``header.frame_id`` and b ``child_frame_id``. Plain
+floats, no arrays: one rotation of one vector costs a tenth of what numpy takes.
 """
 
 from __future__ import annotations
@@ -27,42 +28,50 @@ class Transform:
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Make a quaternion of fixed-axis angles, as URDF's ``rpy`` means them: Rz * Ry * Rx.
-
-    Args:
-        pitch: About y in [rad].
-    """
-    about_x = about((1.0, 0.0, 0.0), roll)
-    about_y = about((0.0, 1.0, 0.0), pitch)
-    about_z = about((0.0, 0.0, 1.0), yaw)
-    return multiply(about_z, multiply(about_y, about_x))
+    """Return the rotation by angles about fixed axes x, y, z in [rad], in this order (REP 103)."""
+    sr, cr = math.sin(roll / 2), math.cos(roll / 2)
+    sp, cp = math.sin(pitch / 2), math.cos(pitch / 2)
+    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
 
 
 def about(axis: Vector, angle: float) -> Quaternion:
-    """Make a quaternion of a rotation about an axis.
-
-    Args:
-        axis: Unit vector.
-    """
-    sine = math.sin(0.5 * angle)
-    return (axis[0] * sine, axis[1] * sine, axis[2] * sine, math.cos(0.5 * angle))
+    """Return the rotation by an angle in [rad] about a unit vector."""
+    sine = math.sin(angle / 2)
+    return sine * axis[0], sine * axis[1], sine * axis[2], math.cos(angle / 2)
 
 
-def multiply(left: Quaternion, right: Quaternion) -> Quaternion:
-    """Multiply quaternions: first the rotation ``right``, then ``left``."""
-    lx, ly, lz, lw = left
-    rx, ry, rz, rw = right
+def multiply(second: Quaternion, first: Quaternion) -> Quaternion:
+    """Return the rotation that does ``first``, then ``second``."""
+    ax, ay, az, aw = second
+    bx, by, bz, bw = first
     return (
-        lw * rx + lx * rw + ly * rz - lz * ry,
-        lw * ry - lx * rz + ly * rw + lz * rx,
-        lw * rz + lx * ry - ly * rx + lz * rw,
-        lw * rw - lx * rx - ly * ry - lz * rz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
     )
 
 
 def rotate(rotation: Quaternion, vector: Vector) -> Vector:
     """Rotate a vector."""
     x, y, z, w = rotation
-    inverse = (-x, -y, -z, w)
-    turned = multiply(multiply(rotation, (*vector, 0.0)), inverse)
-    return turned[:3]
+    vx, vy, vz = vector
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
+
+
+def compose(parent: Transform, child: Transform) -> Transform:
+    """Return the pose of what is in a frame that is in another one."""
+    x, y, z = rotate(parent.rotation, child.translation)
+    a, b, c = parent.translation
+    return Transform((a + x, b + y, c + z), multiply(parent.rotation, child.rotation))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 
-from quad_description.rotations import axes_from_roll_pitch_yaw, Vector
+from quad_description.rotations import axes_from_rpy, Vector
 
 from .velocity import approach
 
@@ -79,7 +79,7 @@ def feet_in_body(feet: Sequence[Vector], pose: BodyPose, centre: Vector) -> list
         feet: Feet in the frame of a body at its normal pose in [m].
         centre: Point that the body turns about in [m].
     """
-    axes = axes_from_roll_pitch_yaw(pose.roll, pose.pitch, pose.yaw)
+    axes = axes_from_rpy(pose.roll, pose.pitch, pose.yaw)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = axes
     cx, cy, cz = centre
     moved_x, moved_y, moved_z = cx + pose.x, cy + pose.y, cz + pose.z

@@ -18,10 +18,17 @@ from dataclasses import dataclass
 import math
 from typing import Final
 
-from ..exceptions import DescriptionError
-from ..rotations import Quaternion, rotate, Vector
-from ..urdf import Description, Joint, JointKind, JointLimits
-from .tree import BASE, link_poses
+from urdf_reader import (
+    DescriptionError,
+    JointKind,
+    KinematicTree,
+    link_poses,
+    Quaternion,
+    rotate,
+    Vector,
+)
+
+from ..urdf import JointLimits, limits_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +136,7 @@ LEGS: Final = ('fl', 'fr', 'bl', 'br')
 FEET: Final = tuple(f'{leg}_foot' for leg in LEGS)
 """Links of the feet, in the order of the legs."""
 
+BASE: Final = 'base_link'  # link of the body
 AXIS_TOLERANCE = 1e-6
 _TURNING = (JointKind.REVOLUTE, JointKind.CONTINUOUS)
 _EXPECTED: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0))
@@ -156,7 +164,7 @@ class LegGeometry:
     limits: tuple[JointLimits, JointLimits, JointLimits]  # ranges of the three joints
 
 
-def leg_geometry(description: Description, leg: str) -> LegGeometry:
+def leg_geometry(tree: KinematicTree, leg: str) -> LegGeometry:
     """Derive the geometry of a leg from the joints between base_link and its foot.
 
     Args:
@@ -166,22 +174,35 @@ def leg_geometry(description: Description, leg: str) -> LegGeometry:
         DescriptionError: Other than three turning joints move the foot, an axis points
             elsewhere, or a length is zero.
     """
-    joints = _chain(description, f'{leg}_foot')
-    poses = link_poses(description, {})
+    foot_link = f'{leg}_foot'
+    joints = [each for each in tree.chain(BASE, foot_link) if each.kind is not JointKind.FIXED]
+    names = tuple(joint.name for joint in joints)
+    for joint in joints:
+        if joint.kind not in _TURNING or joint.mimic is not None:
+            raise DescriptionError(
+                f'{joint.name} is in a leg and is not a turning joint of its own'
+            )
+    if len(joints) != len(_EXPECTED):
+        raise DescriptionError(
+            f'{len(joints)} joints move {foot_link} ({", ".join(names)}); a leg has hip, thigh '
+            'and calf'
+        )
+    poses = link_poses(tree, {}, BASE)
     signs = [
         _sign(rotate(poses[joint.child].rotation, joint.axis), unit, joint.name)
         for joint, unit in zip(joints, _EXPECTED, strict=True)
     ]
-    hip, thigh, calf = (poses[joint.child].position for joint in joints)
-    foot = poses[f'{leg}_foot'].position
+    hip, thigh, calf = (poses[joint.child].translation for joint in joints)
+    foot = poses[foot_link].translation
     thigh_length, thigh_pitch = _in_plane(thigh, calf)
     calf_length, calf_pitch = _in_plane(calf, foot)
     if min(thigh_length, calf_length) < AXIS_TOLERANCE:
         raise DescriptionError(f'leg {leg}: thigh or calf has no length')
-    limits = (joints[0].limits, joints[1].limits, joints[2].limits)
-    middle = calf_pitch - thigh_pitch + signs[2] * _middle(limits[2])
+    limits = [limits_of(joint) for joint in joints]
+    knee = limits[2].lower + limits[2].upper  # of a joint without ends, not a number
+    middle = calf_pitch - thigh_pitch + signs[2] * (knee / 2 if math.isfinite(knee) else 0.0)
     return LegGeometry(
-        joints=(joints[0].name, joints[1].name, joints[2].name),
+        joints=(names[0], names[1], names[2]),
         hip=hip,
         thigh_x=thigh[0] - hip[0],
         thigh_z=thigh[2] - hip[2],
@@ -192,35 +213,8 @@ def leg_geometry(description: Description, leg: str) -> LegGeometry:
         calf_pitch=calf_pitch,
         signs=(signs[0], signs[1], signs[2]),
         knee_sign=math.copysign(1.0, middle),
-        limits=limits,
+        limits=(limits[0], limits[1], limits[2]),
     )
-
-
-def _chain(description: Description, foot: str) -> list[Joint]:
-    """Return the turning joints from the body to a foot."""
-    above = {joint.child: joint for joint in description.joints}
-    chain: list[Joint] = []
-    link = foot
-    while link != BASE:
-        if link not in above:
-            raise DescriptionError(
-                f'the robot description has no chain from {BASE} to {foot}: nothing moves {link}'
-            )
-        joint = above.pop(link)
-        if joint.kind is not JointKind.FIXED:
-            chain.insert(0, joint)
-        link = joint.parent
-    for joint in chain:
-        if joint.kind not in _TURNING or joint.mimics:
-            raise DescriptionError(
-                f'{joint.name} is in a leg and is not a turning joint of its own'
-            )
-    if len(chain) != len(_EXPECTED):
-        raise DescriptionError(
-            f'{len(chain)} joints move {foot} ({", ".join(joint.name for joint in chain)}); a leg '
-            'has hip, thigh and calf'
-        )
-    return chain
 
 
 def _sign(axis: Vector, unit: Vector, name: str) -> float:
@@ -237,9 +231,3 @@ def _in_plane(upper: Vector, lower: Vector) -> tuple[float, float]:
     """Return length and pitch of a link, seen from the side."""
     x, z = lower[0] - upper[0], lower[2] - upper[2]
     return math.hypot(x, z), math.atan2(-x, -z)
-
-
-def _middle(limits: JointLimits) -> float:
-    if math.isinf(limits.lower) or math.isinf(limits.upper):
-        return 0.0
-    return (limits.lower + limits.upper) / 2

@@ -4,15 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import NamedTuple
 
-from ..exceptions import DescriptionError
-from ..rotations import Quaternion, Vector
-from ..urdf import Description, JointLimits, parse
+from urdf_reader import (
+    centre_of_mass,
+    DescriptionError,
+    KinematicTree,
+    link_poses,
+    Quaternion,
+    read_urdf,
+    Vector,
+)
+
+from ..urdf import JointLimits, movable_joints
 from .leg import (
+    BASE,
     calf_rotation,
     FEET,
     foot_position,
@@ -22,7 +31,6 @@ from .leg import (
     LegSolution,
     solve,
 )
-from .tree import centre_of_mass
 
 MAX_GAP = 0.005  # [m] above the plane of the other three, of a foot that stands
 
@@ -80,7 +88,7 @@ class FootPose(NamedTuple):
 class Quadruped:
     """A robot."""
 
-    description: Description  # what the URDF says
+    tree: KinematicTree  # what the URDF says
     names: tuple[str, ...]  # commanded joints in the order of the URDF
     limits: tuple[JointLimits, ...]  # their ranges, in the same order
     legs: tuple[LegGeometry, ...]  # the four legs in the order of :data:`LEGS`
@@ -146,12 +154,7 @@ class Quadruped:
         return self.with_legs([solution.angles for solution in solutions], others)
 
     def with_legs(self, angles: Sequence[Vector], others: Sequence[float]) -> Targets:
-        """Put positions of hip, thigh and calf of each leg among those of all joints.
-
-        Args:
-            angles: Of each leg in [rad].
-            others: Positions of all joints; those of the legs in it are replaced.
-        """
+        """Do as :meth:`place` with positions of hip, thigh and calf of each leg [rad]."""
         targets = list(others)
         for (hip, thigh, calf), leg in zip(self.leg_indices, angles, strict=True):
             targets[hip], targets[thigh], targets[calf] = leg
@@ -185,7 +188,10 @@ class Quadruped:
                     'folded and straight legs'
                 )
             placed = self.place(solutions, placed)
-            centre = centre_of_mass(self.description, self._named(placed))
+            named = dict(zip(self.names, placed, strict=True))
+            centre = centre_of_mass(self.tree.masses(), link_poses(self.tree, named, BASE))
+            if centre is None:
+                raise DescriptionError('the robot description has no masses (inertial/mass)')
             shift = centre[0] - self.hip_centre[0]
         return self._feet_below(shift, height)
 
@@ -196,9 +202,6 @@ class Quadruped:
         )
         return one, two, three, four
 
-    def _named(self, positions: Sequence[float]) -> Mapping[str, float]:
-        return dict(zip(self.names, positions, strict=True))
-
 
 def quadruped(urdf: str) -> Quadruped:
     """Make the model of a robot from its URDF.
@@ -206,18 +209,20 @@ def quadruped(urdf: str) -> Quadruped:
     Raises:
         DescriptionError: It is no URDF of a quadruped whose legs turn about x, y and y.
     """
-    description = parse(urdf)
-    commanded = description.commanded
-    names = tuple(joint.name for joint in commanded)
-    legs = tuple(leg_geometry(description, leg) for leg in LEGS)
+    tree = read_urdf(urdf)
+    joints = movable_joints(tree)
+    names = tuple(joint.name for joint in joints)
+    legs = tuple(leg_geometry(tree, leg) for leg in LEGS)
+    shapes = (*tree.collisions(), *tree.visuals())
+    feet = (each for each in shapes if each.link == FEET[0] and each.shape == 'sphere')
     return Quadruped(
-        description=description,
+        tree=tree,
         names=names,
-        limits=tuple(joint.limits for joint in commanded),
+        limits=tuple(joint.limits for joint in joints),
         legs=legs,
         leg_indices=tuple(_indices(names, leg) for leg in legs),
-        mass=sum(point.mass for point in description.masses.values()),
-        foot_radius=description.spheres.get(f'{LEGS[0]}_foot', 0.0),
+        mass=sum(point.mass for point in tree.masses()),
+        foot_radius=next((foot.lengths('radius')[0] for foot in feet), 0.0),
     )
 
 

@@ -15,7 +15,7 @@ import math
 
 from quad_description.rotations import (
     conjugate,
-    from_roll_pitch_yaw,
+    from_rpy,
     multiply,
     rotate,
     rotation_vector,
@@ -64,7 +64,7 @@ _SIGNS: tuple[Vector, ...] = tuple(
     (x, y, z) for x, y, z in itertools.product((1.0, -1.0), repeat=3)
 )
 _ROTATIONS = tuple(
-    from_roll_pitch_yaw(roll, 0.0, quarter * math.pi / 2)
+    from_rpy(roll, 0.0, quarter * math.pi / 2)
     for roll in (0.0, math.pi)
     for quarter in (0, 1, 2, 3)
 )

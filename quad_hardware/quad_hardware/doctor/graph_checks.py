@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from quad_description import DescriptionError
-from quad_description.urdf import parse
+from urdf_reader import DescriptionError, read_urdf
+
+from quad_description import movable_joints
 
 from .finding import error, Finding, good, note, warning
 
@@ -114,7 +115,7 @@ def _check_joints(seen: Observation) -> Iterator[Finding]:
         yield warning('robot_description', 'no publisher', remedy)
         return
     try:
-        wanted = [joint.name for joint in parse(seen.urdf).commanded]
+        wanted = [joint.name for joint in movable_joints(seen.urdf)]
     except DescriptionError as problem:
         yield error('robot_description', str(problem), 'correct the URDF')
         return
@@ -135,7 +136,7 @@ def _check_transforms(seen: Observation) -> Iterator[Finding]:
     if not seen.urdf:
         return
     try:
-        lost = links_without_place(parse(seen.urdf).links, seen.parents)
+        lost = links_without_place(read_urdf(seen.urdf).links, seen.parents)
     except DescriptionError:
         return  # said above
     if lost:

@@ -13,7 +13,7 @@ import math
 
 from quad_description.rotations import (
     conjugate,
-    from_roll_pitch_yaw,
+    from_rpy,
     IDENTITY,
     multiply,
     Quaternion,
@@ -42,7 +42,7 @@ class ImuMounting:
     def attitude(self, reported: Vector) -> Quaternion:
         """Return the attitude of base_link for reported roll, pitch and yaw [deg]."""
         roll, pitch, yaw = map(math.radians, _signed(self.attitude_signs, reported))
-        return multiply(from_roll_pitch_yaw(roll, pitch, yaw), conjugate(self.rotation))
+        return multiply(from_rpy(roll, pitch, yaw), conjugate(self.rotation))
 
     def acceleration(self, reported: Vector) -> Vector:
         """Return a specific force in base_link [m/s²]."""

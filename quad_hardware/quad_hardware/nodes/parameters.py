@@ -17,7 +17,7 @@ from node_runner import (
     refuse_misspelt,
 )
 from quad_description import DescriptionError, Joint, movable_joints, PRESETS, robot_urdf
-from quad_description.rotations import from_roll_pitch_yaw, Vector
+from quad_description.rotations import from_rpy, Vector
 
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
@@ -227,7 +227,7 @@ def _mounting(read: ParameterReader) -> ImuMounting:
         read, 'imu.mounting', (0.0, 0.0, 0.0), 'roll, pitch, yaw of the IMU in base_link [rad]'
     )
     return ImuMounting(
-        from_roll_pitch_yaw(roll, pitch, yaw),
+        from_rpy(roll, pitch, yaw),
         _signs(read, 'imu.attitude_signs', 'of roll, pitch and yaw as they are reported'),
         _signs(read, 'imu.acceleration_signs', 'of the specific force; +9.8 upwards at rest'),
         _signs(read, 'imu.rate_signs', 'of the angular velocity'),

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import math
 
 from quad_description import LegGeometry, LEGS, quadruped
-from quad_description.rotations import conjugate, from_roll_pitch_yaw, rotate, Vector
+from quad_description.rotations import conjugate, from_rpy, rotate, Vector
 
 PERIOD = 0.28  # [s] of a stride; longer ones lose speed and roll
 DUTY = 0.55  # share of a stride that a foot is on the ground
@@ -105,7 +105,7 @@ class Walker:
             y + left - stance.shift[1],
             -stance.height + dz + up * self.lift * self._stride,
         )
-        to_body = conjugate(from_roll_pitch_yaw(*stance.attitude))
+        to_body = conjugate(from_rpy(*stance.attitude))
         x, y, z = rotate(to_body, ground)
         return middle + x, y, hip_height + z
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from quad_description import Backend, ImuSample, JointSample, RobotState
-from quad_description.rotations import from_roll_pitch_yaw, Quaternion, Vector
+from quad_description.rotations import from_rpy, Quaternion, Vector
 
 from ..exceptions import SetupError
 from .robot import Robot
@@ -28,7 +28,7 @@ class ImuBias:
 
     def orientation(self, roll: float, pitch: float, yaw: float) -> Quaternion:
         """Return what is measured of an attitude [rad]."""
-        return from_roll_pitch_yaw(roll + self.roll, pitch + self.pitch, yaw)
+        return from_rpy(roll + self.roll, pitch + self.pitch, yaw)
 
     def rates(self, angular_velocity: Vector) -> Vector:
         """Return what is measured of an angular velocity [rad/s]."""

@@ -14,9 +14,9 @@ from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
+from urdf_reader import JointKind, read_urdf
 
 from quad_description import FEET, Joint, movable_joints
-from quad_description.urdf import JointKind, parse
 
 from ..exceptions import SetupError
 from ..plant.servo import JAW, ServoParameters
@@ -120,7 +120,7 @@ def _load(urdf: str) -> mujoco.MjSpec:
     """Read the robot, but for frames on floating joints, for which MuJoCo has no place."""
     spec = mujoco.MjSpec.from_string(urdf)
     spec.compiler.fusestatic = False  # feet and IMU stay links of their own
-    for joint in parse(urdf).joints:
+    for joint in read_urdf(urdf).joints:
         if joint.kind is JointKind.FLOATING:
             spec.delete(_body(spec, joint.child))
     return spec

@@ -16,13 +16,19 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import qos_profile_sensor_data, QoSProfile
 from sensor_msgs.msg import BatteryState, Imu
-from urdf_reader import DescriptionError, from_rpy, KinematicTree, PointMass, Quaternion
+from urdf_reader import (
+    centre_of_mass,
+    DescriptionError,
+    from_rpy,
+    KinematicTree,
+    link_poses,
+    PointMass,
+    Quaternion,
+)
 
-from ..link_poses import link_poses
 from ..page.body_panel import BodyPanel, Pose
 from ..page.standing import (
     battery_text,
-    centre_of_mass,
     Contacts,
     feet_of,
     foot_radius,

@@ -14,6 +14,8 @@ import numpy as np
 from urdf_reader import (
     DescriptionError,
     Joint,
+    joint_position,
+    joint_transform,
     KinematicTree,
     MeshFileError,
     Transform,
@@ -21,7 +23,7 @@ from urdf_reader import (
 )
 from viser import FrameHandle, SceneApi, SceneNodeHandle
 
-from ..link_poses import joint_position, joint_transform, link_paths
+from ..link_poses import link_paths
 from ..shapes import Meshes, PLAIN, shapes_of
 
 ROOT = '/robot'

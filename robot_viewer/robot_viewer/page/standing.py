@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from html import escape
 import math
 
-from urdf_reader import KinematicTree, PointMass, Quaternion, rotate, Transform, Vector
+from urdf_reader import KinematicTree, Quaternion, rotate, Transform, Vector
 
 FOOT = '_foot'
 """How the names of the links of feet end."""
@@ -92,25 +92,6 @@ def foot_radius(tree: KinematicTree, foot: str) -> float:
     """
     balls = (s for s in tree.collisions() if s.link == foot and s.shape == 'sphere')
     return next((ball.lengths('radius')[0] for ball in balls), 0.0)
-
-
-def centre_of_mass(masses: Sequence[PointMass], poses: Mapping[str, Transform]) -> Vector | None:
-    """Return it in the root link in [m]; None without masses.
-
-    Args:
-        masses: Of the links.
-        poses: Of the links in the root link.
-    """
-    total, x, y, z = 0.0, 0.0, 0.0, 0.0
-    for part in masses:
-        pose = poses[part.link]
-        dx, dy, dz = rotate(pose.rotation, part.centre)
-        px, py, pz = pose.translation
-        total += part.mass
-        x += part.mass * (px + dx)
-        y += part.mass * (py + dy)
-        z += part.mass * (pz + dz)
-    return (x / total, y / total, z / total) if total > 0.0 else None
 
 
 def support(
