@@ -36,7 +36,10 @@ builds = pytest.mark.parametrize(('preset', 'arm'), BUILDS)
 # roll axis, knee and pad of a left leg at zero [m], as the vendor's model has them
 HIP_X = {'f': 0.04946, 'b': -0.10059}
 ANGLE = st.floats(-1.0, 1.0)
-BROKEN = '<robot><link name="b"/><link name="c"/><joint name="a" type="revolute"><parent link="b"/><child link="c"/>{}</joint></robot>'
+BROKEN = (
+    '<robot><link name="b"/><link name="c"/>'
+    '<joint name="a" type="revolute"><parent link="b"/><child link="c"/>{}</joint></robot>'
+)
 
 
 @builds
