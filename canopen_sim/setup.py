@@ -16,5 +16,4 @@ runpy.run_path(str(SHARED))['setup_package'](
         'fake_slaves = canopen_sim.nodes.fake_slaves:main',
     ],
     commands=['canopen-fake-slaves = canopen_sim.fake_slaves_command:main'],
-    folders=['scenarios'],
 )

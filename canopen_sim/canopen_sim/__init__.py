@@ -5,10 +5,10 @@
 The names here are the public API.
 """
 
+from .deviations import Fault, FaultInjection
 from .device import Device
 from .drive.drive import Drive
 from .drive.servo import ServoModel
-from .fault import Fault, FaultInjection
 from .host import DeviceHost
 from .runner import DeviceRunner
 from .simulation import simulated_devices

@@ -26,8 +26,8 @@ from .drive.drive import Drive
 from .drive.rate import INCREMENTS_PER_SECOND, RateUnits
 from .drive.servo import ServoModel
 from .drive.shared_errors import SharedErrors
-from .faults.injector import FaultInjector
-from .faults.line import FaultLine, Traffic
+from .injector import FaultInjector
+from .line import FaultLine, Traffic
 from .objects.object_store import ObjectStore
 from .objects.parameter_memory import ParameterMemory
 from .objects.parameter_storage import ParameterStorage

@@ -26,7 +26,7 @@ from arm_canopen.standard import (
     UploadSegmentRequest,
 )
 from arm_canopen.standard.sdo import Abort, Response, Segment
-from canopen_sim import Device, Drive
+from canopen_sim import Device, Drive, Fault, FaultInjection
 
 EDS = Path(__file__).parents[2] / 'arm_canopen' / 'eds' / 'cia402_drive.eds'
 NODE_ID = 5
@@ -141,6 +141,15 @@ class Rig:
     def sync(self) -> None:
         """Send a SYNC."""
         self.send(0x080)
+
+    def inject(self, fault: Fault, **settings: object) -> None:
+        """Begin a fault now."""
+        injection = FaultInjection(fault, **settings)  # type: ignore[arg-type]
+        self.device.faults.inject(injection, self.now)
+
+    def cure(self, fault: Fault | None = None) -> None:
+        """End a fault, or all."""
+        self.device.faults.end(self.now, fault)
 
     def nmt(self, command: NmtCommand, node_id: int | None = None) -> None:
         """Send an NMT command, to the device unless another id is given."""

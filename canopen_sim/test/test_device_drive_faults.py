@@ -9,7 +9,7 @@ import pytest
 
 from arm_canopen import DriveState
 from arm_canopen.config import load_eds
-from canopen_sim import Fault
+from canopen_sim import Fault, FaultInjection
 
 FAULTS = [fault for fault in Fault if fault.value.code]
 
@@ -21,7 +21,7 @@ def test_fault_has_its_code_and_stays_while_its_cause_does(fault: Fault, mode: i
     rig = Rig()
     rig.enable(mode)
     rig.take()
-    rig.drive.inject(fault, rig.now)
+    rig.inject(fault, duration=9.0)
     rig.run(0.5)
     assert rig.state is DriveState.FAULT
     assert rig.get(0x603F) == fault.value.code
@@ -30,7 +30,7 @@ def test_fault_has_its_code_and_stays_while_its_cause_does(fault: Fault, mode: i
     ]
     rig.command(FAULT_RESET, 0)
     assert rig.state is DriveState.FAULT
-    rig.drive.clear(fault, rig.now)
+    rig.cure(fault)
     rig.command(FAULT_RESET, 0)
     assert rig.get(0x6041) & 0x4F == 0x40
     assert rig.get(0x603F) == 0
@@ -46,7 +46,7 @@ def test_lost_encoder_leaves_no_ramp() -> None:
         rig.put(0x60FF, 2000)
         rig.enable(3)
         rig.run(1.0)
-        rig.drive.inject(fault, rig.now)
+        rig.inject(fault)
         assert rig.state is expected
 
 
@@ -56,7 +56,7 @@ def test_safe_torque_off_is_no_fault() -> None:
     rig.put(0x60FF, 2000)
     rig.enable(3)
     rig.run(1.0)
-    rig.drive.inject(Fault.STO, rig.now)
+    rig.inject(Fault.STO)
     assert rig.state is DriveState.SWITCH_ON_DISABLED
     assert not rig.statusword & 0x10
     assert rig.get(0x6079) == 0
@@ -64,7 +64,7 @@ def test_safe_torque_off_is_no_fault() -> None:
     assert rig.velocity == 0.0
     rig.command(SHUTDOWN, SWITCH_ON, ENABLE)
     assert rig.get(0x6041) & 0x6F == 0x21
-    rig.drive.clear(Fault.STO, rig.now)
+    rig.cure(Fault.STO)
     assert rig.get(0x6041) & 0x6F == 0x27
 
 
@@ -138,7 +138,7 @@ def test_axes_are_apart_and_share_their_errors() -> None:
     first, second = rig.device.drives
     rig.take()
     for drive in (first, second):
-        drive.inject(Fault.OVER_TEMPERATURE, rig.now, lasting=False)
+        drive.inject(FaultInjection(Fault.OVER_TEMPERATURE), rig.now)
     rig.run(0.5)
     assert (rig.get(0x603F), rig.get(0x683F)) == (0x4310, 0x4310)
     rig.command(FAULT_RESET, 0)

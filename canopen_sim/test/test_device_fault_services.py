@@ -18,7 +18,7 @@ import pytest
 from arm_canopen.can import Bus, open_bus
 from arm_canopen.standard import Statusword
 from canopen_sim import DeviceRunner, Fault
-from canopen_sim.fault import FAULTS
+from canopen_sim.deviations import FAULTS
 
 rclpy = pytest.importorskip('rclpy')
 pytest.importorskip('arm_msgs')

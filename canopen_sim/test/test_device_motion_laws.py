@@ -56,8 +56,8 @@ def perform(rig: Rig, kind: str, value: object) -> None:
         case 'target', ((int(index), int(subindex)), int(target)):
             rig.put(index, target, subindex)
         case 'fault', Fault() as fault:
-            rig.drive.inject(fault, rig.now)
-            rig.drive.clear(fault, rig.now)
+            rig.inject(fault, duration=9.0)
+            rig.cure(fault)
         case 'block', float(place):
             rig.drive.block(place, rig.now)
             rig.drive.release(rig.now)

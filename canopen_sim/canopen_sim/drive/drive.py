@@ -14,7 +14,7 @@ import math
 from arm_canopen import DriveState as State
 from arm_canopen.standard import Controlword, STATE_WORDS, Statusword
 
-from ..fault import Fault
+from ..deviations import Fault, FaultInjection
 from ..objects.object_store import ObjectStore
 from ..timed import NEVER
 from .axis import Axis
@@ -187,52 +187,42 @@ class Drive:
         self._fail(code, now, at_once=at_once)
         self._publish(now)
 
-    def count_rates_in(
-        self, velocity: float | None, acceleration: float | None, now: float | None = None
+    def inject(self, injection: FaultInjection, now: float) -> None:
+        """Begin a fault; the cause of one that lasts stays until :meth:`clear`."""
+        fault, kind = injection.fault, injection.fault.value
+        if injection.lasting:
+            self.causes.add(fault)
+        if fault is Fault.BLOCKED_MOTOR:
+            self.block(now=now)
+        if fault is Fault.STO:
+            self.set_voltage(False, now, fault=False)
+        elif fault is Fault.ENCODER_SHIFTED:
+            self.count_from(injection.position, now)
+        elif fault is Fault.RATE_UNITS:
+            self._count_rates_in(injection.velocity, injection.acceleration, now)
+        elif kind.code:  # others change what it does with later commands only
+            self.raise_fault(kind.code, now, at_once=kind.at_once)
+
+    def clear(self, fault: Fault, now: float) -> None:
+        """Take the cause of a fault away; the drive then still waits for a fault reset."""
+        self.causes.discard(fault)
+        if fault is Fault.BLOCKED_MOTOR:
+            self.release(now)
+        elif fault is Fault.STO:
+            self.set_voltage(True, now)
+        elif fault is Fault.RATE_UNITS:
+            self._count_rates_in(None, None, now)
+
+    def _count_rates_in(
+        self, velocity: float | None, acceleration: float | None, now: float
     ) -> None:
-        """Use other units than those that it was made with, until another call.
-
-        What its objects hold stays the same number.
-
-        Args:
-            velocity: What 1 of its velocities is in [inc/s]; None for its own unit.
-            acceleration: What 1 of its accelerations is in [inc/s^2]; None for its own unit.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-        """
-        now = self._axis.time if now is None else now
+        """Use other units; None for its own. The numbers in its objects stay the same."""
         self._objects.rate_units = (
             velocity or self._rate_units[0],
             acceleration or self._rate_units[1],
         )
         self._on_max_velocity(now)
         self._publish(now)
-
-    def inject(self, fault: Fault, now: float | None = None, *, lasting: bool = True) -> None:
-        """Let something go wrong.
-
-        Args:
-            fault: What.
-            now: Steady time in [s]; by default when the drive last looked at its axis.
-            lasting: Its cause stays until :meth:`clear`; otherwise a fault reset ends it.
-        """
-        now = self._axis.time if now is None else now
-        if lasting:
-            self.causes.add(fault)
-        if fault is Fault.BLOCKED_MOTOR:
-            self.block(now=now)
-        if fault is Fault.STO:
-            self.set_voltage(False, now, fault=False)
-        elif fault.value.code:  # others change what it does with later commands only
-            self.raise_fault(fault.value.code, now, at_once=fault.value.at_once)
-
-    def clear(self, fault: Fault, now: float | None = None) -> None:
-        """Take the cause of a fault away; the drive then still waits for a fault reset."""
-        now = self._axis.time if now is None else now
-        self.causes.discard(fault)
-        if fault is Fault.BLOCKED_MOTOR:
-            self.release(now)
-        if fault is Fault.STO:
-            self.set_voltage(True, now)
 
     def block(self, at: float | None = None, now: float | None = None) -> None:
         """Put a mechanical stop in the way.

@@ -14,7 +14,7 @@ from arm_canopen import OperationMode
 from arm_canopen.standard import AbortCode
 from arm_canopen.standard.datatypes import Value
 
-from ..fault import Fault
+from ..deviations import Fault
 from ..objects.object_store import Integer, refusal
 from .axis import Axis
 from .objects import DriveObjects

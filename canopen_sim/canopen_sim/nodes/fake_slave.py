@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 import sys
 
@@ -17,7 +17,7 @@ from arm_canopen.standard import NODE_ID_MAX, NODE_ID_MIN, UNCONFIGURED
 from node_runner import ParameterReader
 
 from ..host import DeviceHost
-from .slave_process import memories, run_slaves, SimulatedDevices
+from .fake_slaves import memories, run_slaves
 
 DEFAULT_NODE_ID = 2
 HELP = f"""\
@@ -34,14 +34,9 @@ parameters:
 """
 
 
-def run_fake_slave(args: Sequence[str] | None = None) -> int:
-    """Simulate one device in this process; return the exit code."""
-    return run_slaves('fake_slave', _populate, help_text=HELP, args=args)
-
-
 def main() -> None:
     """Entry point."""
-    sys.exit(run_fake_slave())
+    sys.exit(run_slaves('fake_slave', _populate, help_text=HELP))
 
 
 def default_eds() -> Path:
@@ -49,7 +44,7 @@ def default_eds() -> Path:
     return Path(get_package_share_directory('arm_canopen')) / 'eds' / 'cia402_drive.eds'
 
 
-def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
+def _populate(node: Node, host: DeviceHost) -> tuple[str, Mapping[str, int]]:
     read = ParameterReader(node)
     node_id = read.whole(
         'node_id',
@@ -69,7 +64,7 @@ def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
     device = host.add(node_id, eds.dictionary, memory=memories(node)(node_id))
     kind = 'drive' if device.drive is not None else 'device'
     which = 'without node id' if node_id == UNCONFIGURED else str(node_id)
-    return SimulatedDevices(f'simulated {kind} {which} of {eds.path}', {'slave': node_id})
+    return f'simulated {kind} {which} of {eds.path}', {'slave': node_id}
 
 
 if __name__ == '__main__':

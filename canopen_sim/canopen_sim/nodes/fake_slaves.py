@@ -4,19 +4,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 import sys
+import threading
 
 from rclpy.node import Node
 
 from arm_canopen import CanopenError
+from arm_canopen.can import open_bus
 from arm_canopen.config import BusConfig, load_bus
-from node_runner import ParameterReader
+from node_runner import (
+    declare_thread_priority,
+    log_as,
+    notify_ready,
+    ParameterReader,
+    raise_thread_priority,
+    refuse_misspelt,
+    run_program,
+    settle_process_memory,
+    spin,
+)
 
 from ..host import DeviceHost
+from ..node_id_check import NodeIdCheck
+from ..objects.parameter_memory import ParameterFile, ParameterMemory
+from ..runner import DeviceRunner
 from ..simulation import add_devices
-from .slave_process import memories, run_slaves, SimulatedDevices
+from .fault_services import FaultServices
 
+CAN_INTERFACES = (
+    'can0, vcan0, udp_multicast:239.x.y.z[:port], auto, or INTERFACE:CHANNEL[@BITRATE]'
+)
+STORE_DIRECTORY = 'folder of what the devices store (0x1010, LSS); empty: until they end'
+THREAD_PRIORITY = 30  # SCHED_FIFO: devices answer SYNC in time, and leave the master the way
+COMMON_HELP = f"""\
+  can_interface_name  {CAN_INTERFACES}
+                      (default auto: vcan0 where it exists, otherwise multicast on this host)
+  store_directory     {STORE_DIRECTORY}
+  thread_priority     SCHED_FIFO priority of the loop of the devices, 0 for none
+                      (default {THREAD_PRIORITY})
+
+services of the node, of all devices and below ~/<device>/ of each:
+  ~/fault (arm_msgs/srv/InjectFault), ~/power_cycle (std_srvs/srv/Trigger),
+  ~/sto (std_srvs/srv/SetBool)
+"""
 HELP = """\
 Simulate every device of a bus.yml, each made from its EDS, until Ctrl-C.
 
@@ -31,18 +63,75 @@ parameters:
                       absolute encoder reports it (default: 0 increments)
 """
 
-
-def run_fake_slaves(args: Sequence[str] | None = None) -> int:
-    """Simulate every device of a bus.yml in this process; return the exit code."""
-    return run_slaves('fake_slaves', _populate, help_text=HELP, args=args)
+Populate = Callable[[Node, DeviceHost], tuple[str, Mapping[str, int]]]
+"""Adds the devices of a node; returns what they are in words, and their node ids by name."""
 
 
 def main() -> None:
     """Entry point."""
-    sys.exit(run_fake_slaves())
+    sys.exit(run_slaves('fake_slaves', _populate, help_text=HELP))
 
 
-def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
+def run_slaves(
+    name: str, populate: Populate, *, help_text: str, args: Sequence[str] | None = None
+) -> int:
+    """Run the simulated devices of a node until Ctrl-C or SIGTERM.
+
+    Args:
+        name: Name of the node.
+        populate: Reads the node's parameters and adds the devices.
+        help_text: What ``--help`` prints, before the parameters that all of them have.
+        args: Command line; None for the process's own.
+
+    Returns:
+        Exit code: 0, or 1 when the devices could not be described or the bus not be opened.
+    """
+
+    def body(stop: threading.Event) -> None:
+        node = Node(name)
+        log_as(node)
+        try:
+            _run(node, populate, stop)
+        finally:
+            node.destroy_node()
+
+    return run_program(name, body, CanopenError, args=args, help_text=help_text + COMMON_HELP)
+
+
+def _run(node: Node, populate: Populate, stop: threading.Event) -> None:
+    read = ParameterReader(node)
+    with open_bus(read.text('can_interface_name', 'auto', CAN_INTERFACES)) as bus:
+        runner = DeviceRunner(bus)
+        what, names = populate(node, runner.host)
+        check = NodeIdCheck(bus, [device.node_id for device in runner.host.devices])
+        priority = declare_thread_priority(read, THREAD_PRIORITY)
+        refuse_misspelt(node)
+        FaultServices(node, runner, names)
+        settle_process_memory(node)
+        check.finish()
+        runner.start(
+            lambda: raise_thread_priority(node, priority, 'the loop of the simulated devices')
+        )
+        try:
+            node.get_logger().info(f'{what} on {bus.name}')
+            notify_ready()
+            spin([node], stop)
+        finally:
+            runner.stop()
+
+
+def memories(node: Node) -> Callable[[int], ParameterMemory]:
+    """Declare ``store_directory``; return a function that makes the memory of a node id."""
+    folder = ParameterReader(node).text('store_directory', '', STORE_DIRECTORY)
+
+    def memory(node_id: int) -> ParameterMemory:
+        file = Path(folder) / f'node_{node_id}.json'
+        return ParameterFile(file) if folder else ParameterMemory()
+
+    return memory
+
+
+def _populate(node: Node, host: DeviceHost) -> tuple[str, Mapping[str, int]]:
     path = ParameterReader(node).text('bus_config', '', 'bus.yml whose devices are simulated')
     if not path:
         raise CanopenError(
@@ -51,12 +140,11 @@ def _populate(node: Node, host: DeviceHost) -> SimulatedDevices:
     bus = load_bus(path)
     for warning in bus.warnings:
         node.get_logger().warning(str(warning))
-    memory = memories(node)
-    add_devices(host, bus, _positions(node, bus), memory)
+    add_devices(host, bus, _positions(node, bus), memories(node))
     drives = sum(device.drive is not None for device in host.devices)
     others = len(host.devices) - drives
     what = f'{drives} simulated drives' + (f' and {others} other devices' if others else '')
-    return SimulatedDevices(what, {config.name: config.node_id for config in bus.nodes})
+    return what, {config.name: config.node_id for config in bus.nodes}
 
 
 def _positions(node: Node, bus: BusConfig) -> dict[str, float]:

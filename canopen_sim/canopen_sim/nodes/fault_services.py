@@ -17,9 +17,8 @@ from std_srvs.srv import SetBool, Trigger
 from arm_canopen import BusError
 from arm_msgs.srv import InjectFault
 
+from ..deviations import Fault, FaultInjection, parse_fault, unknown
 from ..device import Device
-from ..fault import Fault, FaultInjection, FAULTS
-from ..faults.text import parse_fault, split_settings, unknown
 from ..runner import DeviceRunner
 
 ANSWER_TIMEOUT = 5.0  # [s] the thread of the devices answers within milliseconds
@@ -28,14 +27,6 @@ ALL_FAULTS = 'none'  # instead of a fault: none shall go on
 NOT_IN_NAMES = re.compile(r'[^A-Za-z0-9_]')
 
 Work = Callable[[Device, float], str]
-
-
-def fault_list() -> str:
-    """Return every fault with what it does and its settings, one per line."""
-    return '\n'.join(
-        f'  {name}: {fault.value.text} ({", ".join((*fault.value.settings, "duration"))})'
-        for name, fault in FAULTS.items()
-    )
 
 
 class FaultServices:
@@ -65,7 +56,9 @@ class FaultServices:
     # message classes have no types
     def _on_fault(self, name: str, request: Any, response: Any) -> Any:  # noqa: ANN401
         def begin() -> str:
-            work = requested(request.fault, request.settings, request.duration)
+            work: Work = end_faults
+            if request.fault != ALL_FAULTS:
+                work = injecting(parse_fault(request.fault, request.settings, request.duration))
             return self._do(request.device or name, work)
 
         return self._answer(response, begin)
@@ -126,21 +119,6 @@ def service_part(name: str) -> str:
     """Return a device's name as a part of a ROS name (REP 144 has letters, digits and ``_``)."""
     part = NOT_IN_NAMES.sub('_', name)
     return part if part[:1].isalpha() else f'device_{part}'
-
-
-def requested(fault: str, settings: list[str], duration: float) -> Work:
-    """Return what a request of ``~/fault`` does with a device.
-
-    Raises:
-        ValueError: The fault or a setting makes no sense; an unknown fault is answered with all.
-    """
-    if fault == ALL_FAULTS:
-        return end_faults
-    if fault not in FAULTS:
-        raise ValueError(
-            f'{unknown("fault", fault, FAULTS)}\n{ALL_FAULTS}: ends all\n{fault_list()}'
-        )
-    return injecting(parse_fault(fault, split_settings(settings), duration=duration))
 
 
 def injecting(injection: FaultInjection) -> Work:

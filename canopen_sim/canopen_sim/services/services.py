@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from arm_canopen.can import Frame
 from arm_canopen.standard import CobId, LSS_REQUEST, NmtState
 
-from ..fault import Service
-from ..faults.line import Traffic
+from ..deviations import Service
+from ..line import Traffic
 from .error_control import ErrorControl
 from .lss_slave import LssSlave
 from .nmt_slave import NmtSlave

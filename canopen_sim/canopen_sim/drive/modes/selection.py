@@ -9,7 +9,7 @@ from collections.abc import Container
 from arm_canopen.standard import AbortCode
 from arm_canopen.standard.datatypes import Value
 
-from ...fault import Fault
+from ...deviations import Fault
 from ...objects.object_store import refusal
 from ..axis import Axis
 from ..objects import DriveObjects

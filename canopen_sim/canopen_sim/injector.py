@@ -10,10 +10,11 @@ from typing import Protocol
 
 from arm_canopen.standard import Index, object_address
 
-from ..fault import Fault, FaultInjection
-from ..objects.object_store import ObjectStore
-from ..timed import NEVER
+from .deviations import Fault, FaultInjection
+from .drive.drive import Drive
 from .line import FaultLine, LineFault
+from .objects.object_store import ObjectStore
+from .timed import NEVER
 
 IDENTITY_OBJECTS: dict[str, tuple[int, int]] = {
     'device_type': (Index.DEVICE_TYPE, 0),
@@ -30,24 +31,6 @@ FLOOD_PERIOD_MIN = 1e-3  # [s] a bus carries not many more frames
 OTHER_VENDOR = 0x7FFF_FFFF  # what a wrong identity shows when no value is given
 
 
-class Axis(Protocol):
-    """A drive with faults of its own."""
-
-    def inject(self, fault: Fault, now: float | None = None, *, lasting: bool = True) -> None:
-        """Let something go wrong."""
-
-    def clear(self, fault: Fault, now: float | None = None) -> None:
-        """Take the cause of a fault away."""
-
-    def count_from(self, position: float, now: float | None = None) -> None:
-        """Count from a position in [inc] where the motor is."""
-
-    def count_rates_in(
-        self, velocity: float | None, acceleration: float | None, now: float | None = None
-    ) -> None:
-        """Use other units of velocities and accelerations; None for its own."""
-
-
 class Powered(Protocol):
     """What the injector does with its device."""
 
@@ -55,7 +38,7 @@ class Powered(Protocol):
     store: ObjectStore
 
     @property
-    def drives(self) -> Sequence[Axis]:
+    def drives(self) -> Sequence[Drive]:
         """Its axes."""
 
     def switch_off(self, now: float) -> None:
@@ -90,12 +73,6 @@ class FaultInjector:
     """All faults of one device."""
 
     def __init__(self, device: Powered, line: FaultLine) -> None:
-        """Begin without faults.
-
-        Args:
-            device: The device.
-            line: Its connection to the bus.
-        """
         self._device = device
         self._line = line
         self._active: dict[object, ActiveFault] = {}
@@ -116,48 +93,36 @@ class FaultInjector:
     def inject(self, injection: FaultInjection, now: float) -> None:
         """Begin a fault; the same fault of the same PDO or object ends.
 
-        Args:
-            injection: The fault.
-            now: Steady time in [s].
-
         Raises:
             ValueError: It is a fault of a drive, and the device is none or lacks the axis; or of
                 an object, and the device has no such number.
         """
         self._line.now = now
-        if injection.fault.value.of_drive and not self._axes(injection):
+        fault, kind = injection.fault, injection.fault.value
+        if kind.of_drive and not self._axes(injection):
             raise ValueError(
                 f'device {self._device.node_id} has {len(self._device.drives)} axes; '
-                f'{injection.fault.label} needs one'
+                f'{fault.label} needs one'
             )
-        if injection.fault in POWER_FAULTS:
+        if fault in POWER_FAULTS:
             self._cut_power(injection, now)
             return
-        if injection.fault.value.of_drive:
-            for drive in self._axes(injection):
-                self._begin_in(drive, injection, now)
-            if not injection.lasting:
-                return
-        elif injection.fault is Fault.WRONG_IDENTITY:
+        if fault is Fault.WRONG_IDENTITY:
             self._disguise(injection)
-        elif injection.fault is Fault.OBJECT_KEPT:
+        elif fault is Fault.OBJECT_KEPT:
             self._keep(injection)
-        elif injection.fault is Fault.EMCY_FLOOD:
+        elif fault is Fault.EMCY_FLOOD:
             self._device.repeat_emcy(max(injection.delay, FLOOD_PERIOD_MIN), now)
-        line = None
-        if injection.fault.value.frames:
-            line = LineFault(injection, self._device.node_id)
-        end = now + injection.duration if injection.duration else NEVER
-        self._active[injection.key] = ActiveFault(injection, end, line)
-        self._update_line()
+        for drive in self._axes(injection) if kind.of_drive else ():
+            drive.inject(injection, now)
+        if injection.lasting:
+            line = LineFault(injection, self._device.node_id) if kind.services else None
+            end = now + injection.duration if injection.duration else NEVER
+            self._active[injection.key] = ActiveFault(injection, end, line)
+            self._update_line()
 
     def end(self, now: float, fault: Fault | None = None) -> None:
-        """End a fault, or all; a device without power is switched on.
-
-        Args:
-            now: Steady time in [s].
-            fault: Which; None for all.
-        """
+        """End a fault, or all (None); a device without power is switched on."""
         self._line.now = now
         for key, active in list(self._active.items()):
             if fault in (None, active.injection.fault):
@@ -177,30 +142,22 @@ class FaultInjector:
             self._update_line()
 
     def _ended(self, injection: FaultInjection, now: float) -> None:
+        store = self._device.store
         if injection.fault.value.of_drive:
             for drive in self._axes(injection):
                 drive.clear(injection.fault, now)
-                if injection.fault is Fault.RATE_UNITS:
-                    drive.count_rates_in(None, None, now)
         elif injection.fault is Fault.WRONG_IDENTITY:
             for address in IDENTITY_OBJECTS.values():
-                self._device.store.overlay.pop(address, None)
+                store.overlay.pop(address, None)
         elif injection.fault is Fault.OBJECT_KEPT and injection.object is not None:
-            self._device.store.saved.pop(injection.object, None)
-            self._device.store.find(*injection.object).restore()
+            store.saved.pop(injection.object, None)
+            store.find(*injection.object).restore()
         elif injection.fault is Fault.EMCY_FLOOD:
             self._device.repeat_emcy(0.0, now)
         elif injection.fault in POWER_FAULTS:
             self._device.switch_on(now, position_kept=injection.position_kept)
 
-    def _begin_in(self, drive: Axis, injection: FaultInjection, now: float) -> None:
-        drive.inject(injection.fault, now, lasting=injection.lasting)
-        if injection.fault is Fault.RATE_UNITS:
-            drive.count_rates_in(injection.velocity, injection.acceleration, now)
-        elif injection.fault is Fault.ENCODER_SHIFTED:
-            drive.count_from(injection.position, now)
-
-    def _axes(self, injection: FaultInjection) -> Sequence[Axis]:
+    def _axes(self, injection: FaultInjection) -> Sequence[Drive]:
         drives = self._device.drives
         return drives[injection.axis - 1 : injection.axis] if injection.axis else drives
 

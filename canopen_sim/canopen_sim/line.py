@@ -15,17 +15,14 @@ from typing import NamedTuple
 from arm_canopen.can import Frame
 from arm_canopen.standard.sdo import Abort
 
-from ..fault import Fault, FaultInjection, Service
-from ..timed import NEVER
+from .deviations import Effect, FaultInjection, FRAME_BYTES, Service
+from .timed import NEVER
 
 Deliver = Callable[[Frame, float], None]
 
 SDO_INITIATIONS = (1, 2, 5, 6)  # client command specifiers that name an object (CiA 301, 7.2.4.3)
 SDO_ANSWERS = (2, 3, 4, 5, 6)  # server command specifiers that do
 BLOCK_TRANSFERS = (5, 6)  # client command specifiers of block transfers
-FRAME_BYTES = 8  # [byte] of an SDO
-MULTIPLEXER_BYTES = 4  # [byte] command and object, of an SDO that carries nothing else
-GARBAGE = b'\xa5'  # what stands in the bytes that a deviating server does not mean
 OTHER_DEVICE_DELAY = 0.0005  # [s] by which another device of the same node id answers later
 
 
@@ -43,46 +40,6 @@ class Traffic(NamedTuple):
     number: int = 0
 
 
-DELAYS = frozenset({Fault.SDO_DELAY, Fault.TPDO_DELAY, Fault.RPDO_DELAY})
-
-
-def _with_command(command: int, data: bytes) -> bytes:
-    """Return an expedited answer to a read with another command byte, and with garbage behind."""
-    if data[0] & 0xE2 != 0x42:
-        return data
-    size = FRAME_BYTES - (data[0] >> 2 & 0x03)
-    return bytes((command,)) + data[1:size] + GARBAGE * (FRAME_BYTES - size)
-
-
-def _shortened(data: bytes) -> bytes:
-    """Return an answer without the bytes that carry nothing."""
-    match data[0] >> 5:
-        case 0:
-            return data[: FRAME_BYTES - (data[0] >> 1 & 0x07)]
-        case 1:
-            return data[:1]
-        case 2 if data[0] & 0x02:
-            return data[: FRAME_BYTES - (data[0] >> 2 & 0x03)]
-        case 3:
-            return data[:MULTIPLEXER_BYTES]
-    return data
-
-
-def _with_other_crc(data: bytes) -> bytes:
-    """Return the frame that ends a block transfer with another CRC; it has 5 reserved bytes."""
-    ends = data[0] & 0xE3 == 0xC1 and not any(data[3:])
-    return data[:1] + bytes(byte ^ 0xFF for byte in data[1:3]) + data[3:] if ends else data
-
-
-REWRITES: dict[Fault, Callable[[bytes], bytes]] = {
-    Fault.SDO_FOUR_BYTES: partial(_with_command, 0x43),
-    Fault.SDO_NO_SIZE: partial(_with_command, 0x42),
-    Fault.SDO_SHORT: _shortened,
-    Fault.BLOCK_CRC: _with_other_crc,
-}
-"""What deviating servers make of their frames."""
-
-
 class LineFault:
     """A fault of the line while it goes on.
 
@@ -94,14 +51,10 @@ class LineFault:
     def __init__(self, injection: FaultInjection, node_id: int) -> None:
         """Begin; each device and fault has random numbers of its own."""
         self.injection = injection
-        self._left = injection.count or None
+        self.exhausted = False
+        self._left = injection.count
         seed = f'{injection.seed}/{node_id}/{injection.fault.label}/{injection.pdo}'
         self._random = random.Random(seed)  # noqa: S311  # repeatable noise, no secret
-
-    @property
-    def exhausted(self) -> bool:
-        """It hit as many frames as it was to hit."""
-        return self._left == 0
 
     def hits(self, frame: Frame, traffic: Traffic) -> bool:
         """Return whether it strikes a frame, and count it."""
@@ -110,17 +63,17 @@ class LineFault:
         probability = self.injection.probability
         if probability < 1.0 and self._random.random() >= probability:
             return False
-        if self._left is not None:
-            self._left -= 1
+        self._left -= 1
+        self.exhausted = self._left == 0
         return True
 
     def _concerns(self, frame: Frame, traffic: Traffic) -> bool:
-        injection = self.injection
-        if (traffic.service, traffic.outgoing) not in injection.fault.value.frames:
+        injection, kind = self.injection, self.injection.fault.value
+        if traffic.service not in kind.services or traffic.outgoing not in kind.directions:
             return False
-        if injection.fault in (Fault.BLOCK_ABORT, Fault.BLOCK_SILENCE):
+        if kind.of_blocks:
             return frame.data[0] >> 5 in BLOCK_TRANSFERS if frame.data else False
-        if injection.fault is Fault.SDO_ABORT or injection.object is not None:
+        if kind.effect is Effect.ABORT or injection.object is not None:
             named = sdo_object(frame.data, SDO_ANSWERS if traffic.outgoing else SDO_INITIATIONS)
             return named is not None and injection.object in (None, named)
         return injection.pdo in (0, traffic.number)
@@ -175,31 +128,19 @@ class FaultLine:
 
     def send(self, frame: Frame) -> None:
         """Take a frame of the device."""
-        if not self.faults:
+        if self.faults:
+            self._pass(frame, self._send_at, outgoing=True)
+        else:
             self._send(frame)
-            return
-        frame, delay = self._fate(frame, outgoing=True)
-        if delay == 0.0:
-            self._send(frame)
-        elif delay is not None:
-            self._postpone(delay, partial(self._send_at, frame))
 
     def receive(self, frame: Frame, now: float, deliver: Deliver) -> None:
         """Take a frame for the device, and hand it over unless a fault is in the way."""
         self.now = now
-        frame, delay = self._fate(frame, outgoing=False)
-        if delay == 0.0:
-            deliver(frame, now)
-        elif delay is not None:
-            self._postpone(delay, lambda later: deliver(frame, later))
+        self._pass(frame, deliver, outgoing=False)
 
     def filtered(self, deliver: Deliver) -> Deliver:
         """Return a handler that passes through this line."""
-
-        def handle(frame: Frame, now: float) -> None:
-            self.receive(frame, now, deliver)
-
-        return handle
+        return lambda frame, now: self.receive(frame, now, deliver)
 
     def clear(self) -> None:
         """Lose the frames that are late."""
@@ -211,26 +152,30 @@ class FaultLine:
         while self._late and self._late[0][0] <= now:
             heapq.heappop(self._late)[2](now)
 
-    def _fate(self, frame: Frame, *, outgoing: bool) -> tuple[Frame, float | None]:
-        """Return what becomes of a frame, and how late it is in [s]: None when it gets lost."""
+    def _pass(self, frame: Frame, deliver: Deliver, *, outgoing: bool) -> None:
+        """Deliver what the faults leave of a frame, now or late."""
         traffic = self._identify(frame, outgoing)
         delay = 0.0
         for fault in self.faults:
             if not fault.hits(frame, traffic):
                 continue
-            kind = fault.injection.fault
-            if kind in DELAYS:
-                delay += fault.injection.delay
-            elif kind in REWRITES:
-                frame = frame._replace(data=frame.data and REWRITES[kind](frame.data))
-            elif kind is Fault.NODE_ID_CONFLICT:
-                self._postpone(OTHER_DEVICE_DELAY, partial(self._send_at, frame))
-            else:
-                if kind in (Fault.SDO_ABORT, Fault.BLOCK_ABORT):
+            match fault.injection.fault.value.effect:
+                case Effect.DELAY:
+                    delay += fault.injection.delay
+                case Effect.REPEAT:
+                    self._postpone(OTHER_DEVICE_DELAY, partial(self._send_at, frame))
+                case Effect.ABORT:
                     index, subindex = sdo_object(frame.data, SDO_INITIATIONS) or (0, 0)
                     self._abort(Abort(index, subindex, fault.injection.abort))
-                return frame, None
-        return frame, delay
+                    return
+                case Effect.LOSE:
+                    return
+                case rewrite:
+                    frame = frame._replace(data=rewrite(frame.data))
+        if delay:
+            self._postpone(delay, partial(deliver, frame))
+        else:
+            deliver(frame, self.now)
 
     def _send_at(self, frame: Frame, _now: float) -> None:
         self._send(frame)
