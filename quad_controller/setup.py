@@ -15,7 +15,7 @@ runpy.run_path(str(SHARED))['setup_package'](
         './rosbag_files',
     ],
     extras={
-        'ros': ['./message_templates', './node_runner'],
+        'ros': ['./message_definitions', './message_templates', './node_runner'],
         'physics': ['./quad_hardware', './quad_sim'],
     },
     programs=[

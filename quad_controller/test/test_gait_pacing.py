@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
-from quad_controller.timing.pacer import LoopStatistics, Pacer, WINDOW
+from quad_controller.nodes.control_loop import loop_figures, Pacer, WINDOW
 
 PERIOD = 0.02  # [s]
 
@@ -78,11 +78,8 @@ def test_a_late_step_is_not_made_up_for() -> None:
 
 def test_figures() -> None:
     """Jitter is the distance of intervals from the period."""
-    statistics = LoopStatistics(PERIOD)
-    for interval in (0.02, 0.021, 0.018):
-        statistics.record(interval, 0.0002, 0.001)
-    figures = statistics.figures(3)
-    assert figures.jitter_max == pytest.approx(0.002)
-    assert figures.jitter_p50 == pytest.approx(0.001)
-    assert figures.rate == pytest.approx(3 / 0.059)
-    assert (figures.steps, figures.overruns) == (3, 3)
+    steps = [(interval, 0.0002, 0.001) for interval in (0.02, 0.021, 0.018)]
+    figures = loop_figures(steps, PERIOD)
+    assert figures['jitter_max'] == pytest.approx(0.002)
+    assert figures['jitter_p50'] == pytest.approx(0.001)
+    assert figures['rate'] == pytest.approx(3 / 0.059)

@@ -653,6 +653,9 @@ def test_a_low_battery_lies_down() -> None:
     rig.run(1.0, FORWARD)
     rig.battery = 0.5
     rig.run(0.1, FORWARD)
+    rig.battery = math.nan  # unknown
+    rig.run(4.0, FORWARD)
+    assert rig.controller.status.battery == 0.5
     assert rig.is_in(State.WALK)
     rig.battery = 0.05
     rig.run(6.0, FORWARD)

@@ -1,10 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The thread that steps the controller, on the arrival of feedback or else on its deadline."""
+"""The thread that steps the controller, on the arrival of feedback or else on its deadline.
+
+The schedule is one of absolute times. As long as feedback comes, a step waits for it a little
+beyond its time, and the schedule is drawn towards the arrivals: so the newest feedback is used
+within a moment. Without feedback the steps are where the schedule has them. Either way the rate
+stays the nominal one, within a few per cent of a feedback that is faster or slower.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Collection
 from dataclasses import replace
 import threading
 import time
@@ -14,9 +21,83 @@ from quad_description import RobotState
 
 from ..states.controller import Controller
 from ..states.status import Output
-from ..timing.pacer import LoopFigures, LoopStatistics, Pacer
 
 PAIR_TIME = 0.002  # [s] that joint states wait for the attitude of the same report
+WINDOW = 0.08  # periods before and after its time in which feedback makes a step
+GAIN = 0.2  # share of its distance from the schedule that an arrival draws the schedule by
+RECORDED_STEPS = 1000  # that the figures are of
+
+StepTimes = tuple[float, float, float | None]
+"""Time since the step before, until its command was published, and from the feedback that it used
+to the command, None without one, in [s]."""
+
+
+class Pacer:
+    """Says when the next step is due; times are those of a monotonic clock in [s]."""
+
+    def __init__(self, period: float, now: float) -> None:
+        """Make the first step due now."""
+        self._period = period
+        self._window = WINDOW * period
+        self._due = now
+        self._locked = False
+        self.overruns = 0  # steps that were left out because the one before came too late
+
+    def deadline(self, fresh: bool) -> float:
+        """Return when a step is due at the latest.
+
+        Args:
+            fresh: Whether feedback is there that no step has used.
+        """
+        if fresh:
+            return self._due
+        return self._due + self._window if self._locked else self._due
+
+    def takes(self, now: float) -> bool:
+        """Return whether feedback that arrives now makes a step at once."""
+        return now >= self._due - self._window
+
+    def stepped(self, now: float, arrival: float | None) -> None:
+        """Schedule the next step.
+
+        Args:
+            arrival: When the feedback arrived that it used, None without.
+        """
+        error = 0.0 if arrival is None else arrival - self._due
+        error = min(max(error, -self._window), self._window)
+        self._due += self._period + GAIN * error
+        self._locked = arrival is not None
+        late = now - self._due
+        if late >= 0.0:
+            skipped = int(late / self._period) + 1
+            self.overruns += skipped
+            self._due += skipped * self._period
+
+
+def loop_figures(recorded: Collection[StepTimes], period: float) -> dict[str, float]:
+    """Return how well the last steps kept their time: rate in [1/s], else in [s].
+
+    Jitter is the distance of an interval from the period, a step what it takes until its command
+    is published.
+    """
+    intervals = [interval for interval, _, _ in recorded]
+    jitter = sorted(abs(interval - period) for interval in intervals)
+    durations = sorted(duration for _, duration, _ in recorded)
+    latencies = sorted(latency for _, _, latency in recorded if latency is not None)
+    total = sum(intervals)
+    return {
+        'rate': len(intervals) / total if total > 0.0 else 0.0,
+        'jitter_p50': _percentile(jitter, 0.5),
+        'jitter_p99': _percentile(jitter, 0.99),
+        'jitter_max': _percentile(jitter, 1.0),
+        'step_p99': _percentile(durations, 0.99),
+        'feedback_to_command_p50': _percentile(latencies, 0.5),
+        'feedback_to_command_p99': _percentile(latencies, 0.99),
+    }
+
+
+def _percentile(ordered: list[float], share: float) -> float:
+    return ordered[int((len(ordered) - 1) * share)] if ordered else 0.0
 
 
 class ControlLoop:
@@ -40,7 +121,8 @@ class ControlLoop:
         self.lock = threading.Lock()  # hold it to call the controller between two steps
         self._controller, self._period = controller, period
         self._publish, self._fail, self._record = publish, fail, record
-        self._statistics = LoopStatistics(period)
+        self._recorded: deque[StepTimes] = deque(maxlen=RECORDED_STEPS)
+        self._steps = 0
         self._pacer = Pacer(period, time.monotonic())
         self._arrived = threading.Condition()
         self._measurement = RobotState()
@@ -78,11 +160,12 @@ class ControlLoop:
             elif 'imu' in values and self._arrival is not None:
                 self._arrived.notify()
 
-    def figures(self) -> LoopFigures:
-        """Return how well the time is kept."""
+    def figures(self) -> dict[str, float]:
+        """Return how well the time is kept: counts since the start, and :func:`loop_figures`."""
         with self._arrived:
-            statistics, overruns = self._statistics.copy(), self._pacer.overruns
-        return statistics.figures(overruns)  # the thread need not wait for the sorting
+            counts = {'steps': self._steps, 'overruns': self._pacer.overruns}
+            recorded = list(self._recorded)
+        return counts | loop_figures(recorded, self._period)  # the thread need not wait for it
 
     def _guarded(self) -> None:
         try:
@@ -109,7 +192,8 @@ class ControlLoop:
             end = time.monotonic()
             latency = end - arrival if arrival is not None else None
             with self._arrived:
-                self._statistics.record(now - last, end - now, latency)
+                self._recorded.append((now - last, end - now, latency))
+                self._steps += 1
             if self._record is not None:
                 self._record(output, now - last, end - now, latency)
             last = now

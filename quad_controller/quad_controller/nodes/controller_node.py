@@ -47,21 +47,19 @@ from quad_msgs.srv import LoadPolicy, SetMode
 
 from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
+from ..gait.velocity import Velocity
 from ..policy.interface import Policy
 from ..policy.load import load_policy, LoadedPolicy
 from ..policy.shipped import find_policy
-from ..recording.recorder import Recorder
-from ..recording.run import PolicyRun
-from ..recording.step import StepTiming
+from ..recording import PolicyRun
 from ..states.controller import Controller
 from ..states.modes import Answer, Fault
 from ..states.policy_motion import NO_POLICY
 from ..states.status import EventKind, Output, Status
 from . import messages
 from .control_loop import ControlLoop
-from .diagnostics import loop_diagnostic, recorder_diagnostic, state_diagnostic
-from .joint_reader import CommandFilter, JointReader
 from .parameters import changed_gait, declare_parameters
+from .recorder import Recorder
 
 COMMAND_QOS = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE, history=HistoryPolicy.KEEP_LAST, depth=1
@@ -119,8 +117,8 @@ class ControllerNode(Node):
         self._recorder = self._make_recorder() if settings.record else None
         self._joint_states = FastReader(JointState, 'position', 'velocity')
         self._imu = FastReader(Imu, *messages.IMU_NUMBERS)
-        self._joints = JointReader(settings.robot)
-        self._filter = CommandFilter(
+        self._joints = messages.JointReader(settings.robot)
+        self._filter = messages.CommandFilter(
             settings.robot, others_move=bool(settings.arm_pose or policy is not None)
         )
         self._targets = self._controller.fallback_positions
@@ -187,7 +185,7 @@ class ControllerNode(Node):
     def _record(self, output: Output, dt: float, computing: float, latency: float | None) -> None:
         if self._recorder is not None:
             stamp = self.get_clock().now().nanoseconds
-            self._recorder.offer(output, StepTiming(stamp, dt, computing, latency))
+            self._recorder.offer(output, stamp, dt, computing, latency)
 
     def _load_first_policy(self) -> tuple[Policy | None, str]:
         """Return the policy, or None and why there is none; the gait does not need it."""
@@ -273,7 +271,8 @@ class ControllerNode(Node):
             self._refuse(Fault.IMU, str(error))
 
     def _take_odometry(self, message: Odometry) -> None:
-        self._loop.offer(linear_velocity=messages.linear_velocity(message))
+        linear = message.twist.twist.linear
+        self._loop.offer(linear_velocity=(linear.x, linear.y, linear.z))
         self._arrived['odom'].set()
 
     def _take_contacts(self, message: FootContacts) -> None:
@@ -290,11 +289,12 @@ class ControllerNode(Node):
         self.get_logger().warning(reason, throttle_duration_sec=WARN_PERIOD)
 
     def _take_battery(self, message: BatteryState) -> None:
-        self._loop.offer(battery=messages.charge(message))
+        self._loop.offer(battery=message.percentage)
 
     def _take_twist(self, message: Twist) -> None:
+        velocity = Velocity(message.linear.x, message.linear.y, message.angular.z)
         with self._loop.lock:
-            answer = self._controller.set_velocity(messages.velocity(message))
+            answer = self._controller.set_velocity(velocity)
         self._complain(answer)
 
     def _take_stamped_twist(self, message: TwistStamped) -> None:
@@ -412,11 +412,12 @@ class ControllerNode(Node):
         array = DiagnosticArray()
         array.header.stamp = self.get_clock().now().to_msg()
         array.status = [
-            state_diagnostic(name, status),
-            loop_diagnostic(name, self._loop.figures()),
+            messages.state_diagnostic(name, status),
+            messages.loop_diagnostic(name, self._loop.figures()),
         ]
         if self._recorder is not None:
-            array.status = [*array.status, recorder_diagnostic(name, self._recorder)]
+            recording = messages.recorder_diagnostic(name, self._recorder)
+            array.status = [*array.status, recording]
         self._diagnostics.publish(array)
 
     def _give_up(self, error: Exception) -> None:

@@ -4,26 +4,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import math
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Pose, Twist
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import BatteryState, Imu
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Pose
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header
 
-from quad_description import FEET, ImuSample
-from quad_description.rotations import normalized, roll_pitch_yaw, Vector
+from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
+from quad_description.rotations import normalized, roll_pitch_yaw
 from quad_msgs.msg import FootContacts, JointCommand
 
 from ..gait.body import BodyPose
-from ..gait.velocity import Velocity
+from ..states.status import Status
+from .recorder import Recorder
 
 UNMEASURED = -1.0  # first covariance of what an IMU does not measure (sensor_msgs/Imu, REP 145)
-
-
+STILL_TITLES = frozenset({'relax', 'to relax', 'lie', 'to lie'})
+"""States of the controller in which no joint but those of the legs moves."""
 _VARIANCES = 0, 4, 8  # of roll, pitch and yaw in a covariance
 
 IMU_NUMBERS = tuple(
@@ -70,17 +71,6 @@ def imu_sample(message: Imu, numbers: Sequence[float]) -> ImuSample:
     )
 
 
-def charge(message: BatteryState) -> float | None:
-    """Return the charge 0 to 1, None when it is not known."""
-    return float(message.percentage) if math.isfinite(message.percentage) else None
-
-
-def linear_velocity(message: Odometry) -> Vector:
-    """Return the velocity of the body in its own frame [m/s]."""
-    linear = message.twist.twist.linear
-    return linear.x, linear.y, linear.z
-
-
 def foot_contacts(message: FootContacts) -> tuple[bool, ...]:
     """Return which feet are on the ground, in the order of :data:`quad_description.FEET`.
 
@@ -93,11 +83,6 @@ def foot_contacts(message: FootContacts) -> tuple[bool, ...]:
     return tuple(bool(seen[foot]) for foot in FEET)
 
 
-def velocity(message: Twist) -> Velocity:
-    """Return the parts of a velocity that a quadruped follows."""
-    return Velocity(message.linear.x, message.linear.y, message.angular.z)
-
-
 def body_pose(message: Pose) -> BodyPose:
     """Return the pose of the body relative to its normal one; all zeros are no rotation."""
     place, turn = message.position, message.orientation
@@ -105,6 +90,94 @@ def body_pose(message: Pose) -> BodyPose:
     if not any(rotation):
         return BodyPose(place.x, place.y, place.z)
     return BodyPose(place.x, place.y, place.z, *roll_pitch_yaw(normalized(rotation)))
+
+
+class JointReader:
+    """Puts the joints of a message into the robot's order.
+
+    The legs must be measured. An arm's servo need not be: protocol v1 of the XGO does not report
+    one of them. Such a joint counts as being where it is sent, and is not sent anywhere before it
+    is to move, because its jump would be of unknown size. The order of a message seldom changes,
+    so the permutation is kept until it does.
+    """
+
+    def __init__(self, robot: Quadruped) -> None:
+        self._names = robot.names
+        self._spared = {robot.names[index] for index in robot.others}
+        self._seen: list[str] | None = None
+        self._places: list[int | None] = []
+        # joints that were in no message yet; empty before the first
+        self.unreported: tuple[str, ...] = ()
+
+    def read(
+        self, message: JointState, numbers: Sequence[float], sent: Sequence[float]
+    ) -> JointSample:
+        """Return the joints of a message.
+
+        Args:
+            message: What was measured, but for its numbers.
+            numbers: Positions [rad], and velocities [rad/s] behind them.
+            sent: Where all joints were sent [rad], for those that are never reported.
+
+        Raises:
+            ValueError: A joint of a leg, or one that was there before, is missing, or there are
+                not as many positions as names.
+        """
+        if len(message.position) != len(message.name):
+            raise ValueError(
+                f'joint states: {len(message.position)} positions for {len(message.name)} names'
+            )
+        if message.name != self._seen:
+            self._find(list(message.name))
+        count = len(message.position)
+        position, velocity = numbers[:count], numbers[count:]
+        known = len(velocity) == count
+        return JointSample(
+            tuple(
+                target if place is None else position[place]
+                for place, target in zip(self._places, sent, strict=True)
+            ),
+            tuple(0.0 if place is None else velocity[place] for place in self._places)
+            if known
+            else None,
+        )
+
+    def _find(self, names: list[str]) -> None:
+        missing = [name for name in self._names if name not in names]
+        if needed := [name for name in missing if name not in self._spared]:
+            self._seen = None
+            raise ValueError(
+                f'joint states without {", ".join(needed)}; does the hardware node use the same '
+                'robot description?'
+            )
+        self._spared &= set(missing)
+        self.unreported = tuple(missing)
+        self._places = [names.index(name) if name in names else None for name in self._names]
+        self._seen = names
+
+
+class CommandFilter:
+    """Decides how many joints a command is for: all, or the first ones, which are the legs."""
+
+    def __init__(self, robot: Quadruped, *, others_move: bool) -> None:
+        """Begin with a robot that has not moved."""
+        legs = len(robot.names) - len(robot.others)
+        legs_first = all(index >= legs for index in robot.others)
+        self._count = legs if legs_first else len(robot.names)
+        # whether joints that are no legs' will be sent elsewhere, ever
+        self.others_move = others_move
+        self._moved = False
+
+    def select(self, targets: Targets, title: str, unreported: Sequence[str]) -> Targets:
+        """Return the targets to send.
+
+        Args:
+            targets: Of all joints [rad].
+        """
+        self._moved = self._moved or title not in STILL_TITLES
+        if unreported and not (self.others_move and self._moved):
+            return targets[: self._count]
+        return targets
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,3 +189,62 @@ class JointCommands:
     def message(self, stamp: Time, numbers: Sequence[float]) -> JointCommand:
         """Make a message of targets [rad]."""
         return JointCommand(header=Header(stamp=stamp), position=numbers)
+
+
+def state_diagnostic(node: str, status: Status) -> DiagnosticStatus:
+    """Describe what the robot does."""
+    level, message = DiagnosticStatus.OK, status.title
+    if status.faults:
+        level, message = DiagnosticStatus.ERROR, '; '.join(status.faults)
+    elif math.isinf(status.joints_age):
+        words = ('waiting for /joint_states', *status.warnings)
+        level, message = DiagnosticStatus.STALE, '; '.join(words)
+    elif status.warnings:
+        level, message = DiagnosticStatus.WARN, '; '.join(status.warnings)
+    velocity = status.velocity
+    return DiagnosticStatus(
+        level=level,
+        name=f'{node}: state',
+        message=message,
+        values=_values(
+            {
+                'state': status.title,
+                'goal': status.goal.value,
+                'gait': status.gait.value,
+                'policy': status.policy,
+                'velocity': f'{velocity.x:.3f} {velocity.y:.3f} {velocity.yaw:.3f}',
+                'joint_states_age': f'{status.joints_age:.3f}',
+                'imu_age': f'{status.imu_age:.3f}',
+                'battery': '' if status.battery is None else f'{status.battery:.2f}',
+                'refused': str(status.refused),
+                'targets_slowed': str(status.limited),
+                'out_of_reach': str(status.unreachable),
+            }
+        ),
+    )
+
+
+def loop_diagnostic(node: str, figures: Mapping[str, float]) -> DiagnosticStatus:
+    """Describe how well the loop keeps its time."""
+    digits = {'steps': 0, 'overruns': 0, 'rate': 2}
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f'{node}: loop',
+        message=f'{figures["rate"]:.1f} Hz, jitter p99 {figures["jitter_p99"] * 1e3:.2f} ms',
+        values=_values({key: f'{value:.{digits.get(key, 6)}f}' for key, value in figures.items()}),
+    )
+
+
+def recorder_diagnostic(node: str, recorder: Recorder) -> DiagnosticStatus:
+    """Describe how the recording goes."""
+    trouble = recorder.failure or (f'{recorder.lost} steps lost' if recorder.lost else '')
+    return DiagnosticStatus(
+        level=DiagnosticStatus.WARN if trouble else DiagnosticStatus.OK,
+        name=f'{node}: recorder',
+        message=trouble or f'records to {recorder.folder}',
+        values=_values({'folder': str(recorder.folder), 'lost': str(recorder.lost)}),
+    )
+
+
+def _values(values: dict[str, str]) -> list[KeyValue]:
+    return [KeyValue(key=key, value=value) for key, value in values.items()]
