@@ -5,6 +5,8 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+import re
+import textwrap
 
 from arm_canopen import ConfigError
 from arm_canopen.config import BusConfig, load_bus, Problem
@@ -168,6 +170,33 @@ nodes:
     node_id: 2
 """
 """A bus without errors and warnings; its last section is that of a device."""
+
+
+def added(section: str, piece: str, base: str = BUS) -> str:
+    """Add a piece to a section of the sample; own keys replace equal ones."""
+    piece = textwrap.dedent(piece).strip('\n')
+    if section == 'top':
+        return f'{base}{piece}\n'
+    depth = 4 if section == 'joint1' else 2
+    lines = base.splitlines()
+    start = next(i for i, line in enumerate(lines) if line.strip() == f'{section}:')
+    end = next((i for i in range(start + 1, len(lines)) if lines[i][:depth].strip()), len(lines))
+    names = re.findall(r'^([\w]+):', piece, flags=re.MULTILINE)
+    body = _without(lines[start + 1 : end], {' ' * depth + name for name in names})
+    addition = textwrap.indent(piece, ' ' * depth).splitlines()
+    return '\n'.join([*lines[: start + 1], *body, *addition, *lines[end:]]) + '\n'
+
+
+def _without(lines: list[str], names: set[str]) -> list[str]:
+    """Leave out keys and what is indented below them."""
+    kept: list[str] = []
+    dropping = False
+    for line in lines:
+        is_key = line.partition(':')[0] in names
+        dropping = is_key or (dropping and line.startswith(' ' * 4))
+        if not dropping:
+            kept.append(line)
+    return kept
 
 
 def write_bus(folder: Path, text: str = BUS, *, eds: str | None = None) -> Path:

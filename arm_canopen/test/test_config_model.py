@@ -1,16 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What the keys of a bus.yml become in the model."""
+"""What a bus.yml and its EDS files become in the model."""
 
 from __future__ import annotations
 
 from dataclasses import fields, MISSING
+import importlib.util
 from operator import attrgetter
 from pathlib import Path
+import shutil
 from typing import Any
 
-from config_cases import added
 from config_samples import (
+    added,
+    ARTICLE_BUS,
     BUS,
     DRIVE_ROWS,
     eds_text,
@@ -20,57 +23,55 @@ from config_samples import (
     TWO_AXES_EDS,
     write_bus,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 import pytest
 
-from arm_canopen import ConfigError, DriveState
-from arm_canopen.config import Identity, load_eds, MasterConfig, NodeConfig, PdoConfig
+from arm_canopen import DriveState
+from arm_canopen.config import (
+    BusConfig,
+    Identity,
+    load_bus,
+    load_eds,
+    MasterConfig,
+    NodeConfig,
+    PdoConfig,
+    SdoWrite,
+)
+from arm_canopen.config.findings import Place
 from arm_canopen.config.model.drive import RecoveryPolicy
+from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
+from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
+from arm_canopen.config.resolve.merge import merge_device
 from arm_canopen.config.sections import DeviceSettings, MasterSettings
-from arm_canopen.standard import DataType
+from arm_canopen.standard import CAN_ID_MASK, DataType
+
+PACKAGE = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize(
     ('piece', 'attribute', 'value'),
     [
-        ('namespace: left/arm', 'namespace', 'left/arm'),
         ('remappings: {joint_states: js}', 'remappings', {'joint_states': 'js'}),
-        ('mandatory: true', 'mandatory', True),
-        ('boot: false', 'boot', False),
-        ('restore_configuration: 1', 'restore_configuration', 1),
-        ('retry_factor: 5', 'retry_factor', 5),
-        ('life_time_factor: 4', 'life_time_factor', 4),
-        ('heartbeat_producer: 50', 'uses_node_guarding', False),
-        ('reset_communication: false', 'reset_communication', False),
         ('sdo_timeout_ms: 50', 'sdo_timeout', 0.05),
         ('boot_timeout_ms: 2500', 'boot_timeout', 2.5),
         ('period: 40', 'poll_period', 0.04),
+        ('heartbeat_producer: 50', 'uses_node_guarding', False),
         ('heartbeat_producer: 50', 'heartbeat_producer', 0.05),
         ('heartbeat_producer: 50', 'heartbeat_timeout', pytest.approx(0.15)),
         ('heartbeat_producer: 50\nheartbeat_multiplier: 2', 'heartbeat_timeout', 0.1),
         ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
         ('heartbeat_consumer: false', 'heartbeat_consumer', False),
-        ('heartbeat_consumer: true', 'heartbeat_consumer', True),
-        ('revision_number: 0', 'identity.revision_number', 0),
         ('revision_number: 0x10002', 'identity.revision_number', 0x10002),
-        ('serial_number: 77', 'identity.serial_number', 77),
-        ('scale_pos_to_dev: 2\nscale_pos_from_dev: 0.5', 'drive.scale_pos_to_dev', 2.0),
-        ('scale_vel_to_dev: 2\nscale_vel_from_dev: 0.5', 'drive.scale_vel_from_dev', 0.5),
-        ('scale_eff_from_dev: 0.5\nscale_eff_to_dev: 2', 'drive.scale_eff_from_dev', 0.5),
-        ('effort_mode: 4', 'drive.scale_eff_from_dev', 1.0),
         ('scale_eff_to_dev: 8', 'drive.scale_eff_from_dev', 0.125),
-        ('offset_pos_from_dev: -1', 'drive.offset_pos_from_dev', -1.0),
         ('switching_state: 2', 'drive.switching_state', DriveState.SWITCH_ON_DISABLED),
+        ('switching_state: 8', 'drive.switching_state', DriveState.OPERATION_ENABLED),
         ('homing_timeout_seconds: 30', 'drive.homing_timeout', 30.0),
-        ('position_mode: 8', 'drive.position_mode', 8),
-        ('velocity_mode: 3', 'drive.velocity_mode', 3),
-        ('effort_mode: 10', 'drive.effort_mode', 10),
-        ('scale_eff_to_dev: 20', 'drive.scale_eff_to_dev', 20.0),
         ('target_timeout_ms: 50', 'drive.target_timeout', 0.05),
         ('recovery: auto', 'drive.recovery', RecoveryPolicy.AUTO),
-        ('quirks: festo_cmmp', 'drive.quirks', 'festo_cmmp'),
-        ('offset_pos_to_dev: 1', 'drive.scale_from_factor_group', False),
         ('offset_pos_to_dev: 1', 'drive.scale_pos_to_dev', 1000.0),
-        ('scale_from_factor_group: true', 'drive.scale_from_factor_group', True),
+        ('scale_from_factor_group: false', 'drive.scale_from_factor_group', False),
+        ('eds: drive.eds', 'eds.name', 'drive.eds'),
     ],
 )
 def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: object) -> None:
@@ -82,28 +83,19 @@ def test_keys_of_a_device(tmp_path: Path, piece: str, attribute: str, value: obj
 @pytest.mark.parametrize(
     ('piece', 'attribute', 'value'),
     [
-        ('namespace: /cell', 'namespace', '/cell'),
         ('remappings: {a: b}', 'remappings', {'a': 'b'}),
         ('baudrate: 125', 'bitrate', 125_000),
-        ('sync_period: 5000', 'sync_period', 0.005),
         ('sync_window: 2000', 'sync_window', 0.002),
-        ('start: false', 'start', False),
-        ('start_all_nodes: true', 'start_all_nodes', True),
-        ('reset_all_nodes: true', 'reset_all_nodes', True),
-        ('stop_all_nodes: true', 'stop_all_nodes', True),
         ('boot_time: 2000', 'boot_time', 2.0),
         ('nmt_inhibit_time: 50', 'nmt_inhibit_time', 0.005),
         ('time_cob_id: 0x40000100', 'time_period', 1.0),
         ('time_cob_id: 0x80000100', 'time_period', 0.0),
         ('time_period_ms: 500', 'time_period', 0.5),
         ('time_period_ms: 500', 'time_cob_id', 0x40000100),
+        ('sync_period: 5000', 'sync_period', 0.005),
         ('sync_period: 5000', 'cycle_period', 0.005),
-        ('sync_overflow: 240', 'sync_overflow', 240),
-        ('sync_overflow: 0', 'sync_overflow', 0),
-        ('start_nodes: false', 'start_nodes', False),
         ('boot_timeout: 500', 'boot_timeout', 0.5),
         ('heartbeat_producer: 0', 'heartbeat_timeout', 0.0),
-        ('heartbeat_producer: 100', 'heartbeat_timeout', pytest.approx(0.3)),
         ('heartbeat_producer: 100\nheartbeat_multiplier: 5', 'heartbeat_timeout', 0.5),
     ],
 )
@@ -113,33 +105,33 @@ def test_keys_of_the_master(tmp_path: Path, piece: str, attribute: str, value: o
     assert attrgetter(attribute)(master) == value
 
 
+@pytest.mark.parametrize(
+    ('settings', 'model'), [(DeviceSettings, NodeConfig), (MasterSettings, MasterConfig)]
+)
+def test_a_default_has_one_value(settings: Any, model: Any) -> None:
+    """A device that is built by a program has the defaults of one that bus.yml names."""
+    read = {field.name: field.default for field in fields(settings)}
+    built = {field.name: field.default for field in fields(model)}
+    same = {
+        name
+        for name in read.keys() & built.keys()
+        if read[name] not in (None, '') and built[name] is not MISSING
+    }
+    assert len(same) > 5
+    assert {name: read[name] for name in same} == {name: built[name] for name in same}
+
+
 def test_supervision_of_heartbeats(tmp_path: Path) -> None:
     """The options' multiplier counts for all; the master may leave the supervision out."""
     text = added('joint1', 'heartbeat_producer: 100')
     options = 'options: {heartbeat_multiplier: 10}\n'
     assert load_text(tmp_path, options + text).nodes[0].heartbeat_timeout == 1.0
-    unwatched = text.replace('  node_id: 1', '  node_id: 1\n  heartbeat_consumer: false')
+    unwatched = added('master', 'heartbeat_consumer: false', text)
     (node,) = load_text(tmp_path, unwatched).nodes
     assert (node.heartbeat_producer, node.heartbeat_timeout) == (0.1, 0.0)
-
-
-def test_the_eds_gives_the_heartbeat_when_bus_yml_does_not(tmp_path: Path) -> None:
-    """A producer time in the EDS is supervised, too."""
     name = 'Producer heartbeat time\nDataType=0x0006\nAccessType=rw\nDefaultValue='
-    eds = eds_text().replace(f'{name}0', f'{name}250')
-    (node,) = load_text(tmp_path, eds=eds).nodes
-    assert (node.heartbeat_producer, node.heartbeat_timeout) == (0.25, 0.75)
-
-
-def test_a_fixed_heartbeat_cannot_be_changed(tmp_path: Path) -> None:
-    """A device whose 0x1017 is read-only keeps the period of its EDS, and no other is taken."""
-    head = 'Producer heartbeat time\nDataType=0x0006\nAccessType='
-    eds = eds_text().replace(f'{head}rw\nDefaultValue=0', f'{head}ro\nDefaultValue=250')
-    text = added('joint1', 'heartbeat_producer: 250')
-    assert load_text(tmp_path, text, eds=eds).nodes[0].heartbeat_producer == 0.25
-    (problem,) = errors_of(write_bus(tmp_path, text.replace('250', '100'), eds=eds))
-    assert problem.key == 'nodes.joint1.heartbeat_producer'
-    assert 'fixed at 250 ms' in problem.message
+    (node,) = load_text(tmp_path, eds=eds_text().replace(f'{name}0', f'{name}250')).nodes
+    assert (node.heartbeat_producer, node.heartbeat_timeout) == (0.25, 0.75)  # that of the EDS
 
 
 def test_devices_watch_the_master_where_they_can(tmp_path: Path) -> None:
@@ -151,11 +143,26 @@ def test_devices_watch_the_master_where_they_can(tmp_path: Path) -> None:
     assert not load_text(tmp_path, silent).nodes[0].heartbeat_consumer
 
 
+@pytest.mark.parametrize(
+    ('piece', 'guard_time'),
+    [
+        ('heartbeat_producer: 0\nguard_time: 150', 0.15),
+        ('heartbeat_producer: 0', 0.05),
+        ('heartbeat_producer: 100\nguard_time: 150', 0.0),
+    ],
+)
+def test_a_device_without_heartbeat_is_guarded(
+    tmp_path: Path, piece: str, guard_time: float
+) -> None:
+    """bus.yml says how often, else the EDS does; both at a time are forbidden by CiA 301."""
+    eds = eds_text([*DRIVE_ROWS, Row(0x100C, 0, 'Guard time', 6, 'rw', '50')])
+    (node,) = load_text(tmp_path, added('joint1', piece), eds=eds).nodes
+    assert (node.guard_time, node.uses_node_guarding) == (guard_time, guard_time > 0.0)
+
+
 def test_the_identity_is_that_of_the_eds(tmp_path: Path) -> None:
     """Type, vendor and product are checked; revision and serial only if bus.yml names them."""
     assert load_text(tmp_path).nodes[0].identity == Identity(0x0002_0192, 0x555, 7)
-    unknown = eds_text().replace('DefaultValue=0x555', 'DefaultValue=0')
-    assert load_text(tmp_path, eds=unknown).nodes[0].identity.vendor_id == 0
 
 
 def test_the_node_id_may_come_from_a_dcf(tmp_path: Path) -> None:
@@ -175,12 +182,6 @@ def test_the_cycle_without_sync_is_the_shortest_period(tmp_path: Path) -> None:
     text = f'{silent}    period: 20\n  joint2: {{node_id: 3, period: 5}}\n'
     bus = load_text(tmp_path, text)
     assert (bus.master.cycle_period, bus.master.sync_period) == (0.005, 0.0)
-
-
-def pdos(folder: Path, piece: str) -> tuple[tuple[PdoConfig, ...], tuple[PdoConfig, ...]]:
-    """Load the sample with a piece added to its device."""
-    (node,) = load_text(folder, added('joint1', piece)).nodes
-    return node.tpdos, node.rpdos
 
 
 TWO_AXES = """
@@ -204,63 +205,40 @@ def test_a_drive_with_two_axes(tmp_path: Path) -> None:
     assert unnamed.joints == unnamed.node('joint1').joints == ('joint1_0', 'joint1_1')
 
 
-@pytest.mark.parametrize('name', ['left arm', '1st', ''])
-def test_a_channel_has_a_name_that_a_ros_node_can_have(tmp_path: Path, name: str) -> None:
-    """As its device must; each axis gets a node of that name."""
-    text = added('joint1', f"num_channels: 2\nchannel_names: [elbow, '{name}']")
-    (error,) = errors_of(write_bus(tmp_path, text, eds=TWO_AXES_EDS.read_text()))
-    assert 'is no name for a ROS node' in error.message
-
-
-def test_two_devices_have_no_axis_of_one_name(tmp_path: Path) -> None:
-    """Each axis is a joint, with a node of its own."""
-    text = added('joint1', 'num_channels: 2\nchannel_names: [joint2, elbow]')
-    text += '  joint2: {node_id: 5}\n'
-    errors = errors_of(write_bus(tmp_path, text, eds=TWO_AXES_EDS.read_text()))
-    assert ["both have an axis 'joint2'" in error.message for error in errors] == [True]
-
-
 def test_all_pdos_of_the_eds_appear(tmp_path: Path) -> None:
     """PDOs that bus.yml does not name are as the EDS says; those that it names are configured."""
-    tpdos, rpdos = pdos(tmp_path, '')
-    for group, base in ((tpdos, 0x180), (rpdos, 0x200)):
+    (node,) = load_text(tmp_path).nodes
+    for group, base in ((node.tpdos, 0x180), (node.rpdos, 0x200)):
         assert [pdo.number for pdo in group] == [1, 2, 3, 4, 5, 6]
         assert [pdo.configured for pdo in group] == [True] + [False] * 5
         assert [pdo.enabled for pdo in group] == [True, True] + [False] * 4
         assert [pdo.cob_id for pdo in group[:4]] == [base + 0x100 * n + 2 for n in range(4)]
+        assert not any(pdo.fixed_mapping for pdo in group)
         assert all(pdo.inhibit_time is pdo.sync_start is None for pdo in group)
-    assert [pdo.event_time for pdo in tpdos] == [0.1] + [None] * 5  # state, on change
-    assert all(pdo.event_time is None for pdo in rpdos)
+    assert [pdo.event_time for pdo in node.tpdos] == [0.1] + [None] * 5  # state, on change
+    assert all(pdo.event_time is None for pdo in node.rpdos)
 
 
-def test_parameters_of_a_pdo(tmp_path: Path) -> None:
-    """Times are in seconds; what bus.yml does not name stays with the device."""
-    piece = """
-        tpdo:
-          1: {inhibit_time: 15, event_timer: 100, sync_start: 3, transmission: 240}
-        rpdo:
-          1: {event_deadline: 50, cob_id: 0x333}
-    """
-    tpdos, rpdos = pdos(tmp_path, piece)
-    assert tpdos[0].inhibit_time == 0.0015
-    assert tpdos[0].event_time == 0.1
-    assert tpdos[0].sync_start == 3
-    assert tpdos[0].transmission == 240
-    assert rpdos[0].event_time == 0.05
-    assert rpdos[0].cob_id == 0x333
-    assert rpdos[0].transmission == 255
+PDOS = """
+tpdo:
+  1: {inhibit_time: 15, event_timer: 100, sync_start: 3, transmission: 240}
+  2: {mapping: [{index: 0x2003}, {index: 0x6061}, {index: 0x6041}]}
+rpdo:
+  1: {event_deadline: 50, cob_id: 0x333}
+  2: {mapping: [{index: 0x0005}, {index: 0x6040}, {index: 0x0004}]}
+"""
 
 
-def test_mappings_have_the_types_of_the_eds(tmp_path: Path) -> None:
-    """Bits come from the EDS; RPDOs take gaps."""
-    piece = """
-        tpdo: {1: {mapping: [{index: 0x2003}, {index: 0x6061}, {index: 0x6041}]}}
-        rpdo: {1: {mapping: [{index: 0x0005}, {index: 0x6040}, {index: 0x0004}]}}
-    """
-    tpdos, rpdos = pdos(tmp_path, piece)
-    types = [mapped.data_type for mapped in tpdos[0].mapping]
+def test_parameters_and_mappings_of_pdos(tmp_path: Path) -> None:
+    """Times are in seconds; types come from the EDS, and RPDOs take gaps."""
+    (node,) = load_text(tmp_path, added('joint1', PDOS)).nodes
+    tpdo, rpdo = node.tpdos[0], node.rpdos[0]
+    times = (tpdo.inhibit_time, tpdo.event_time, tpdo.sync_start, tpdo.transmission)
+    assert times == (0.0015, 0.1, 3, 240)
+    assert (rpdo.event_time, rpdo.cob_id, rpdo.transmission) == (0.05, 0x333, 255)
+    types = [mapped.data_type for mapped in node.tpdos[1].mapping]
     assert types == [DataType.BOOLEAN, DataType.INTEGER8, DataType.UNSIGNED16]
-    gaps = [(mapped.index, mapped.data_type) for mapped in rpdos[0].mapping]
+    gaps = [(mapped.index, mapped.data_type) for mapped in node.rpdos[1].mapping]
     assert gaps == [
         (5, DataType.UNSIGNED8),
         (0x6040, DataType.UNSIGNED16),
@@ -280,31 +258,6 @@ def test_free_identifiers_are_given_to_pdos_from_the_fifth_on(tmp_path: Path) ->
     assert not bus.nodes[1].tpdos[5].enabled
 
 
-def fixed_tpdos() -> str:
-    """Write an EDS whose TPDOs always carry the statusword."""
-    head, mark, tail = eds_text().partition('[1A00]')
-    count = 'ParameterName=Number of objects\nDataType=0x0005\nAccessType='
-    first = 'ParameterName=Object 1\nDataType=0x0007\nAccessType='
-    tail = tail.replace(f'{count}rw\nDefaultValue=0', f'{count}const\nDefaultValue=1')
-    tail = tail.replace(f'{first}rw\nDefaultValue=0', f'{first}const\nDefaultValue=0x60410010')
-    return head + mark + tail
-
-
-def test_a_fixed_mapping_is_kept(tmp_path: Path) -> None:
-    """A device whose mapping is read-only is used with it, and marked so."""
-    (node,) = load_text(tmp_path, eds=fixed_tpdos()).nodes
-    assert [pdo.fixed_mapping for pdo in node.tpdos] == [True] * 6
-    assert [pdo.fixed_mapping for pdo in node.rpdos] == [False] * 6
-    assert {mapped.word for pdo in node.tpdos for mapped in pdo.mapping} == {0x6041_0010}
-
-
-def test_a_fixed_mapping_cannot_be_changed(tmp_path: Path) -> None:
-    """Wanting another one than the device has is refused."""
-    text = added('joint1', 'tpdo: {1: {mapping: [{index: 0x6064}]}}')
-    (problem,) = errors_of(write_bus(tmp_path, text, eds=fixed_tpdos()))
-    assert 'the mapping of TPDO 1 of joint1 is fixed' in problem.message
-
-
 def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Seven devices that share an EDS cost one reading."""
     reads: list[Path] = []
@@ -319,47 +272,233 @@ def test_an_eds_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert len(reads) == 1
 
 
-def test_the_line_of_a_device_is_that_of_its_name(tmp_path: Path) -> None:
-    """Nodes log where they are configured."""
-    path = write_bus(tmp_path)
-    (node,) = load_text(tmp_path).nodes
-    assert isinstance(node, NodeConfig)
-    assert path.read_text('utf-8').splitlines()[node.line - 1] == '  joint1:'
+OLD = """options: {dcf_path: "@BUS_CONFIG_PATH@"}
+master: {node_id: 1, driver: "ros2_canopen::MasterDriver", sync_period: 10000}
+.template: {this: is ignored}
+joint1:
+  node_id: 2
+  dcf: drive.eds
+  driver: "ros2_canopen::Cia402Driver"
+  tpdo: {1: {mapping: [{index: 0x6041}]}}
+  rpdo: {1: {mapping: [{index: 0x6040}]}}
+"""
 
 
-def test_a_device_without_heartbeat_is_guarded(tmp_path: Path) -> None:
-    """bus.yml says how often, else the EDS does; an EDS without 0x100C refuses it."""
-    rows = [*DRIVE_ROWS, Row(0x100C, 0, 'Guard time', 6, 'rw', '50')]
-    text = added('joint1', 'heartbeat_producer: 0\nguard_time: 150')
-    (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
-    assert (node.guard_time, node.uses_node_guarding) == (0.15, True)
-    text = added('joint1', 'heartbeat_producer: 0')
-    (node,) = load_text(tmp_path, text, eds=eds_text(rows)).nodes
-    assert (node.guard_time, node.uses_node_guarding) == (0.05, True)
-    with pytest.raises(ConfigError, match='no writable 0x100C'):
-        load_text(
-            tmp_path, added('joint1', 'heartbeat_producer: 0\nguard_time: 150'), eds=eds_text()
-        )
+def test_both_formats_give_the_same_device(tmp_path: Path) -> None:
+    """A device is the same in the old flat format and in the new one, but for its line."""
+    (old,) = load_text(tmp_path, OLD).nodes
+    (new,) = load_text(tmp_path).nodes
+    names = NodeConfig.__dataclass_fields__.keys() - {'line', 'dictionary'}
+    assert [getattr(old, name) for name in names] == [getattr(new, name) for name in names]
+    assert list(old.dictionary) == list(new.dictionary)
+    assert (old.line, new.line) == (4, 21)  # that of its name
 
 
-def test_a_heartbeat_replaces_guarding(tmp_path: Path) -> None:
-    """Both at a time are forbidden by CiA 301; the heartbeat wins, and it is reported."""
-    config = load_text(tmp_path, added('joint1', 'heartbeat_producer: 100\nguard_time: 150'))
-    assert (config.nodes[0].guard_time, config.nodes[0].uses_node_guarding) == (0.0, False)
-    assert any('sends a heartbeat every 100 ms' in str(warning) for warning in config.warnings)
+DEFAULTS = """
+heartbeat_producer: 100
+remappings: {a: b, c: d}
+sdo:
+  - {index: 0x6081, value: 1}
+  - {index: 0x6083, value: 2}
+tpdo:
+  1: {transmission: 5, mapping: [{index: 0x6041}, {index: 0x6061}]}
+  2: {transmission: 6, mapping: [{index: 0x6064}]}
+"""
+OWN = """
+heartbeat_producer: 300
+remappings: {c: e}
+tpdo:
+  1: {mapping: [{index: 0x6061}]}
+  2: {transmission: 7}
+"""
+
+
+def test_own_values_beat_the_defaults(tmp_path: Path) -> None:
+    """Each key of a device wins; mappings merge key by key, lists of a PDO are replaced."""
+    text = added('joint1', OWN, added('defaults', DEFAULTS))
+    (node,) = load_text(tmp_path, text).nodes
+    assert node.heartbeat_producer == 0.3
+    assert node.remappings == {'a': 'b', 'c': 'e'}
+    assert [pdo.transmission for pdo in node.tpdos[:2]] == [5, 7]
+    assert [mapped.index for mapped in node.tpdos[0].mapping] == [0x6061]
+    assert [mapped.index for mapped in node.tpdos[1].mapping] == [0x6064]
 
 
 @pytest.mark.parametrize(
-    ('settings', 'model'), [(DeviceSettings, NodeConfig), (MasterSettings, MasterConfig)]
+    ('own', 'expected'),
+    [
+        ('', [(0x6081, 1), (0x6083, 2)]),
+        ('sdo: [{index: 0x6084, value: 3}]', [(0x6081, 1), (0x6083, 2), (0x6084, 3)]),
+        ('sdo: [{index: 0x6081, value: 9}]', [(0x6083, 2), (0x6081, 9)]),
+        ('sdo: []', []),
+        ('error_behavior: {1: 2}', [(0x1029, 2), (0x6081, 1), (0x6083, 2)]),
+    ],
+    ids=['defaults only', 'another object', 'the same object', 'empty list', 'error behaviour'],
 )
-def test_a_default_has_one_value(settings: Any, model: Any) -> None:
-    """A device that is built by a program has the defaults of one that bus.yml names."""
-    read = {field.name: field.default for field in fields(settings)}
-    built = {field.name: field.default for field in fields(model)}
-    same = {
-        name
-        for name in read.keys() & built.keys()
-        if read[name] not in (None, '') and built[name] is not MISSING
+def test_lists_of_writes_merge_by_object(
+    tmp_path: Path, own: str, expected: list[tuple[int, int]]
+) -> None:
+    """A device adds to the defaults' writes or replaces single ones; an empty list drops all."""
+    text = added('joint1', own, added('defaults', DEFAULTS))
+    (node,) = load_text(tmp_path, text).nodes
+    writes = [(write.index, int.from_bytes(write.data, 'little')) for write in node.sdo_writes]
+    assert writes == expected
+
+
+KEYS = st.sampled_from('abcd')
+TREES = st.recursive(
+    st.integers(0, 9), lambda children: st.dictionaries(KEYS, children, max_size=3), max_leaves=8
+)
+SECTIONS = st.dictionaries(KEYS, TREES, max_size=4)
+PLACE = Place(Path('x.yml'))
+
+
+def section(tree: dict[str, object]) -> YamlMap:
+    """Turn nested dicts into a document."""
+    entries: dict[str, Item] = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            entries[key] = section(value)
+        else:
+            entries[key] = Scalar(PLACE, str(value), ScalarKind.INTEGER)
+    return YamlMap(PLACE, entries)
+
+
+def merged(below: Any, above: Any) -> Any:
+    """Merge nested dicts: the oracle."""
+    if not isinstance(below, dict) or not isinstance(above, dict):
+        return above
+    return below | {
+        key: merged(below[key], value) if key in below else value for key, value in above.items()
     }
-    assert len(same) > 5
-    assert {name: read[name] for name in same} == {name: built[name] for name in same}
+
+
+@pytest.mark.slow
+@given(below=SECTIONS, above=SECTIONS)
+def test_merging_is_deep_and_the_upper_wins(
+    below: dict[str, object], above: dict[str, object]
+) -> None:
+    """Merging two sections is merging nested dicts; nothing given is changed."""
+    lower, upper = section(below), section(above)
+    assert merge_device(lower, upper) == section(merged(below, above))
+    assert (lower, upper) == (section(below), section(above))
+
+
+@pytest.mark.parametrize(
+    ('options', 'own', 'folder'),
+    [
+        ('', 'dcf: drive.eds', '.'),
+        ('options: {dcf_path: "@BUS_CONFIG_PATH@"}', 'dcf: drive.eds', '.'),
+        ('options: {dcf_path: "@BUS_CONFIG_PATH@/a"}', 'dcf: drive.eds', 'a'),
+        ('options: {dcf_path: a}', 'dcf: drive.eds', 'a'),
+        ('options: {dcf_path: nowhere}', 'dcf: drive.eds', '.'),
+        ('options: {dcf_path: a}', 'dcf: drive.eds\ndcf_path: b', 'b'),
+        ('options: {dcf_path: "$EDS_OF_TEST"}', 'dcf: drive.eds', 'b'),
+        ('', 'dcf: ${EDS_OF_TEST}/drive.eds', 'b'),
+        ('', 'dcf: "@BUS_CONFIG_PATH@/a/drive.eds"', 'a'),
+        ('', 'eds: "@BUS_CONFIG_PATH@/a/drive.eds"', 'a'),
+    ],
+)
+def test_where_the_eds_is_looked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: str, own: str, folder: str
+) -> None:
+    """In dcf_path (the device's, else that of the options), else beside the bus.yml, reported."""
+    for name in ('a', 'b'):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / 'drive.eds').write_text(eds_text(), encoding='utf-8')
+    monkeypatch.setenv('EDS_OF_TEST', str(tmp_path / 'b'))
+    bus = load_text(tmp_path, f'{options}\n{added("joint1", own)}')
+    assert bus.nodes[0].eds.resolve() == (tmp_path / folder / 'drive.eds').resolve()
+    assert len([w for w in bus.warnings if 'taken is' in w.message]) == ('nowhere' in options)
+
+
+def test_another_folder_for_the_variable(tmp_path: Path) -> None:
+    """@BUS_CONFIG_PATH@ may be made to stand for another folder."""
+    other = tmp_path / 'other'
+    other.mkdir()
+    (other / 'drive.eds').write_text(eds_text(), encoding='utf-8')
+    path = write_bus(tmp_path, f'options: {{dcf_path: "@BUS_CONFIG_PATH@"}}\n{BUS}')
+    assert load_bus(path, bus_config_path=other).nodes[0].eds == other / 'drive.eds'
+
+
+def test_what_a_missing_section_lacks_has_its_name(tmp_path: Path) -> None:
+    """There is no line to show."""
+    path = write_bus(tmp_path, OLD.replace('master:', 'mastr:'))
+    lacking = {"no 'driver'", "no 'node_id'"}
+    assert {each.key for each in errors_of(path) if each.message in lacking} == {'master'}
+
+
+@pytest.fixture(params=['sample EDS', 'shipped EDS'])
+def article(request: pytest.FixtureRequest, tmp_path: Path) -> BusConfig:
+    """Load the published bus.yml of a seven-joint arm, unchanged."""
+    shutil.copy(ARTICLE_BUS, tmp_path / 'bus.yml')
+    shipped = (PACKAGE / 'eds' / 'cia402_drive.eds').read_text('utf-8')
+    text = eds_text() if request.param == 'sample EDS' else shipped
+    (tmp_path / 'cia402_slave.eds').write_text(text, encoding='utf-8')
+    return load_bus(tmp_path / 'bus.yml')
+
+
+def test_the_article_loads_without_a_warning(article: BusConfig) -> None:
+    """The master sends a heartbeat, so that drives notice its end; devices are found by name."""
+    master = article.master
+    assert article.warnings == ()
+    assert (master.node_id, master.name, master.bitrate) == (1, 'master', 1_000_000)
+    assert master.sync_period == master.cycle_period == 0.01
+    assert master.heartbeat_producer == 0.2
+    assert master.heartbeat_timeout == pytest.approx(0.6)
+    assert master.start_nodes
+    assert article.node('panda_joint3').node_id == 4
+    with pytest.raises(KeyError, match='panda_joint1, panda_joint2'):
+        article.node('panda_joint8')
+
+
+def _summary(pdo: PdoConfig) -> tuple[int, int, int, list[int]]:
+    return pdo.number, pdo.cob_id, pdo.transmission, [mapped.index for mapped in pdo.mapping]
+
+
+def test_the_joints_of_the_article(article: BusConfig) -> None:
+    """In the order of the file, alike but for name, node id and COB-IDs."""
+    assert [(node.name, node.node_id) for node in article.nodes] == [
+        (f'panda_joint{number}', number + 1) for number in range(1, 8)
+    ]
+    for node in article.nodes:
+        own, drive = node.node_id, node.drive
+        assert node.is_drive
+        assert node.heartbeat_consumer
+        assert (node.heartbeat_producer, node.heartbeat_timeout) == (1.0, 3.0)
+        assert (drive.position_mode, drive.velocity_mode) == (1, None)
+        assert drive.switching_state is DriveState.OPERATION_ENABLED
+        assert node.identity.device_type != 0
+        assert node.identity.revision_number == node.identity.serial_number == 0
+        assert [_summary(pdo) for pdo in node.tpdos if pdo.enabled] == [
+            (1, 0x180 + own, 1, [0x6041, 0x6061]),
+            (2, 0x280 + own, 1, [0x6064, 0x606C]),
+        ]
+        assert [_summary(pdo) for pdo in node.rpdos if pdo.enabled] == [
+            (1, 0x200 + own, 255, [0x6040, 0x6060]),
+            (2, 0x300 + own, 255, [0x607A, 0x60FF]),
+        ]
+        assert [pdo.configured for pdo in node.tpdos[:4] + node.rpdos[:4]] == [True] * 8
+        entry = node.dictionary.get(0x1800, 1)  # ``$NODEID``, although they share one file
+        assert entry is not None
+        assert int(entry.default or 0) & CAN_ID_MASK == 0x180 + own
+    assert article.nodes[0].sdo_writes == (
+        SdoWrite(0x6081, 0, (1000).to_bytes(4, 'little')),
+        SdoWrite(0x6083, 0, (10000).to_bytes(4, 'little')),
+        SdoWrite(0x6084, 0, (10000).to_bytes(4, 'little')),
+        SdoWrite(0x6085, 0, (10000).to_bytes(4, 'little')),
+        SdoWrite(0x6098, 0, b'\x00'),
+        SdoWrite(0x60C2, 1, b'\x32'),
+        SdoWrite(0x60C2, 2, b'\xfd'),
+    )
+
+
+def test_the_default_dictionary_is_made_from_the_simulated_drive() -> None:
+    """The file is what its tool makes of the present EDS."""
+    tool_file = PACKAGE / 'tools' / 'make_default_drive.py'
+    spec = importlib.util.spec_from_file_location('make_default_drive', tool_file)
+    assert spec is not None
+    assert spec.loader is not None
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    assert tool.default_drive(tool.SOURCE.read_text('ascii')) == DEFAULT_DRIVE.read_text('ascii')

@@ -8,14 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
-from config_cases import added
-from config_samples import DRIVE_ROWS, eds_text, FACTOR_ROWS, load_text, Row, write_bus
-from drive_samples import (
-    SCALE,
-)
+from config_samples import added, DRIVE_ROWS, eds_text, FACTOR_ROWS, load_text, Row, write_bus
+from drive_samples import SCALE
 import pytest
 
-from arm_canopen import ConfigError, DriveError, OperationMode
+from arm_canopen import DriveError, OperationMode
 from arm_canopen.cia402.modes import Mode
 from arm_canopen.cia402.parameters import DriveParameters
 from arm_canopen.cia402.target_limits import check_target
@@ -70,11 +67,8 @@ def test_what_one_means(
 
 
 def test_an_eds_without_factor_group_has_no_radians(tmp_path: Path) -> None:
-    """Then nobody knows what an increment is, and the group cannot be used."""
+    """An increment then has no known size."""
     assert units_of(tmp_path, 'mandatory: false', eds=eds_text()).radians is None
-    text = added(JOINT, 'scale_from_factor_group: true')
-    (error,) = check_file(write_bus(tmp_path, text)).errors
-    assert error.key.endswith('scale_from_factor_group')
 
 
 def test_the_default_is_reported_where_the_drive_counts_otherwise(tmp_path: Path) -> None:
@@ -87,13 +81,6 @@ def test_the_default_is_reported_where_the_drive_counts_otherwise(tmp_path: Path
         written = load_text(tmp_path, added(JOINT, f'scale_pos_to_dev: {scale}'), eds=EDS)
         found = [w.message for w in check_bus(written).warnings if 'factor group' in w.message]
         assert ['one of them is wrong' in message for message in found] == [True] * is_doubted
-
-
-def test_two_rules_are_refused(tmp_path: Path) -> None:
-    """The factor group and a scale cannot both be meant."""
-    text = added(JOINT, 'scale_from_factor_group: true\nscale_pos_to_dev: 5')
-    with pytest.raises(ConfigError, match='scale_pos_to_dev'):
-        load_text(tmp_path, text, eds=EDS)
 
 
 POSITIONS = 'scale_pos_to_dev: -57295.78\nscale_pos_from_dev: -1.745329e-5'
@@ -212,20 +199,6 @@ def test_a_scale_that_rounds_everything_is_a_warning(tmp_path: Path, key: str) -
     text = added(JOINT, f'{key}: 0.0001\n{other}: 10000')
     found = [w for w in check_file(write_bus(tmp_path, text, eds=EDS)).warnings if key in w.key]
     assert len(found) == 1
-
-
-@pytest.mark.parametrize(
-    ('piece', 'warns'),
-    [
-        ('sdo: [{index: 0x6081, value: 0}]', True),
-        ('sdo: [{index: 0x6081, value: 0}]\nposition_mode: 8', False),
-        ('sdo: [{index: 0x6081, value: 5}]', False),
-    ],
-)
-def test_a_profile_velocity_of_0(tmp_path: Path, piece: str, *, warns: bool) -> None:
-    """In mode 1 nothing would move; other modes do not need it."""
-    report = check_file(write_bus(tmp_path, added(JOINT, piece)))
-    assert any('profile velocity' in warning.message for warning in report.warnings) is warns
 
 
 @pytest.mark.parametrize('offset', [0.0, 0.3])

@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import threading
 
-from config_cases import added
-from config_samples import load_text
+from config_samples import added, load_text
 from isolation import Isolation
 import pytest
 import rclpy
