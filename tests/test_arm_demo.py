@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The demo of arm motion and the bring-up with motion, as a newcomer starts them."""
+"""The demo of arm motion, as a newcomer starts it."""
 
 from __future__ import annotations
 
@@ -59,24 +59,3 @@ def test_ctrl_c_in_the_middle_of_the_demo(isolation: Isolation) -> None:
             assert demo.wait(40.0) == 0, demo.output
         assert any(line.startswith('peak jerk') for line in demo.lines), demo.output
         assert set(recorder.last_states().values()) == {'Switch on disabled'}
-
-
-def test_bring_up_with_motion_enables_and_moves(isolation: Isolation) -> None:
-    """With --enable, a trajectory from the command line is followed, with feedback."""
-    goal = (
-        '{trajectory: {joint_names: [joint_1_s, joint_2_l, joint_3_u, joint_4_r, joint_5_b, '
-        'joint_6_t], points: [{positions: [0.1, 0.0, 0.0, 0.0, -0.2, 0.0], '
-        'time_from_start: {sec: 1}}]}}'
-    )
-    with start(isolation, 'arm_bringup', 'bringup', 'gp110', '--simulate', '--enable') as bringup:
-        bringup.wait_for('all 6 drives are enabled', 60.0)
-        command = [
-            *('ros2', 'action', 'send_goal', '--feedback'),
-            '/gp110_arm_controller/follow_joint_trajectory',
-            *('control_msgs/action/FollowJointTrajectory', goal),
-        ]
-        with RunningProcess(command, isolation.env) as sent:
-            assert sent.wait(60.0) == 0, sent.output
-        assert 'SUCCEEDED' in sent.output
-        assert 'eedback' in sent.output
-        assert bringup.stop() == 0, bringup.output

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 import re
 from typing import Any, TYPE_CHECKING
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand, ParallelGripperCommand
 from control_msgs.msg import JointJog, JointTrajectoryControllerState
 from controller_manager_msgs.srv import ListControllers
+from isolation import Isolation, reserve
 from moveit_msgs.action import ExecuteTrajectory
 from moveit_msgs.msg import RobotTrajectory
 from processes import RunningProcess
@@ -23,9 +23,6 @@ from two_arms import ARMS, DRIVES, FOLLOWER, GRIPPER, write_two_arms
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
 
@@ -80,26 +77,34 @@ class Robot:
         return [each.result() for each in futures]
 
 
+@pytest.fixture(scope='module')
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    """Bring the robot up, with its planner, for all tests of this module."""
+    folder = write_two_arms(tmp_path_factory.mktemp('robot') / 'two_arms')
+    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{folder}/', '--simulate', '--enable']
+    margin = 'move_group:trajectory_execution.allowed_goal_duration_margin:=60.0'  # [s]
+    with reserve() as isolation:
+        command += ['--plan', '--can', isolation.bus, '--ros-args', '-p', margin]
+        with (
+            RunningProcess(command, isolation.env) as bringup,
+            RosClient(isolation.domain_id) as client,
+        ):
+            bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
+            bringup.wait_for('collisions are checked with wheel at 0', 60.0)
+            bringup.wait_for('all is ready', 60.0)
+            yield Robot(client)
+            assert bringup.stop(30.0) == 0, bringup.output
+
+
 @pytest.fixture
-def robot(isolation: Isolation, tmp_path: Path) -> Iterator[Robot]:
-    """Bring the robot up."""
-    with bring_up(isolation, tmp_path) as robot:
-        yield robot
-
-
-@contextmanager
-def bring_up(isolation: Isolation, folder: Path, *options: str) -> Iterator[Robot]:
-    """Bring the robot up from files in a folder, with options besides."""
-    robot = write_two_arms(folder / 'two_arms')
-    command = ['ros2', 'run', 'arm_bringup', 'bringup', f'{robot}/', '--simulate', '--enable']
-    with (
-        RunningProcess([*command, '--can', isolation.bus, *options], isolation.env) as bringup,
-        RosClient(isolation.domain_id) as client,
-    ):
-        bringup.wait_for(f'all {len(DRIVES)} drives are enabled', 90.0)
-        bringup.wait_for('collisions are checked with wheel at 0', 60.0)
-        yield Robot(client)
-        assert bringup.stop(30.0) == 0, bringup.output
+def robot(started: Robot) -> Robot:
+    """Bring both arms and the gripper to 0, one after the other."""
+    for arm, joints in ARMS.items():
+        (done,) = started.results([started.follow(arm, 4, [0.0] * len(joints))])
+        assert done.status == SUCCEEDED, done.result
+    (hand,) = started.results([started.grip(0.0)])
+    assert hand.status == SUCCEEDED, hand.result
+    return started
 
 
 def test_both_arms_and_the_gripper_move_at_the_same_time(robot: Robot) -> None:
@@ -150,7 +155,6 @@ def test_arms_that_move_towards_each_other_stop_and_may_part(robot: Robot) -> No
 
 def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Robot) -> None:
     """A goal beyond the range is refused; a second arm is jogged by a servo of its own."""
-    robot.client.spin_until(lambda: GRIPPER in robot.at, 60.0, 'joint states')
     beyond = robot.results([robot.grip(0.2)])[0]
     assert (beyond.status, beyond.result.reached_goal) == (ABORTED, False)
     goal = ParallelGripperCommand.Goal()
@@ -163,8 +167,9 @@ def test_a_gripper_takes_goals_of_either_kind_and_the_newer_one_counts(robot: Ro
     assert robot.at[GRIPPER] == pytest.approx(0.001, abs=2e-3)
     jogs = robot.client.node.create_publisher(JointJog, '/right_servo_node/delta_joint_cmds', 10)
     jog = JointJog(joint_names=['right_slide'], velocities=[1.0])
-    robot.client.node.create_timer(0.02, lambda: jogs.publish(jog))
+    timer = robot.client.node.create_timer(0.02, lambda: jogs.publish(jog))
     robot.client.spin_until(lambda: robot.at['right_slide'] > 0.05, 60.0, 'motion of the slide')
+    robot.client.node.destroy_timer(timer)
     assert [robot.at[name] for name in ARMS['left']] == pytest.approx([0.0] * 3, abs=1e-3)
 
 
@@ -185,18 +190,15 @@ def test_the_panda_with_its_gripper_grips(isolation: Isolation) -> None:
         assert bringup.stop(30.0) == 0, bringup.output
 
 
-def test_a_trajectory_of_arm_and_gripper_is_split(isolation: Isolation, tmp_path: Path) -> None:
+def test_a_trajectory_of_arm_and_gripper_is_split(robot: Robot) -> None:
     """move_group has the arm follow it, and the gripper close where it ends."""
-    margin = 'move_group:trajectory_execution.allowed_goal_duration_margin:=60.0'  # [s]
-    with bring_up(isolation, tmp_path, '--plan', '--ros-args', '-p', margin) as robot:
-        moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
-        robot.client.spin_until(lambda: {*moved} <= {*robot.at}, 60.0, 'joint states')
-        trajectory = JointTrajectory(joint_names=moved)
-        for places, seconds in (([robot.at[name] for name in moved], 0), (target, 4)):
-            point = JointTrajectoryPoint(positions=places)
-            point.time_from_start.sec = seconds
-            trajectory.points.append(point)
-        goal = ExecuteTrajectory.Goal(trajectory=RobotTrajectory(joint_trajectory=trajectory))
-        (done,) = robot.results([robot.send(ExecuteTrajectory, '/execute_trajectory', goal)])
-        assert done.status == SUCCEEDED, done.result.error_code
-        assert [robot.at[name] for name in moved] == pytest.approx(target, abs=1e-3)
+    moved, target = [*ARMS['left'], GRIPPER], [*TARGETS['left'], 0.03]
+    trajectory = JointTrajectory(joint_names=moved)
+    for places, seconds in (([robot.at[name] for name in moved], 0), (target, 4)):
+        point = JointTrajectoryPoint(positions=places)
+        point.time_from_start.sec = seconds
+        trajectory.points.append(point)
+    goal = ExecuteTrajectory.Goal(trajectory=RobotTrajectory(joint_trajectory=trajectory))
+    (done,) = robot.results([robot.send(ExecuteTrajectory, '/execute_trajectory', goal)])
+    assert done.status == SUCCEEDED, done.result.error_code
+    assert [robot.at[name] for name in moved] == pytest.approx(target, abs=1e-3)

@@ -46,6 +46,7 @@ def test_an_arm_survives_its_drives(isolation: Isolation, tmp_path: Path) -> Non
         _recovers(arm)
         _leaves_a_target_of_another_client_alone(arm)
         _refuses_without_torque(arm)
+        _aborts_a_goal_when_the_master_ends(arm)
 
 
 def _inject(arm: MovingArm, joint: str, fault: str) -> None:
@@ -140,6 +141,20 @@ def _refuses_without_torque(arm: MovingArm) -> None:
     result = arm.send(goal_to(READY, 2.0)).wait()[1]
     assert result.error_code != Result.SUCCESSFUL
     assert 'panda_joint2 ' in result.error_string
+
+
+def _aborts_a_goal_when_the_master_ends(arm: MovingArm) -> None:
+    """Ctrl-C in the middle of it: the drives stop, and the client gets a result."""
+    name = '/fake_slaves/panda_joint2/sto'
+    assert arm.client.call(SetBool, name, SetBool.Request(data=False)).success
+    arm.follow()
+    run = arm.send(goal_to([0.3, *READY[1:]], 6.0))
+    arm.client.spin_until(lambda: len(run.feedback) > 10, 10.0, 'motion')
+    arm.master.signal(signal.SIGINT)
+    status, result = run.wait()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert 'panda_joint' in result.error_string
+    assert arm.master.wait() == 0
 
 
 def test_drives_stop_by_themselves_when_the_master_is_killed(

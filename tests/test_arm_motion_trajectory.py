@@ -47,20 +47,6 @@ def test_an_arm_follows_goals_and_says_why_not(isolation: Isolation, tmp_path: P
         _names_the_lost_drives(arm)
 
 
-def test_a_goal_is_aborted_when_the_master_ends(isolation: Isolation, tmp_path: Path) -> None:
-    """Ctrl-C in the middle of it: the drives stop, and the client gets a result."""
-    with MovingArm(isolation, tmp_path) as arm:
-        arm.follow()
-        run = arm.send(goal_to(READY, 6.0))
-        arm.client.spin_until(lambda: len(run.feedback) > 10, 10.0, 'motion')
-        arm.master.signal(signal.SIGINT)
-        status, result = run.wait()
-        assert status == GoalStatus.STATUS_ABORTED
-        assert 'panda_joint' in result.error_string
-        assert arm.master.wait() == 0
-        assert 'leaked' not in arm.master.output
-
-
 def _reports_where_it_stands(
     arm: MovingArm, states: Sequence[JointTrajectoryControllerState]
 ) -> None:

@@ -26,16 +26,9 @@ from moveit_msgs.msg import (
 )
 from moveit_msgs.srv import (
     ApplyPlanningScene,
-    GetCartesianPath,
-    GetMotionPlan,
     GetMotionSequence,
-    GetPlannerParams,
     GetPlanningScene,
     GetPositionFK,
-    GetPositionIK,
-    GetStateValidity,
-    QueryPlannerInterfaces,
-    SetPlannerParams,
 )
 from moving_arm import goal_to, MovingArm, READY, robot_parameters
 from planning_messages import panda
@@ -61,7 +54,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from isolation import Isolation
-    from processes import RunningProcess
 
 pytestmark = pytest.mark.scenario
 
@@ -69,7 +61,7 @@ TURNED = [1.2, *READY[1:]]
 
 
 def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path) -> None:
-    """Scene, states, plans, execution, cancel and refusals, on the simulated drives."""
+    """Plans, execution, cancel and what appears on the way, on the simulated drives."""
     with MovingArm(isolation, tmp_path) as arm:
         group = arm.run(
             executable('arm_planning', 'move_group'),
@@ -85,22 +77,14 @@ def test_clients_of_moveit_plan_and_execute(isolation: Isolation, tmp_path: Path
         _back_to_ready(arm)
         _moves_by_the_command_of_the_readme(arm)
         _back_to_ready(arm)
-        _shares_the_scene(arm)
-        _answers_about_states(arm)
         _executes(arm)
-        _says_why_not(arm)
         _cancels_and_stops(arm)
-        _back_to_ready(arm)
-        _plans_for_move_group_interface(arm, group)
-        _plans_and_executes_for_pymoveit2(arm)
-        _solves_and_follows_lines(arm)
         _back_to_ready(arm)
         _follows_sequences(arm)
         _cancels_a_move(arm)
         _back_to_ready(arm)
         _stops_in_front_of_what_appears(arm)
         _back_to_ready(arm)
-        _says_why_no_plan(arm)
         _plans_anew_around_what_appears(arm)
         _cancels_before_it_is_planned_anew(arm)
         _names_the_drive_that_fails(arm)
@@ -204,62 +188,6 @@ def _moves_by_the_command_of_the_readme(arm: MovingArm) -> None:
     assert [places[name] for name in JOINTS] == pytest.approx([0.8, *READY[1:]], abs=1e-2)
 
 
-def _shares_the_scene(arm: MovingArm) -> None:
-    """PlanningSceneInterface: apply_planning_scene; pymoveit2: the topic collision_object."""
-    monitored = arm.client.listen(PlanningScene, '/monitored_planning_scene', LATCHED)
-    change = PlanningScene(is_diff=True)
-    change.robot_state.is_diff = True
-    change.world.collision_objects = [_box('crate', 0.11, 0.31, 0.5)]
-    apply = ApplyPlanningScene.Request(scene=change)
-    assert arm.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
-    publisher = arm.client.node.create_publisher(CollisionObject, '/collision_object', 10)
-    arm.client.spin_until(lambda: bool(publisher.get_subscription_count()), 10.0, 'a listener')
-    publisher.publish(_box('far', -2.0, 0.0, 0.4))
-
-    def names() -> set[str]:
-        return {each.id for each in monitored[-1].world.collision_objects} if monitored else set()
-
-    arm.client.spin_until(lambda: names() == {'crate', 'far'}, 10.0, 'the scene with both')
-    scene = _scene(arm)
-    assert {each.id for each in scene.world.collision_objects} == {'crate', 'far'}
-    assert dict(
-        zip(
-            scene.robot_state.joint_state.name, scene.robot_state.joint_state.position, strict=True
-        )
-    )['panda_joint4'] == pytest.approx(READY[3], abs=0.02)
-    refused = ApplyPlanningScene.Request(scene=PlanningScene(is_diff=True))
-    refused.scene.world.collision_objects = [
-        CollisionObject(id='nothing', operation=CollisionObject.REMOVE)
-    ]
-    assert not arm.client.call(ApplyPlanningScene, '/apply_planning_scene', refused).success
-
-
-def _answers_about_states(arm: MovingArm) -> None:
-    request = GetPositionFK.Request(fk_link_names=['panda_link8'])
-    answer = arm.client.call(GetPositionFK, '/compute_fk', request)
-    assert answer.error_code.val == MoveItErrorCodes.SUCCESS
-    assert answer.pose_stamped[0].header.frame_id == 'panda_link0'
-    assert answer.pose_stamped[0].pose.position.x == pytest.approx(0.307, abs=0.03)
-    unknown = GetPositionFK.Request(fk_link_names=['moon'])
-    code = arm.client.call(GetPositionFK, '/compute_fk', unknown).error_code
-    assert (code.val, code.source) == (MoveItErrorCodes.INVALID_LINK_NAME, 'move_group')
-    assert 'moon' in code.message
-    check = GetStateValidity.Request(group_name='panda_arm')
-    assert arm.client.call(GetStateValidity, '/check_state_validity', check).valid
-    check.robot_state.joint_state.name = list(JOINTS)
-    check.robot_state.joint_state.position = TURNED
-    answer = arm.client.call(GetStateValidity, '/check_state_validity', check)
-    assert not answer.valid
-    assert 'crate' in {answer.contacts[0].contact_body_1, answer.contacts[0].contact_body_2}
-    assert answer.contacts[0].depth > 0.0
-    check = GetStateValidity.Request(group_name='panda_arm')
-    check.constraints = goal_constraints(TURNED)
-    answer = arm.client.call(GetStateValidity, '/check_state_validity', check)
-    assert not answer.valid
-    assert [each.result for each in answer.constraint_result] == [False] + [True] * 6
-    assert answer.constraint_result[0].distance == pytest.approx(1.2, abs=0.02)
-
-
 def _trajectory(positions: Sequence[float], seconds: int) -> RobotTrajectory:
     """Return a straight motion from READY."""
     trajectory = JointTrajectory(joint_names=list(JOINTS))
@@ -288,23 +216,6 @@ def _executes(arm: MovingArm) -> None:
         status, result = run.wait()
         assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result
         assert run.states == ['MONITOR', 'IDLE']
-
-
-def _says_why_not(arm: MovingArm) -> None:
-    """The trajectory begins elsewhere, or no controller moves its joint."""
-    elsewhere, leg = _trajectory(READY, 2), _trajectory(READY, 2)
-    elsewhere.joint_trajectory.points[0].positions = [0.3, *READY[1:]]
-    leg.joint_trajectory.joint_names[0] = 'leg'
-    for trajectory, code, words in (
-        (elsewhere, MoveItErrorCodes.CONTROL_FAILED, 'panda_joint1'),
-        (leg, MoveItErrorCodes.CONTROL_FAILED, "no joint 'leg'; joints: panda_joint1"),
-        (RobotTrajectory(), MoveItErrorCodes.INVALID_MOTION_PLAN, 'no points'),
-    ):
-        status, result = execute(arm, trajectory).wait()
-        assert status == GoalStatus.STATUS_ABORTED
-        assert result.error_code.val == code, result.error_code
-        assert words in result.error_code.message
-        assert result.error_code.source == 'move_group'
 
 
 def _cancels_and_stops(arm: MovingArm) -> None:
@@ -336,72 +247,6 @@ def _cancels_and_stops(arm: MovingArm) -> None:
 def _back_to_ready(arm: MovingArm) -> None:
     status, result = arm.send(goal_to(READY, 3.0)).wait()
     assert (status, result.error_code) == (GoalStatus.STATUS_SUCCEEDED, 0), result.error_string
-
-
-def _plans_for_move_group_interface(arm: MovingArm, group: RunningProcess) -> None:
-    """MoveGroupInterface::plan, then ::execute with what it got."""
-    planners = arm.client.call(
-        QueryPlannerInterfaces, '/query_planner_interface', QueryPlannerInterfaces.Request()
-    )
-    planner = planners.planner_interfaces[0]
-    assert planner.pipeline_id == 'ompl'
-    about = GetPlannerParams.Request(planner_config=planner.planner_ids[0], group='panda_arm')
-    params = arm.client.call(GetPlannerParams, '/get_planner_params', about).params
-    assert dict(zip(params.keys, params.values, strict=True)) == {'type': 'geometric::RRTConnect'}
-    change = SetPlannerParams.Request(planner_config=planner.planner_ids[0], params=params)
-    arm.client.call(SetPlannerParams, '/set_planner_params', change)
-    group.wait_for('set_planner_params: RRTConnectkConfigDefault .* type was refused', 10.0)
-    status, result = move(arm, move_goal([-0.4, *READY[1:]], plan_only=True)).wait()
-    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
-    points = result.planned_trajectory.joint_trajectory.points
-    assert list(points[-1].positions) == pytest.approx([-0.4, *READY[1:]], abs=1e-3)
-    assert result.planning_time > 0.0
-    assert list(result.trajectory_start.joint_state.name)[:7] == JOINTS
-    goal = ExecuteTrajectory.Goal(trajectory=result.planned_trajectory)
-    status, result = ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal).wait()
-    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
-
-
-def _plans_and_executes_for_pymoveit2(arm: MovingArm) -> None:
-    """plan_kinematic_path with the joints as start state, then execute_trajectory."""
-    request = GetMotionPlan.Request()
-    wanted = request.motion_plan_request
-    wanted.group_name = 'panda_arm'
-    wanted.allowed_planning_time, wanted.num_planning_attempts = 0.5, 5
-    wanted.start_state.joint_state.name = list(JOINTS)
-    wanted.start_state.joint_state.position = [-0.4, *READY[1:]]
-    wanted.goal_constraints = [goal_constraints(READY)]
-    answer = arm.client.call(GetMotionPlan, '/plan_kinematic_path', request).motion_plan_response
-    assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code.message
-    goal = ExecuteTrajectory.Goal(trajectory=answer.trajectory)
-    status, result = ActionRun(arm, ExecuteTrajectory, '/execute_trajectory', goal).wait()
-    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
-
-
-def _solves_and_follows_lines(arm: MovingArm) -> None:
-    """compute_ik from the present state, and a Cartesian path there that is executed."""
-    fk = GetPositionFK.Request(fk_link_names=['panda_link8'])
-    here = arm.client.call(GetPositionFK, '/compute_fk', fk).pose_stamped[0]
-    here.pose.position.z -= 0.05
-    ik = GetPositionIK.Request()
-    ik.ik_request.group_name, ik.ik_request.pose_stamped = 'panda_arm', here
-    ik.ik_request.avoid_collisions = True
-    solved = arm.client.call(GetPositionIK, '/compute_ik', ik)
-    assert solved.error_code.val == MoveItErrorCodes.SUCCESS, solved.error_code.message
-    assert 'panda_joint7' in solved.solution.joint_state.name
-    asked = GetCartesianPath.Request(group_name='panda_arm', max_step=0.01)
-    asked.header.frame_id, asked.waypoints = 'panda_link0', [here.pose]
-    asked.avoid_collisions, asked.start_state.is_diff = True, True
-    line = arm.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
-    assert line.fraction == 1.0, line.error_code.message
-    status, result = execute(arm, line.solution).wait()
-    assert (status, result.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, 1), result.error_code
-    there = arm.client.call(GetPositionFK, '/compute_fk', fk).pose_stamped[0].pose.position
-    assert there.z == pytest.approx(here.pose.position.z, abs=2e-3)
-    here.pose.position.z += 5.0
-    refused = arm.client.call(GetPositionIK, '/compute_ik', ik).error_code
-    assert refused.val == MoveItErrorCodes.NO_IK_SOLUTION
-    assert 'out of reach' in refused.message
 
 
 def _sequence(arm: MovingArm, *radii: float) -> MotionSequenceRequest:
@@ -437,18 +282,13 @@ def _pose_constraints(at: PoseStamped) -> Constraints:
 
 
 def _follows_sequences(arm: MovingArm) -> None:
-    """Pilz' plan_sequence_path and sequence_move_group, with a blend; and what is refused."""
+    """Pilz' plan_sequence_path and sequence_move_group, with a blend."""
     asked = GetMotionSequence.Request(request=_sequence(arm, 0.02, 0.0))
     planned = arm.client.call(GetMotionSequence, '/plan_sequence_path', asked).response
     assert planned.error_code.val == MoveItErrorCodes.SUCCESS, planned.error_code.message
     (trajectory,) = planned.planned_trajectories
     ends = trajectory.joint_trajectory.points[0], trajectory.joint_trajectory.points[-1]
     assert all(list(end.positions) == pytest.approx(READY, abs=0.01) for end in ends)
-    wrong = GetMotionSequence.Request(request=_sequence(arm, 0.2, 0.0))
-    refused = arm.client.call(GetMotionSequence, '/plan_sequence_path', wrong).response.error_code
-    assert (refused.val, refused.source) == (MoveItErrorCodes.INVALID_MOTION_PLAN, 'move_group')
-    assert 'item 0' in refused.message
-
     depth = _depth(arm)
     goal = MoveGroupSequence.Goal(request=asked.request)
     run = ActionRun(arm, MoveGroupSequence, '/sequence_move_group', goal)
@@ -458,10 +298,6 @@ def _follows_sequences(arm: MovingArm) -> None:
     assert len(result.response.planned_trajectories) == 1
     assert run.states == ['PLANNING', 'MONITOR', 'IDLE']
     assert depth() == pytest.approx(0.08, abs=0.01)
-    goal.planning_options.replan = True
-    status, result = ActionRun(arm, MoveGroupSequence, '/sequence_move_group', goal).wait()
-    assert status == GoalStatus.STATUS_ABORTED
-    assert 'replan' in result.response.error_code.message
 
 
 def _depth(arm: MovingArm) -> Callable[[], float]:
@@ -561,7 +397,6 @@ def _stops_in_front_of_what_appears(arm: MovingArm) -> None:
 
 def _plans_anew_around_what_appears(arm: MovingArm) -> None:
     """With replan, a move that is blocked on its way goes around."""
-    _goes(arm, 'crate')
     visitor, observer = _visitor(arm, -0.65, size=0.06), Observer(arm)
     goal = move_goal([-1.2, *READY[1:]])
     goal.request.max_velocity_scaling_factor = 0.05  # a busy machine is late with the box
@@ -633,20 +468,3 @@ def _stands(states: Sequence[JointState]) -> bool:
         for state in since
         for place, before in zip(last.position, state.position, strict=True)
     )
-
-
-def _says_why_no_plan(arm: MovingArm) -> None:
-    """The blocked goal names the pair."""
-    blocked, unknown, far = move_goal(TURNED), move_goal(READY), move_goal(READY)
-    unknown.request.group_name = 'legs'
-    far.request.goal_constraints[0].joint_constraints[0].joint_name = 'leg'
-    for goal, code, words in (
-        (blocked, MoveItErrorCodes.GOAL_IN_COLLISION, 'crate'),
-        (unknown, MoveItErrorCodes.INVALID_GROUP_NAME, 'panda_arm'),
-        (far, MoveItErrorCodes.INVALID_GOAL_CONSTRAINTS, "'leg'"),
-    ):
-        status, result = move(arm, goal).wait()
-        assert status == GoalStatus.STATUS_ABORTED
-        assert result.error_code.val == code, result.error_code
-        assert words in result.error_code.message
-        assert result.error_code.source == 'move_group'

@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""/joint_states of an arm: straight from its master, or put together from several publishers."""
+"""/joint_states that is put together from several publishers."""
 
 from __future__ import annotations
 
-import itertools
-import time
 from typing import TYPE_CHECKING
 
 from bench_axes import urdf
@@ -13,34 +11,11 @@ from processes import executable, RunningProcess
 import pytest
 from ros_client import RosClient
 from sensor_msgs.msg import JointState
-from simulated_arm import JOINTS, SimulatedArm
-
-from arm_msgs.srv import InjectFault
 
 if TYPE_CHECKING:
     from isolation import Isolation
 
 pytestmark = pytest.mark.scenario
-
-
-def test_the_master_publishes_the_joints_of_its_bus(isolation: Isolation) -> None:
-    """All of a SYNC in one message, from one publisher; a drive that is lost is left out."""
-    with SimulatedArm(isolation, master_arguments=['-p', 'robot_joint_states:=true']) as arm:
-        states = arm.client.listen(JointState, '/joint_states')
-
-        def published(names: list[str]) -> bool:
-            return bool(states) and [*states[-1].name] == names
-
-        arm.client.spin_until(lambda: published(JOINTS), 20.0, 'all joints')
-        assert len(arm.client.node.get_publishers_info_by_topic('/joint_states')) == 1
-        arm.client.spin_until(lambda: len(states) > 50, 20.0, 'more of them')
-        stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in states]
-        assert all(after > before for before, after in itertools.pairwise(stamps))
-        assert time.time_ns() - stamps[-1] < 60 * 10**9  # on the clock of ROS
-        fault = InjectFault.Request(fault='disconnect')
-        assert arm.client.call(InjectFault, f'/fake_slaves/{JOINTS[2]}/fault', fault).success
-        others = [joint for joint in JOINTS if joint != JOINTS[2]]
-        arm.client.spin_until(lambda: published(others), 20.0, 'the other joints')
 
 
 def test_a_loss_is_warned_of_and_an_end_is_not(isolation: Isolation) -> None:

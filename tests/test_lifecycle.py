@@ -50,6 +50,10 @@ def test_the_manager_brings_up_and_deactivation_disables(
     """Inactive nodes refuse in words; deactivated in motion, every drive stops and is off."""
     with BusRecorder(isolation.bus) as recorder, SimulatedArm(isolation, lifecycle_bus) as arm:
         assert states(arm) == {'unconfigured'}
+        assert set(_said(arm, 'nodes')) == {f'/{node}' for node in ['lifecycle_manager', *NODES]}
+        _said(arm, 'set', '/panda_joint1', 'configure')
+        assert _said(arm, 'get', '/panda_joint1') == ['inactive [2]']
+        _said(arm, 'set', '/panda_joint1', 'cleanup')
         refused = arm.client.trigger('/panda_joint1/init')
         assert not refused.success
         assert 'panda_joint1 is unconfigured, not active' in refused.message
@@ -78,16 +82,8 @@ def test_the_manager_brings_up_and_deactivation_disables(
         arm.init_all()
 
 
-def test_the_command_line_knows_the_nodes(isolation: Isolation, lifecycle_bus: Path) -> None:
-    """Ros2 lifecycle lists them and sets their states."""
-    with SimulatedArm(isolation, lifecycle_bus) as arm:
-        listed = arm.run('ros2', 'lifecycle', 'nodes')
-        assert listed.wait() == 0, listed.output
-        assert set(listed.lines) == {f'/{node}' for node in ['lifecycle_manager', *NODES]}
-        done = arm.run('ros2', 'lifecycle', 'set', '/panda_joint1', 'configure')
-        assert done.wait() == 0, done.output
-        state = arm.run('ros2', 'lifecycle', 'get', '/panda_joint1')
-        assert state.wait() == 0, state.output
-        assert state.lines == ['inactive [2]']
-        assert change(arm, 'panda_joint1', 'activate')
-        assert arm.client.trigger('/panda_joint1/init').success
+def _said(arm: SimulatedArm, *words: str) -> list[str]:
+    """Return what ``ros2 lifecycle`` prints."""
+    process = arm.run('ros2', 'lifecycle', *words)
+    assert process.wait() == 0, process.output
+    return process.lines

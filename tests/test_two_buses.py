@@ -86,14 +86,3 @@ def test_buses_whose_nodes_have_one_name_are_refused(isolation: Isolation, tmp_p
     with RunningProcess(program('master', config, 'a,b'), isolation.env) as master:
         assert master.wait() == 1
         master.wait_for('bus_config names 1 buses, can_interface_name 2')
-
-
-def test_a_misspelt_parameter_is_refused(isolation: Isolation, tmp_path: Path) -> None:
-    """Rclpy would ignore it, and the master would run on another bus than was meant."""
-    config = write_bus(tmp_path, 'left')
-    for name in ('master', 'fake_slaves'):
-        command = program(name, str(config), isolation.bus)
-        wrong = [word.replace('can_interface_name:', 'can_interface_nam:') for word in command]
-        with RunningProcess(wrong, isolation.env) as process:
-            assert process.wait() == 1
-            process.wait_for("unknown parameter 'can_interface_nam'; did you mean")

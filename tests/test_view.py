@@ -102,16 +102,3 @@ def test_a_page_that_hangs_does_not_hold_the_end_up(isolation: Isolation) -> Non
         viewer.suspend()
         assert demo.wait(STARTING) == 0, demo.output
     assert not is_open(demo_url)
-
-
-@pytest.mark.parametrize(('option', 'variable'), [(['--no-view'], ''), ([], '1')])
-def test_without_it_there_is_no_process(
-    isolation: Isolation, option: list[str], variable: str
-) -> None:
-    """By option, or by the variable of make."""
-    arguments = ['panda', '--simulate', '--can', isolation.bus, *option]
-    with start(isolation, 'arm_bringup', 'bringup', *arguments, no_view=variable) as arm:
-        arm.wait_for('all is ready', STARTING)
-        assert not viewers_below(arm)
-        assert arm.stop(60.0) == 0, arm.output
-    assert 'viewer' not in arm.output

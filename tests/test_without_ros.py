@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -292,8 +293,19 @@ def test_a_model_is_printed(environment: Environment) -> None:
 def test_examples_of_the_readmes_run(
     environment: Environment, package: str, tmp_path: Path, isolation: Isolation
 ) -> None:
-    """Here, too, and not only where ROS is."""
+    """As they are printed; what `>>>` shows is what comes."""
     variables = {**environment.variables, 'ROS_DOMAIN_ID': str(isolation.domain_id)}
     python = environment.folder / 'bin' / 'python'
     done = run_examples(package, tmp_path, python, variables)
     assert done.returncode == 0, done.stderr
+    assert re.search(r'^[1-9]\d* examples$', done.stdout, re.MULTILINE)
+
+
+def test_no_readme_is_forgotten() -> None:
+    """Each README with an example is run."""
+    written = {
+        path.parent.name
+        for path in CHECKOUT.glob('*/README.md')
+        if re.search('^```python$', path.read_text(), re.MULTILINE)
+    }
+    assert written <= set(READMES)
