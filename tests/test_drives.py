@@ -182,7 +182,7 @@ def test_halt_quick_stop_moves_and_streams(arm: SimulatedArm) -> None:
 
     def send() -> bool:
         stream.publish(Float64(data=0.0))
-        return abs(states[-1].position[0]) < 2e-3
+        return bool(abs(states[-1].position[0]) < 2e-3)
 
     arm.client.spin_until(send, 20.0, 'position 0.0')
     arm.master.wait_for('the stream of targets has paused')
