@@ -15,7 +15,7 @@ from ..exceptions import ConfigError, Problem
 class Place:
     """Where something is written."""
 
-    file: Path
+    file: Path = Path()
     line: int = 0  # line, from 1; 0 for the whole file
     key: str = ''  # path of the key, such as ``nodes.joint1.tpdo.1.mapping[0]``
 

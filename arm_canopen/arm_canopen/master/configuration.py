@@ -119,7 +119,7 @@ class Configurator:
             remedy = (
                 f'if it is slow at that, write timeout_ms: {round(5e3 * timeout)} to its entry'
             )
-            raise SdoTimeoutError(f'{error}; {remedy} in {own.location.key or "sdo"}') from error
+            raise SdoTimeoutError(f'{error}; {remedy} in {own.place.key or "sdo"}') from error
 
     async def read_number(self, index: int, subindex: int) -> int:
         """Read an object as an unsigned number.

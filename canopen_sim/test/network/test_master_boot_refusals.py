@@ -15,7 +15,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import Severity
 from arm_canopen.config import NodeConfig
-from arm_canopen.config.model import SourceLocation
+from arm_canopen.config.model import Place
 from arm_canopen.standard import NmtState
 
 TOO_HIGH = 0x0609_0031  # Elmo's answer to 0x1016
@@ -37,7 +37,7 @@ class Refusing:
         self, config: NodeConfig, *keys: str, refuses: dict[tuple[int, int], int]
     ) -> None:
         """Switch the device on."""
-        locations = {(NODE, *key.split('.')): SourceLocation(7, key) for key in ('node_id', *keys)}
+        locations = {(NODE, *key.split('.')): Place(line=7, key=key) for key in ('node_id', *keys)}
         bus = replace(bus_config(config, **WATCHING), locations=locations)
         self.net = VirtualNetwork(bus, absent=[NODE])
         self.device = ScriptedDevice(

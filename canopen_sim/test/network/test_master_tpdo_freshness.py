@@ -15,7 +15,7 @@ from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode, RefusalCause, Severity
 from arm_canopen.config import BusConfig, load_bus, NodeConfig
-from arm_canopen.config.model import SourceLocation
+from arm_canopen.config.model import Place
 from arm_canopen.config.model.boot_plan import boot_writes
 from arm_canopen.config.model.checks import check_bus
 from arm_canopen.config.model.tpdo_freshness import with_event_timer
@@ -118,7 +118,7 @@ def test_an_axis_is_not_held_at_a_position_of_unknown_age(
 def test_a_device_that_refuses_its_event_timer_is_named() -> None:
     """It boots, and is not taken for silent when it only rests."""
     without = on_change(timer=False).dictionary
-    config = replace(bus_config(on_change()), locations={(JOINT,): SourceLocation()})
+    config = replace(bus_config(on_change()), locations={(JOINT,): Place()})
     net = VirtualNetwork(config, dictionaries={JOINT: without})
     net.boot()
     net.run(2.0)
@@ -134,7 +134,7 @@ def test_a_device_that_refuses_its_event_timer_is_named() -> None:
 
 def test_a_timer_that_is_taken_at_the_next_boot_counts_again() -> None:
     """The loss is noticed from then on, and a device that refuses it once more is named again."""
-    net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): SourceLocation()}))
+    net = VirtualNetwork(replace(bus_config(on_change()), locations={(JOINT,): Place()}))
     refused = FaultInjection(Fault.SDO_ABORT, object=(0x1800, 5), abort=0x06090030)
     net.start()
     for refuses in (True, False, True):
@@ -176,7 +176,7 @@ def test_a_drive_in_operation_is_taken_over_and_gets_its_event_timer() -> None:
     net = VirtualNetwork(bus_config(replace(timed, tpdos=untimed)))
     net.boot()
     net.do(JOINT, 'init')
-    net._config = replace(bus_config(timed), locations={(JOINT,): SourceLocation()})
+    net._config = replace(bus_config(timed), locations={(JOINT,): Place()})
     net.replace_master()
     net.start()
     net.run(2.0)

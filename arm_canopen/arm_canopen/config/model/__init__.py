@@ -5,7 +5,8 @@
 It is made of plain values, and imports nothing that reads files.
 """
 
-from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
+from ..findings import Place
+from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .drive import DriveConfig, RecoveryPolicy
 from .identity import Identity
 from .master import MasterConfig
@@ -17,7 +18,7 @@ __all__ = [
     'MasterConfig',
     'NodeConfig',
     'PdoConfig',
+    'Place',
     'RecoveryPolicy',
     'SdoWrite',
-    'SourceLocation',
 ]

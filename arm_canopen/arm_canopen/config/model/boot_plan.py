@@ -24,8 +24,9 @@ from ...standard.dictionary import object_address
 from ...standard.nmt import ConsumerHeartbeatTime
 from ...standard.objects import Index, PDO_COUNT_MAX
 from ...standard.pdo import MAPPED_LENGTH_MASK
+from ..findings import Place
 from ..units import HUNDRED_MICROSECONDS, MILLISECONDS
-from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite, SourceLocation
+from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite
 from .pdo_direction import Direction, RPDO, TPDO
 from .tpdo_freshness import EVENT_TIMER_SUBINDEX
 
@@ -341,7 +342,7 @@ def assumed_cob_ids(node: NodeConfig) -> Iterator[BootWrite]:
 
 def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootWrite]:
     """Yield a write of a file; before a COB-ID one that ends its service, which fixes it."""
-    address, key = (write.index, write.subindex), _key(write.location)
+    address, key = (write.index, write.subindex), _key(write.place)
     value = int.from_bytes(write.data, 'little')
     mask, off = SERVICES_OFF.get(address, (0, 0))
     if value & mask != off:
@@ -352,8 +353,8 @@ def _written(write: SdoWrite, *, unless_default: bool = False) -> Iterator[BootW
     yield BootWrite(*address, write.data, key, unless_default=unless_default)
 
 
-def _key(location: SourceLocation) -> str:
-    return f'{location.key} (line {location.line})' if location.line else location.key or 'bus.yml'
+def _key(place: Place) -> str:
+    return f'{place.key} (line {place.line})' if place.line else place.key or 'bus.yml'
 
 
 def _units(time: float | None, per_second: float = HUNDRED_MICROSECONDS) -> int | None:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,22 +14,16 @@ from ...standard.datatypes import DataType, decode, Value
 from ...standard.dictionary import object_address, ObjectDictionary
 from ...standard.objects import AXIS_OFFSET, COMMANDS, Index, slow_timeout
 from ...standard.pdo import MappedObject
+from ..findings import Place
 from .drive import DriveConfig
 from .identity import ANY_DEVICE, Identity
 from .master import MasterConfig
+from .pdo_direction import Direction, RPDO, TPDO
 
 SDO_TIMEOUT = 0.2  # [s] not the 20 ms of ros2_canopen, which many devices exceed
 BOOT_TIMEOUT = 1.0  # [s]
 POLL_PERIOD = 0.01  # [s]
 RETRY_FACTOR = 3
-
-
-@dataclass(frozen=True, slots=True)
-class SourceLocation:
-    """Where something stands in bus.yml."""
-
-    line: int = 0  # line, from 1; 0 when it is not known
-    key: str = ''  # path of the key, such as ``defaults.tpdo.1.mapping``
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +45,8 @@ class PdoConfig:
     fixed_mapping: bool = False  # the device's mapping is read-only (and equal to ``mapping``)
     # the EDS gives the COB-ID of another node id, and ``cob_id`` is that of this one
     assumed: bool = False
+    # where bus.yml has its COB-ID, else the PDO or the device
+    place: Place = field(default=Place(), compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +58,7 @@ class SdoWrite:
     data: bytes  # the value as it is sent
     # how long the device may take for it in [s]; None as for any object
     timeout: float | None = None
-    # where bus.yml has it
-    location: SourceLocation = field(default=SourceLocation(), compare=False)
+    place: Place = field(default=Place(), compare=False)  # where bus.yml has it
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +147,13 @@ class NodeConfig:
         return None if entry is None else entry.default
 
     @property
+    def pdos(self) -> Iterator[tuple[Direction, PdoConfig]]:
+        """All PDOs, the TPDOs first."""
+        for direction, pdos in ((TPDO, self.tpdos), (RPDO, self.rpdos)):
+            for pdo in pdos:
+                yield direction, pdo
+
+    @property
     def uses_node_guarding(self) -> bool:
         """The master requests its NMT state; never together with a heartbeat (CiA 301)."""
         return self.guard_time > 0.0 and not self.heartbeat_producer
@@ -196,21 +198,19 @@ class BusConfig:
     warnings: tuple[Problem, ...] = ()  # what was odd but could be understood
     # where each key stands, by the names that lead to it: ``('master', 'node_id')``, ``('joint1',
     # 'tpdo', '1', 'mapping')``; defaults belong to every device
-    locations: Mapping[tuple[str, ...], SourceLocation] = field(
-        default_factory=dict, compare=False
-    )
+    locations: Mapping[tuple[str, ...], Place] = field(default_factory=dict, compare=False)
 
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of all joints that its drives have, in the order of the file."""
         return tuple(joint for node in self.nodes for joint in node.joints)
 
-    def place_of(self, *names: str) -> SourceLocation:
+    def place_of(self, *names: str) -> Place:
         """Return where a key stands, or else the nearest thing around it that does."""
         for length in range(len(names), 0, -1):
-            if (location := self.locations.get(names[:length])) is not None:
-                return location
-        return SourceLocation()
+            if (place := self.locations.get(names[:length])) is not None:
+                return place
+        return Place(self.file)
 
     def node(self, name: str) -> NodeConfig:
         """Return a device by name.

@@ -4,21 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ..findings import Findings, Place
-from ..model import BusConfig, MasterConfig, SourceLocation
+from ..model import BusConfig, MasterConfig, NodeConfig
 from ..model.pdo_direction import RPDO, TPDO
 from ..read.document import Item, YamlMap
+from ..read.section import read_section
+from ..sections import OPTION_KEYS, Options
 from .cob_ids import assign_cob_ids
-from .device import DeviceDraft, read_device
-from .device_timing import finish_device
+from .device import DeviceReader
 from .eds_files import EdsFiles
 from .layout import lay_out, Layout
-from .master import build_master
-from .settings import read_master_settings, read_options
+from .master import build_master, read_master
 
 PDO_SECTIONS = (RPDO.name, TPDO.name)
 DEPTH_MAX = 3  # device, tpdo, number; below are the keys of a PDO
@@ -29,46 +28,35 @@ def resolve_bus(
 ) -> BusConfig:
     """Make a bus, without what is wrong, of its bus.yml and the EDS files that this names."""
     layout = lay_out(document, findings)
-    options = read_options(layout.options, findings)
-    settings = read_master_settings(layout.master, findings)
+    options = Options(**read_section(layout.options, OPTION_KEYS, findings))
+    settings = read_master(layout.master, findings)
     beside = file.parent.absolute()
     eds_files = EdsFiles(beside if bus_config_path is None else bus_config_path, beside)
-    drafts = [
-        read_device(name, section, options, eds_files, findings)
-        for name, section in layout.devices.items()
-    ]
-    periods = [draft.settings.poll_period for draft in drafts]
-    master = build_master(layout.master, settings, options, periods, findings)
-    unique = _check_node_ids(layout.master, settings.node_id, drafts, findings)
-    _check_axis_names(unique, findings)
-    _check_lifecycle(master, drafts, findings)
-    nodes = tuple(
-        finish_device(
-            draft,
-            draft.config,
-            master,
-            findings,
-            multiplier=options.heartbeat_multiplier,
-            is_watched=settings.watch_devices,
-        )
-        for draft in _with_cob_ids(unique, findings)
-        if draft.config is not None
-    )
-    return BusConfig(file, master, nodes, findings.warnings, _locations(layout))
-
-
-def _locations(layout: Layout) -> dict[tuple[str, ...], SourceLocation]:
-    """Say where each key stands, by the names that lead to it."""
-    sections = {'master': layout.master, **layout.devices}
-    return {
-        names: SourceLocation(item.place.line, item.place.key)
-        for name, section in sections.items()
-        for names, item in _walk((name,), section)
+    readers = {
+        name: DeviceReader(name, section, findings) for name, section in layout.devices.items()
     }
+    periods = [reader.settings.poll_period for reader in readers.values()]
+    master = build_master(layout.master, settings, options, periods, findings)
+    nodes = [
+        node
+        for reader in readers.values()
+        if (node := reader.read(options, eds_files, master, settings)) is not None
+    ]
+    _check_lifecycle(master, nodes, readers, findings)
+    unique = _check_node_ids(layout.master, settings.node_id, nodes, readers, findings)
+    _check_axis_names(unique, readers, findings)
+    finished = assign_cob_ids(unique, findings)
+    return BusConfig(file, master, finished, findings.warnings, dict(_locations(layout)))
 
 
-def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Item]]:
-    yield names, item
+def _locations(layout: Layout) -> Iterator[tuple[tuple[str, ...], Place]]:
+    """Yield where each key stands, by the names that lead to it."""
+    for name, section in {'master': layout.master, **layout.devices}.items():
+        yield from _walk((name,), section)
+
+
+def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...], Place]]:
+    yield names, item.place
     if not isinstance(item, YamlMap) or len(names) > DEPTH_MAX:
         return
     for name, child in item.entries.items():
@@ -77,62 +65,61 @@ def _walk(names: tuple[str, ...], item: Item) -> Iterator[tuple[tuple[str, ...],
 
 
 def _check_lifecycle(
-    master: MasterConfig, drafts: Sequence[DeviceDraft], findings: Findings
+    master: MasterConfig,
+    nodes: Sequence[NodeConfig],
+    readers: Mapping[str, DeviceReader],
+    findings: Findings,
 ) -> None:
-    """Refuse a mixture of managed and plain nodes, which nobody could bring up in order."""
-    for draft in drafts:
-        if draft.config is None or draft.config.is_lifecycle == master.is_lifecycle:
+    """Refuse a mixture of managed and plain nodes, which cannot be brought up in order."""
+    for node in nodes:
+        if node.is_lifecycle == master.is_lifecycle:
             continue
         kinds = ('a lifecycle driver', 'a plain one')
-        mine, others = kinds if draft.config.is_lifecycle else kinds[::-1]
+        mine, others = kinds if node.is_lifecycle else kinds[::-1]
         findings.error(
-            draft.place_of('driver'),
-            f'{draft.config.driver} is {mine}, but the master has {others} ({master.driver})',
+            readers[node.name].place_of('driver'),
+            f'{node.driver} is {mine}, but the master has {others} ({master.driver})',
             'take lifecycle drivers for all or for none',
         )
 
 
 def _check_node_ids(
-    master: YamlMap, master_id: int | None, drafts: Sequence[DeviceDraft], findings: Findings
-) -> list[DeviceDraft]:
+    master: YamlMap,
+    master_id: int | None,
+    nodes: Sequence[NodeConfig],
+    readers: Mapping[str, DeviceReader],
+    findings: Findings,
+) -> list[NodeConfig]:
     """Refuse doubled node ids; returns the devices that have one of their own."""
     owners: dict[int, tuple[str, Place]] = {}
     if master_id is not None:
         owners[master_id] = ('the master', master.entries['node_id'].place)
     unique = []
-    for draft in drafts:
-        if draft.config is None:
-            continue
-        node_id = draft.config.node_id
-        name, place = owners.setdefault(node_id, (draft.config.name, draft.place_of('node_id')))
-        if name == draft.config.name:
-            unique.append(draft)
+    for node in nodes:
+        own = readers[node.name].place_of('node_id')
+        name, place = owners.setdefault(node.node_id, (node.name, own))
+        if name == node.name:
+            unique.append(node)
             continue
         findings.error(
-            draft.place_of('node_id'),
-            f'node id {node_id} of {draft.config.name} is also that of {name} (line {place.line})',
+            own,
+            f'node id {node.node_id} of {node.name} is also that of {name} (line {place.line})',
             'give each device an id of its own',
         )
     return unique
 
 
-def _check_axis_names(drafts: Sequence[DeviceDraft], findings: Findings) -> None:
+def _check_axis_names(
+    nodes: Sequence[NodeConfig], readers: Mapping[str, DeviceReader], findings: Findings
+) -> None:
     """Refuse an axis that has the name of another device's axis: each is a joint of its own."""
     owners: dict[str, str] = {}
-    for draft in drafts:
-        if draft.config is None:
-            continue
-        for axis in draft.config.axes:
-            owner = owners.setdefault(axis.name, draft.config.name)
-            if owner != draft.config.name:
+    for node in nodes:
+        for axis in node.axes:
+            owner = owners.setdefault(axis.name, node.name)
+            if owner != node.name:
                 findings.error(
-                    draft.place_of('channel_names'),
-                    f'{draft.config.name} and {owner} both have an axis {axis.name!r}',
+                    readers[node.name].place_of('channel_names'),
+                    f'{node.name} and {owner} both have an axis {axis.name!r}',
                     'give each a name of its own',
                 )
-
-
-def _with_cob_ids(drafts: Sequence[DeviceDraft], findings: Findings) -> list[DeviceDraft]:
-    """Give the PDOs of all devices their final COB-IDs."""
-    assigned = iter(assign_cob_ids([pdo for draft in drafts for pdo in draft.pdos], findings))
-    return [replace(draft, pdos=[next(assigned) for _ in draft.pdos]) for draft in drafts]

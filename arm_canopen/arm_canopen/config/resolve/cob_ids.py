@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ...standard.cob_id import CAN_ID_MASK
 from ..findings import Findings
-from ..model.pdo_direction import RPDO
-from .pdos import PdoDraft
+from ..model.bus import NodeConfig, PdoConfig
+from ..model.pdo_direction import Direction, RPDO, TPDO
+from .pdos import AUTO_ID
 
 FREE_RANGE = range(0x680, 0x6E0)
 """Where dcfgen, too, puts the PDOs from the fifth on; no pre-defined service lies there."""
@@ -31,64 +32,86 @@ RESERVED: tuple[tuple[range, str], ...] = (
 """Identifiers that no PDO may have (CiA 301, tables 38 to 40)."""
 
 
-def assign_cob_ids(drafts: Sequence[PdoDraft], findings: Findings) -> list[PdoDraft]:
+def assign_cob_ids(nodes: Sequence[NodeConfig], findings: Findings) -> tuple[NodeConfig, ...]:
     """Give every PDO its final COB-ID, in the order of the file.
 
     Reserved and doubled identifiers are reported. When only EDS defaults are concerned, these
     are warnings; two RPDOs with one identifier, of which one frame would move two axes, are an
     error.
     """
-    used = {draft.config.cob_id for draft in drafts if draft.config.enabled and not draft.auto}
+    used = {pdo.cob_id for node in nodes for _, pdo in node.pdos if pdo.enabled}
     free = iter([cob_id for cob_id in FREE_RANGE if cob_id not in used])
-    result = [
-        _assigned(draft, next(free, 0), findings) if draft.auto else draft for draft in drafts
-    ]
-    _check(result, findings)
-    return result
+    result = []
+    for node in nodes:
+        tpdos, rpdos = (
+            tuple(_assigned(node, direction, pdo, free, findings) for pdo in pdos)
+            for direction, pdos in ((TPDO, node.tpdos), (RPDO, node.rpdos))
+        )
+        result.append(replace(node, tpdos=tpdos, rpdos=rpdos))
+    owners: dict[int, tuple[str, PdoConfig]] = {}
+    commanded: dict[int, tuple[str, PdoConfig]] = {}  # those of RPDOs
+    for node in result:
+        for direction, pdo in node.pdos:
+            if pdo.enabled and pdo.cob_id:
+                own = _title(node, direction, pdo), pdo
+                _check(own, owners, commanded if direction is RPDO else {}, findings)
+    return tuple(result)
 
 
-def _assigned(draft: PdoDraft, cob_id: int, findings: Findings) -> PdoDraft:
+def _title(node: NodeConfig, direction: Direction, pdo: PdoConfig) -> str:
+    return f'{direction.title} {pdo.number} of {node.name}'
+
+
+def _assigned(
+    node: NodeConfig,
+    direction: Direction,
+    pdo: PdoConfig,
+    free: Iterator[int],
+    findings: Findings,
+) -> PdoConfig:
+    if pdo.cob_id != AUTO_ID:
+        return pdo
+    cob_id = next(free, 0)
     if not cob_id:
         findings.error(
-            draft.place,
-            f'no free COB-ID is left for {draft.title} between 0x680 and 0x6DF',
+            pdo.place,
+            f'no free COB-ID is left for {_title(node, direction, pdo)} between 0x680 and 0x6DF',
             'write a COB-ID that the bus does not use',
         )
-    return replace(draft, config=replace(draft.config, cob_id=cob_id))
+    return replace(pdo, cob_id=cob_id)
 
 
-def _check(drafts: Sequence[PdoDraft], findings: Findings) -> None:
-    owners: dict[int, PdoDraft] = {}
-    commanded: dict[int, PdoDraft] = {}  # those of RPDOs
-    for draft in drafts:
-        cob_id = draft.config.cob_id
-        if not draft.config.enabled or not cob_id:
-            continue
-        for purpose in (purpose for ids, purpose in RESERVED if cob_id in ids):
-            message = f'COB-ID 0x{cob_id:03X} of {draft.title} is not for PDOs ({purpose})'
-            _report(findings, [draft], message)
-        owner = owners.setdefault(cob_id, draft)
-        both_command = False
-        if draft.direction is RPDO and draft.config.mapping:
-            other = commanded.setdefault(cob_id, draft)
-            both_command = other is not draft
-            owner = other if both_command else owner
-        if owner is not draft:
-            _report(
-                findings,
-                [draft, owner],
-                f'COB-ID 0x{cob_id:03X} of {draft.title} is also that of {owner.title} '
-                f'(line {owner.place.line})',
-                certain=both_command,
-            )
+def _check(
+    own: tuple[str, PdoConfig],
+    owners: dict[int, tuple[str, PdoConfig]],
+    commanded: dict[int, tuple[str, PdoConfig]],
+    findings: Findings,
+) -> None:
+    """Report an identifier that is reserved, or has an owner already."""
+    title, pdo = own
+    for purpose in (purpose for ids, purpose in RESERVED if pdo.cob_id in ids):
+        message = f'COB-ID 0x{pdo.cob_id:03X} of {title} is not for PDOs ({purpose})'
+        _report(findings, [pdo], message)
+    owner = owners.setdefault(pdo.cob_id, own)
+    other = commanded.setdefault(pdo.cob_id, own) if pdo.mapping else own
+    both_command = other is not own
+    owner = other if both_command else owner
+    if owner is not own:
+        _report(
+            findings,
+            [pdo, owner[1]],
+            f'COB-ID 0x{pdo.cob_id:03X} of {title} is also that of {owner[0]} '
+            f'(line {owner[1].place.line})',
+            certain=both_command,
+        )
 
 
 def _report(
-    findings: Findings, drafts: list[PdoDraft], message: str, *, certain: bool = False
+    findings: Findings, pdos: list[PdoConfig], message: str, *, certain: bool = False
 ) -> None:
-    if certain or any(draft.config.configured for draft in drafts):
+    if certain or any(pdo.configured for pdo in pdos):
         remedy = "name each PDO in bus.yml with 'cob_id: auto', or 'enabled: false'"
-        findings.error(drafts[0].place, message, remedy)
+        findings.error(pdos[0].place, message, remedy)
     else:
         remedy = 'name the PDO in bus.yml if the device does not add its node id to the default'
-        findings.warning(drafts[0].place, message, remedy)
+        findings.warning(pdos[0].place, message, remedy)

@@ -4,164 +4,313 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
 
+from ...standard.datatypes import DataType, UNSIGNED_BITS
 from ...standard.device_profile import drive_axes, is_drive, profile_number
 from ...standard.dictionary import object_address, ObjectDictionary
-from ...standard.objects import AXIS_OFFSET, Index
+from ...standard.objects import AXIS_OFFSET, Index, is_signed
+from ...standard.pdo import SYNCHRONOUS_MAX
 from ..findings import Findings, Place
 from ..model.bus import NodeConfig
 from ..model.drive import DriveConfig
 from ..model.identity import Identity
+from ..model.master import MasterConfig
 from ..model.pdo_direction import RPDO, TPDO
+from ..model.tpdo_freshness import with_event_timer
 from ..read.document import YamlMap
 from ..read.eds import Eds
-from ..read.section import texts
-from ..sections import DeviceSettings, Options
+from ..read.section import read_section, texts
+from ..sections import DEVICE_KEYS, DeviceSettings, DRIVE_KEYS, MasterSettings, Options
+from ..units import MILLISECONDS
+from .axes import check_node_name, read_axes, read_drive
+from .drivers import check_driver
 from .eds_files import EdsFiles
+from .master import check_namespace
 from .parameter_values import parameter_writes
-from .pdos import PdoDraft, PdoReader
+from .pdos import PdoReader
 from .sdo_list import read_writes
-from .settings import read_device_settings
 
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)
+CYCLIC_OBJECTS = ((RPDO, Index.CONTROLWORD, 'enabled'), (TPDO, Index.STATUSWORD, 'watched'))
+"""What a drive cannot do without in its PDOs, as no SDO runs inside the cycle."""
 
 
-@dataclass(frozen=True, slots=True)
-class DeviceDraft:
-    """A device before the COB-IDs of the whole bus are known."""
+class DeviceReader:
+    """Reads one device; what its section has for the cycle of the master is there at once."""
 
-    # its configuration without PDOs; None when its EDS or its node id is missing
-    config: NodeConfig | None
-    section: YamlMap  # its section, defaults merged
-    settings: DeviceSettings  # the values of the section
-    pdos: list[PdoDraft] = field(default_factory=list)  # its PDOs, TPDOs first
+    def __init__(self, name: str, section: YamlMap, findings: Findings) -> None:
+        """Read the keys of a section, whose defaults are merged, but for its PDOs and objects."""
+        self.name = name
+        self._section = section
+        self._findings = findings
+        values = read_section(section, DEVICE_KEYS + DRIVE_KEYS, findings)
+        drive_values = {
+            key.field: values.pop(key.field) for key in DRIVE_KEYS if key.field in values
+        }
+        drive = read_drive(section, drive_values, findings)
+        self.settings = DeviceSettings(**values)
+        check_node_name(name, section.place, findings)
+        check_namespace(section, self.settings.namespace, findings)
+        check_driver(section, self.settings.driver, findings, for_master=False)
+        self._axes = read_axes(name, section, self.settings.num_channels, drive, findings)
 
     def place_of(self, key: str) -> Place:
         """Return the place of a key, that of the section when the key is absent."""
-        item = self.section.entries.get(key)
-        return item.place if item is not None else self.section.place
+        item = self._section.entries.get(key)
+        return item.place if item is not None else self._section.place
 
-
-def read_device(
-    name: str, section: YamlMap, options: Options, eds_files: EdsFiles, findings: Findings
-) -> DeviceDraft:
-    """Read everything about a device that does not depend on master and other devices."""
-    settings, axes = read_device_settings(name, section, findings)
-    eds = _find_eds(section, settings, options, eds_files, findings)
-    names = texts(section, 'remappings', findings)
-    node_id = settings.node_id or (eds.node_id if eds is not None else None)
-    if not node_id and 'node_id' not in section.entries:
-        findings.error(section.place, "no 'node_id'", "write 'node_id:' with 1 to 127")
-    if eds is None:
-        return DeviceDraft(None, section, settings)
-    eds = replace(eds, dictionary=eds.dictionary.for_node(node_id or 0))
-    config = NodeConfig(
-        name=name,
-        node_id=node_id or 0,
-        driver=settings.driver,
-        eds=eds.path,
-        dictionary=eds.dictionary,
-        namespace=settings.namespace,
-        remappings=names,
-        identity=_identity(settings, eds.dictionary),
-        boot=settings.boot,
-        mandatory=settings.mandatory,
-        reset_communication=settings.reset_communication,
-        retry_factor=settings.retry_factor or options.retry_factor,
-        restore_configuration=settings.restore_configuration,
-        sdo_timeout=settings.sdo_timeout,
-        boot_timeout=settings.boot_timeout,
-        poll_period=settings.poll_period,
-        sdo_writes=read_writes(section, eds.dictionary, findings),
-        parameter_writes=parameter_writes(eds, findings),
-        axes=_placed(axes, eds.dictionary),
-        line=section.place.line,
-    )
-    _check_profile(config, section, findings)
-    _check_axes(config, section, findings)
-    reader = PdoReader(name, section, eds, node_id or 0, findings=findings)
-    pdos = reader.read(TPDO) + reader.read(RPDO)
-    return DeviceDraft(config if node_id else None, section, settings, pdos if node_id else [])
-
-
-def _find_eds(
-    section: YamlMap,
-    settings: DeviceSettings,
-    options: Options,
-    eds_files: EdsFiles,
-    findings: Findings,
-) -> Eds | None:
-    item = section.entries.get('dcf')
-    if item is None and DRIVE_PROFILE in settings.driver:
-        return eds_files.default_drive(section, findings)
-    if item is None:
-        findings.error(section.place, "no 'dcf'", 'write dcf: with the EDS or DCF of the device')
-        return None
-    if not settings.dcf:
-        return None
-    folder = options.dcf_path if settings.dcf_path is None else settings.dcf_path
-    return eds_files.find(settings.dcf, folder, item, findings)
-
-
-def _identity(settings: DeviceSettings, dictionary: ObjectDictionary) -> Identity:
-    """Return what is checked at boot.
-
-    Revision and serial number count only if bus.yml names them: EDS files rarely have those of
-    the firmware at hand, and the device would not boot although it fits.
-    """
-    return Identity(
-        device_type=dictionary.number(Index.DEVICE_TYPE) or 0,
-        vendor_id=dictionary.number(Index.IDENTITY, 1) or 0,
-        product_code=dictionary.number(Index.IDENTITY, 2) or 0,
-        revision_number=settings.revision_number,
-        serial_number=settings.serial_number,
-    )
-
-
-def _check_profile(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
-    """Refuse the drive profile's driver for a device that is no drive."""
-    if config.is_drive and not drive_axes(config.dictionary):
-        missing = [index for index in DRIVE_OBJECTS if not config.dictionary.has_index(index)]
-        names = ' and '.join(
-            f'{object_address(index)} ({index.name.lower()})' for index in missing
+    def read(
+        self,
+        options: Options,
+        eds_files: EdsFiles,
+        master: MasterConfig,
+        master_settings: MasterSettings,
+    ) -> NodeConfig | None:
+        """Return the device, with COB-IDs still to be given; None without EDS or node id."""
+        settings, section, findings = self.settings, self._section, self._findings
+        eds = self._find_eds(options, eds_files)
+        remappings = texts(section, 'remappings', findings)
+        node_id = settings.node_id or (eds.node_id if eds is not None else None)
+        if not node_id and 'node_id' not in section.entries:
+            findings.error(section.place, "no 'node_id'", "write 'node_id:' with 1 to 127")
+        if eds is None:
+            return None
+        dictionary = eds.dictionary.for_node(node_id or 0)
+        eds = replace(eds, dictionary=dictionary)
+        producer = self._heartbeat_producer(dictionary)
+        multiplier = settings.heartbeat_multiplier or options.heartbeat_multiplier
+        life_time_factor = settings.life_time_factor
+        if life_time_factor is None:
+            life_time_factor = dictionary.number(Index.LIFE_TIME_FACTOR) or 0
+        pdos = PdoReader(self.name, section, eds, node_id or 0, findings=findings)
+        node = NodeConfig(
+            name=self.name,
+            node_id=node_id or 0,
+            driver=settings.driver,
+            eds=eds.path,
+            dictionary=dictionary,
+            namespace=settings.namespace,
+            remappings=remappings,
+            identity=self._identity(dictionary),
+            heartbeat_producer=producer,
+            heartbeat_timeout=producer * multiplier if master_settings.watch_devices else 0.0,
+            heartbeat_consumer=self._heartbeat_consumer(dictionary, master),
+            guard_time=self._guard_time(dictionary, producer),
+            life_time_factor=life_time_factor,
+            retry_factor=settings.retry_factor or options.retry_factor,
+            boot=settings.boot,
+            mandatory=settings.mandatory,
+            reset_communication=settings.reset_communication,
+            restore_configuration=settings.restore_configuration,
+            sdo_timeout=settings.sdo_timeout,
+            boot_timeout=settings.boot_timeout,
+            poll_period=settings.poll_period,
+            tpdos=pdos.read(TPDO),
+            rpdos=pdos.read(RPDO),
+            sdo_writes=read_writes(section, dictionary, findings),
+            parameter_writes=parameter_writes(eds, findings),
+            axes=_placed(self._axes, dictionary),
+            line=section.place.line,
         )
-        findings.error(
-            section.entries['driver'].place,
-            f'{config.driver} is for CiA 402 drives, but the EDS has no {names}',
-            "take 'ros2_canopen::ProxyDriver', or the EDS of the drive",
-        )
-    elif config.is_drive and not is_drive(config.dictionary):
-        findings.warning(
-            section.entries['driver'].place,
-            f'{config.driver} is for CiA 402 drives, but 0x1000 of the EDS names profile '
-            f'{profile_number(config.dictionary)}, whose objects from 0x6000 on are others',
-            "take 'ros2_canopen::ProxyDriver', or correct 0x1000 in the EDS",
+        if node.is_drive:
+            self._check_profile(node)
+            self._check_axes(node)
+        if not node_id:
+            return None
+        self._check_period(master)
+        self._check_sync(node, master)
+        if node.is_drive:
+            self._check_drive_pdos(node)
+            tpdos = (with_event_timer(pdo, dictionary) for pdo in node.tpdos)
+            node = replace(node, tpdos=tuple(tpdos))
+        return node
+
+    def _find_eds(self, options: Options, eds_files: EdsFiles) -> Eds | None:
+        settings, section = self.settings, self._section
+        item = section.entries.get('dcf')
+        if item is None and DRIVE_PROFILE in settings.driver:
+            return eds_files.default_drive(section, self._findings)
+        if item is None:
+            remedy = 'write dcf: with the EDS or DCF of the device'
+            self._findings.error(section.place, "no 'dcf'", remedy)
+            return None
+        if not settings.dcf:
+            return None
+        folder = options.dcf_path if settings.dcf_path is None else settings.dcf_path
+        return eds_files.find(settings.dcf, folder, item, self._findings)
+
+    def _identity(self, dictionary: ObjectDictionary) -> Identity:
+        """Return what is checked at boot.
+
+        Revision and serial number count only if bus.yml names them: EDS files rarely have those of
+        the firmware at hand, and the device would not boot although it fits.
+        """
+        return Identity(
+            device_type=dictionary.number(Index.DEVICE_TYPE) or 0,
+            vendor_id=dictionary.number(Index.IDENTITY, 1) or 0,
+            product_code=dictionary.number(Index.IDENTITY, 2) or 0,
+            revision_number=self.settings.revision_number,
+            serial_number=self.settings.serial_number,
         )
 
+    def _heartbeat_producer(self, dictionary: ObjectDictionary) -> float:
+        """Return the period of the device's heartbeat in [s]."""
+        entry, wanted = dictionary.get(Index.PRODUCER_HEARTBEAT), self.settings.heartbeat_producer
+        given = (dictionary.number(Index.PRODUCER_HEARTBEAT) or 0) / MILLISECONDS
+        if entry is None and wanted:
+            self._findings.error(
+                self.place_of('heartbeat_producer'),
+                'the device has no heartbeat: 0x1017 is not in its EDS',
+                'remove the key, or use the EDS that fits the device',
+            )
+        if entry is None or wanted is None or wanted == given:
+            return given
+        if not entry.access.writable:
+            self._findings.error(
+                self.place_of('heartbeat_producer'),
+                f'the heartbeat is fixed at {given * 1e3:g} ms: 0x1017 is read-only in the EDS',
+                'remove the key, the period of the EDS counts',
+            )
+        return wanted
 
-def _check_axes(config: NodeConfig, section: YamlMap, findings: Findings) -> None:
-    """Refuse more axes than the EDS has."""
-    present = drive_axes(config.dictionary)
-    if config.is_drive and 0 < len(present) < len(config.axes):
-        words = (object_address(Index.CONTROLWORD + AXIS_OFFSET * axis) for axis in present)
-        findings.error(
-            section.entries['num_channels'].place,
-            f'the EDS has {len(present)} of {len(config.axes)} axes, with the controlword '
-            f'{", ".join(words)}',
-            'correct num_channels, or use the EDS that fits the device',
+    def _guard_time(self, dictionary: ObjectDictionary, producer: float) -> float:
+        """Return the period of node guarding in [s]; a heartbeat replaces it (CiA 301, 7.2.8)."""
+        entry, wanted = dictionary.get(Index.GUARD_TIME), self.settings.guard_time
+        if wanted and producer:
+            self._findings.warning(
+                self.place_of('guard_time'),
+                f'not used: the device sends a heartbeat every {producer * 1e3:g} ms',
+                "remove the key, or write 'heartbeat_producer: 0'",
+            )
+            return 0.0
+        if wanted and (entry is None or not entry.access.writable):
+            self._findings.error(
+                self.place_of('guard_time'),
+                'the device cannot be guarded: no writable 0x100C in its EDS',
+                'remove the key, and set heartbeat_producer',
+            )
+        if wanted is None and not producer:
+            return (dictionary.number(Index.GUARD_TIME) or 0) / MILLISECONDS
+        return wanted or 0.0
+
+    def _heartbeat_consumer(self, dictionary: ObjectDictionary, master: MasterConfig) -> bool:
+        """Return whether the device watches the master; by default it does if it can."""
+        entry, wanted = (
+            dictionary.get(Index.CONSUMER_HEARTBEAT, 1),
+            self.settings.heartbeat_consumer,
         )
+        capable = entry is not None and entry.access.writable
+        if wanted and not capable:
+            self._findings.error(
+                self.place_of('heartbeat_consumer'),
+                'the device cannot watch the master: no writable 0x1016:01 in its EDS',
+                'remove the key, or use the EDS that fits the device',
+            )
+        if wanted and not master.heartbeat_producer:
+            self._findings.error(
+                self.place_of('heartbeat_consumer'),
+                'the master sends no heartbeat that the device could watch',
+                "write 'heartbeat_producer: 200' into the section master",
+            )
+        return capable and master.heartbeat_producer > 0 and wanted is not False
+
+    def _check_period(self, master: MasterConfig) -> None:
+        period = self.settings.poll_period
+        if 'period' in self._section.entries and master.sync_period not in (0.0, period):
+            self._findings.warning(
+                self.place_of('period'),
+                f'SYNC is the clock: PDOs come every {master.sync_period * 1e3:g} ms, not every '
+                f'{period * 1e3:g} ms; only objects that no PDO carries are read so often',
+                'make period equal to sync_period',
+            )
+
+    def _check_sync(self, node: NodeConfig, master: MasterConfig) -> None:
+        """Warn about PDOs that wait for a SYNC that the master does not send."""
+        for direction, pdo in node.pdos:
+            synchronous = pdo.enabled and pdo.transmission <= SYNCHRONOUS_MAX
+            if pdo.configured and synchronous and not master.sync_period:
+                self._findings.warning(
+                    pdo.place,
+                    f'{direction.title} {pdo.number} of {node.name} waits for SYNC (transmission '
+                    f'{pdo.transmission}), but the master sends none',
+                    "write 'sync_period: 10000' into the section master, or 'transmission: 255'",
+                )
+
+    def _check_profile(self, node: NodeConfig) -> None:
+        """Refuse the drive profile's driver for a device that is no drive."""
+        place = self.place_of('driver')
+        if not drive_axes(node.dictionary):
+            names = ' and '.join(
+                f'{object_address(index)} ({index.name.lower()})'
+                for index in DRIVE_OBJECTS
+                if not node.dictionary.has_index(index)
+            )
+            self._findings.error(
+                place,
+                f'{node.driver} is for CiA 402 drives, but the EDS has no {names}',
+                "take 'ros2_canopen::ProxyDriver', or the EDS of the drive",
+            )
+        elif not is_drive(node.dictionary):
+            self._findings.warning(
+                place,
+                f'{node.driver} is for CiA 402 drives, but 0x1000 of the EDS names profile '
+                f'{profile_number(node.dictionary)}, whose objects from 0x6000 on are others',
+                "take 'ros2_canopen::ProxyDriver', or correct 0x1000 in the EDS",
+            )
+
+    def _check_axes(self, node: NodeConfig) -> None:
+        """Refuse more axes than the EDS has."""
+        present = drive_axes(node.dictionary)
+        if 0 < len(present) < len(node.axes):
+            words = (object_address(Index.CONTROLWORD + AXIS_OFFSET * axis) for axis in present)
+            self._findings.error(
+                self.place_of('num_channels'),
+                f'the EDS has {len(present)} of {len(node.axes)} axes, with the controlword '
+                f'{", ".join(words)}',
+                'correct num_channels, or use the EDS that fits the device',
+            )
+
+    def _check_drive_pdos(self, node: NodeConfig) -> None:
+        """Report what a drive lacks in its PDOs, and refuse what has no sign for its direction."""
+        mapped = [
+            (direction, pdo, each)
+            for direction, pdo in node.pdos
+            if pdo.enabled
+            for each in pdo.mapping
+        ]
+        for axis, (direction, first, verb) in product(node.axes, CYCLIC_OBJECTS):
+            index = first + AXIS_OFFSET * axis.channel
+            if not any(way is direction and each.index == index for way, _, each in mapped):
+                self._findings.warning(
+                    self._section.place,
+                    f'no enabled {direction.title} carries {object_address(index)} '
+                    f'({first.name.lower()}); '
+                    f'{axis.name or "the drive"} cannot be {verb} in the cycle',
+                    f'map it below {direction.name}',
+                )
+        for direction, pdo, each in mapped:
+            unsigned = each.data_type in UNSIGNED_BITS or each.data_type is DataType.BOOLEAN
+            if unsigned and is_signed(each.index, each.subindex):
+                self._findings.error(
+                    pdo.place,
+                    f'{direction.title} {pdo.number} of {node.name} carries '
+                    f'{object_address(each.index, each.subindex)} as {each.data_type.name}, which '
+                    'holds no negative value',
+                    'correct its DataType in the EDS (0x0003 INTEGER16, 0x0004 INTEGER32), or the '
+                    'length in the default mapping',
+                )
 
 
-def _placed(
-    axes: tuple[DriveConfig, ...], dictionary: ObjectDictionary
-) -> tuple[DriveConfig, ...]:
+def _placed(axes: Iterable[DriveConfig], dictionary: ObjectDictionary) -> tuple[DriveConfig, ...]:
     """Return the axes with the objects of those that the device has, in their order.
 
     Most have the first one at 0x6040; some have none there, or leave one out.
     """
-    present = drive_axes(dictionary)
+    axes, present = tuple(axes), drive_axes(dictionary)
     if len(present) < len(axes):
         return axes
     return tuple(replace(axis, channel=at) for axis, at in zip(axes, present, strict=False))

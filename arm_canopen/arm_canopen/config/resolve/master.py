@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Building the master's configuration from its settings."""
+"""Building the master's configuration from its section of bus.yml."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, fields
+import re
 
 from ...standard.cob_id import TIME_PRODUCER
 from ..findings import Findings, RefusedError
@@ -12,13 +13,35 @@ from ..model.identity import Identity
 from ..model.master import MasterConfig
 from ..read.document import YamlMap
 from ..read.scalars import integer
-from ..read.section import texts
-from ..sections import MASTER, MasterSettings, Options, U8_MAX, U16_MAX
+from ..read.section import read_section, texts
+from ..sections import MASTER, MASTER_KEYS, MasterSettings, Options, U8_MAX, U16_MAX
 from ..units import MILLISECONDS
+from .drivers import check_driver
 from .sdo_list import error_behaviours
 
+NAMESPACE = re.compile(r'/?([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?')
 TIME_PERIOD = 1.0  # [s] when only that bit requests it
 HEARTBEAT_TIME_MAX = U16_MAX / MILLISECONDS  # [s] 0x1016 holds 16 bits
+
+
+def read_master(section: YamlMap, findings: Findings) -> MasterSettings:
+    """Read the section ``master``."""
+    settings = MasterSettings(**read_section(section, MASTER_KEYS, findings))
+    check_namespace(section, settings.namespace, findings)
+    check_driver(section, settings.driver, findings, for_master=True)
+    if 'node_id' not in section.entries:
+        findings.error(section.place, "no 'node_id'", "write 'node_id: 1'")
+    return settings
+
+
+def check_namespace(section: YamlMap, namespace: str, findings: Findings) -> None:
+    """Refuse a namespace that ROS does not know."""
+    if not NAMESPACE.fullmatch(namespace):
+        findings.error(
+            section.entries['namespace'].place,
+            f'{namespace!r} is no ROS namespace',
+            "write it like '/left/arm'",
+        )
 
 
 def build_master(

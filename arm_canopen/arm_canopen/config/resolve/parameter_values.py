@@ -15,7 +15,7 @@ from ...standard.dictionary import ObjectEntry
 from ...standard.objects import axis_of, COMMANDS, Index
 from ..findings import Findings, Place
 from ..model.boot_plan import ERROR_CONTROL
-from ..model.bus import SdoWrite, SourceLocation
+from ..model.bus import SdoWrite
 from ..read.eds import Eds
 
 ACTIONS = frozenset({Index.STORE_PARAMETERS, Index.RESTORE_PARAMETERS})
@@ -28,7 +28,7 @@ def parameter_writes(eds: Eds, findings: Findings) -> tuple[SdoWrite, ...]:
     """Return the writes of a DCF in ascending order; an EDS has none, nor has what is reported."""
     return tuple(
         SdoWrite(
-            *entry.address, data, location=SourceLocation(key=f'ParameterValue of {eds.path.name}')
+            *entry.address, data, place=Place(eds.path, key=f'ParameterValue of {eds.path.name}')
         )
         for entry in eds.dictionary
         if entry.configured

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ...standard.cob_id import CAN_ID_MASK, COB_ID_EXTENDED, COB_ID_INVALID, PREDEFINED_MAX
@@ -24,27 +24,11 @@ from .pdo_mapping import eds_mapping, is_fixed, read_mapping
 
 PDO_KEYS = {TPDO.name: TPDO_KEYS, RPDO.name: RPDO_KEYS}
 """The keys of one PDO."""
-AUTO = 'auto'
+AUTO, AUTO_ID = 'auto', -1  # a COB-ID from the free range, which is given when all are known
 TRANSMISSION_DEFAULT = 255
 EVENT_TYPES = (254, 255)
 SUBINDICES = {'inhibit_time': 3, 'event_time': 5, 'sync_start': 6}
 """Sub-indices of the communication parameter that not every device has (CiA 301, 7.5.2.37)."""
-
-
-@dataclass(frozen=True, slots=True)
-class PdoDraft:
-    """A PDO before the COB-IDs of the whole bus are known."""
-
-    config: PdoConfig
-    direction: Direction
-    device: str
-    place: Place  # where to complain: its COB-ID in bus.yml, else the PDO or the device
-    auto: bool = False  # it wants a COB-ID from the free range
-
-    @property
-    def title(self) -> str:
-        """Name as people write it: ``TPDO 1 of joint1``."""
-        return f'{self.direction.title} {self.config.number} of {self.device}'
 
 
 class PdoReader:
@@ -60,32 +44,34 @@ class PdoReader:
         self._node_id = node_id
         self._findings = findings
 
-    def read(self, direction: Direction) -> list[PdoDraft]:
+    def read(self, direction: Direction) -> tuple[PdoConfig, ...]:
         """Return all PDOs of a direction by ascending number."""
         numbers = direction.numbers(self._eds.dictionary)
         wanted = dict(self._wanted(direction, numbers))
-        drafts = []
+        pdos = []
         for number in numbers:
-            draft = self._default(direction, number)
+            pdo = self._default(direction, number)
             if number in wanted:
-                draft = self._configured(draft, wanted[number])
-            elif draft.config.enabled:
+                pdo = self._configured(direction, pdo, wanted[number])
+            elif pdo.enabled:
                 # the warnings of this mapping matter, as the PDO is in use
                 eds_mapping(direction, number, self._eds, self._findings)
-                self._warn_of_assumption(draft)
-            drafts.append(draft)
-        return drafts
+                self._warn_of_assumption(direction, pdo)
+            pdos.append(pdo)
+        return tuple(pdos)
 
-    def _warn_of_assumption(self, draft: PdoDraft) -> None:
+    def _title(self, direction: Direction, pdo: PdoConfig) -> str:
+        return f'{direction.title} {pdo.number} of {self._name}'
+
+    def _warn_of_assumption(self, direction: Direction, pdo: PdoConfig) -> None:
         """Report a COB-ID that the file has for another node id, which boot looks up."""
-        config = draft.config
-        entry = self._eds.dictionary.get(draft.direction.communication + config.number - 1, 1)
-        if entry is not None and entry.literal is not None and config.mapping:
+        entry = self._eds.dictionary.get(direction.communication + pdo.number - 1, 1)
+        if entry is not None and entry.literal is not None and pdo.mapping:
             self._findings.warning(
                 Place(self._eds.path, entry.line, f'[{entry.index:04X}sub1]'),
-                f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {draft.title} is not that of node '
-                f'{self._node_id}; it is taken to have 0x{config.cob_id:03X}, which is compared '
-                'at boot',
+                f'COB-ID 0x{entry.literal & CAN_ID_MASK:03X} of {self._title(direction, pdo)} is '
+                f'not that of node {self._node_id}; it is taken to have 0x{pdo.cob_id:03X}, which '
+                'is compared at boot',
                 'name the PDO in bus.yml with cob_id: auto, so that it is written',
             )
 
@@ -104,7 +90,7 @@ class PdoReader:
                     f"indent them below '{name}:'",
                 )
 
-    def _default(self, direction: Direction, number: int) -> PdoDraft:
+    def _default(self, direction: Direction, number: int) -> PdoConfig:
         """Describe a PDO as its EDS does."""
         communication = direction.communication + number - 1
         mapping = direction.mapping + number - 1
@@ -113,7 +99,7 @@ class PdoReader:
         if cob_id is None:
             cob_id = COB_ID_INVALID
         enabled = not cob_id & (COB_ID_INVALID | COB_ID_EXTENDED) and bool(cob_id & CAN_ID_MASK)
-        config = PdoConfig(
+        return PdoConfig(
             number,
             enabled,
             cob_id & CAN_ID_MASK,
@@ -122,9 +108,9 @@ class PdoReader:
             configured=self._eds.dictionary.is_configured(communication, mapping),
             fixed_mapping=is_fixed(direction, number, self._eds.dictionary),
             assumed=entry is not None and entry.literal is not None,
+            place=self._device.place,
             **self._times(direction, communication),
         )
-        return PdoDraft(config, direction, self._name, self._device.place)
 
     def _times(self, direction: Direction, communication: int) -> dict[str, Any]:
         """Return the times that a DCF gives a PDO; others are left to the device."""
@@ -136,40 +122,39 @@ class PdoReader:
                 found[key.field] = entry.default / (key.unit or 1)
         return found
 
-    def _configured(self, draft: PdoDraft, section: YamlMap) -> PdoDraft:
+    def _configured(self, direction: Direction, pdo: PdoConfig, section: YamlMap) -> PdoConfig:
         """Lay the values of bus.yml over a PDO of the EDS."""
-        values = read_section(section, PDO_KEYS[draft.direction.name], self._findings)
-        self._check_parameters(draft, section, values)
-        config = replace(draft.config, configured=True, **{'enabled': True} | values)
-        draft = replace(draft, config=config, place=section.place)
+        values = read_section(section, PDO_KEYS[direction.name], self._findings)
+        self._check_parameters(direction, pdo, section, values)
+        fixed: dict[str, Any] = {'configured': True, 'place': section.place}
+        pdo = replace(pdo, **{'enabled': True} | values | fixed)
         entries = listing(section, 'mapping', self._findings)
         if entries is not None:
-            draft = self._with_mapping(draft, entries)
-        if config.enabled and not (draft.config.mapping or (entries and entries.items)):
+            pdo = self._with_mapping(direction, pdo, entries)
+        if pdo.enabled and not (pdo.mapping or (entries and entries.items)):
             self._findings.error(
                 section.place,
-                f'{draft.title} is enabled, but maps nothing',
+                f'{self._title(direction, pdo)} is enabled, but maps nothing',
                 "write its mapping, or 'enabled: false'",
             )
-        return self._with_cob_id(draft, section.entries.get('cob_id'))
+        return self._with_cob_id(direction, pdo, section.entries.get('cob_id'))
 
-    def _with_mapping(self, draft: PdoDraft, entries: YamlList) -> PdoDraft:
-        config = draft.config
-        mapping = read_mapping(draft.direction, config.number, entries, self._eds, self._findings)
-        if config.fixed_mapping and mapping != config.mapping:
+    def _with_mapping(self, direction: Direction, pdo: PdoConfig, entries: YamlList) -> PdoConfig:
+        mapping = read_mapping(direction, pdo.number, entries, self._eds, self._findings)
+        if pdo.fixed_mapping and mapping != pdo.mapping:
             self._findings.error(
                 entries.place,
-                f'the mapping of {draft.title} is fixed (read-only in the EDS)',
+                f'the mapping of {self._title(direction, pdo)} is fixed (read-only in the EDS)',
                 'remove it, the mapping of the EDS counts',
             )
-        return replace(draft, config=replace(config, mapping=mapping))
+        return replace(pdo, mapping=mapping)
 
     def _check_parameters(
-        self, draft: PdoDraft, section: YamlMap, values: dict[str, object]
+        self, direction: Direction, pdo: PdoConfig, section: YamlMap, values: dict[str, Any]
     ) -> None:
         """Refuse what the device has no sub-index for, and transmission types without use."""
-        communication = draft.direction.communication + draft.config.number - 1
-        for key in PDO_KEYS[draft.direction.name]:
+        communication = direction.communication + pdo.number - 1
+        for key in PDO_KEYS[direction.name]:
             subindex = SUBINDICES.get(key.field)
             if subindex is None or key.field not in values:
                 continue
@@ -188,26 +173,23 @@ class PdoReader:
                 'take 0 to 240 (with SYNC), or 254 or 255 (on events)',
             )
 
-    def _with_cob_id(self, draft: PdoDraft, item: Item | None) -> PdoDraft:
+    def _with_cob_id(self, direction: Direction, pdo: PdoConfig, item: Item | None) -> PdoConfig:
         """Add the COB-ID: a number, ``auto`` or the EDS's own."""
-        config = draft.config
         if item is None:
-            if config.enabled and not config.cob_id:
-                self._findings.error(
-                    draft.place, f'{draft.title} has no COB-ID in the EDS', "write 'cob_id: auto'"
-                )
-            return draft
-        draft = replace(draft, place=item.place)
+            if pdo.enabled and not pdo.cob_id:
+                what = f'{self._title(direction, pdo)} has no COB-ID in the EDS'
+                self._findings.error(pdo.place, what, "write 'cob_id: auto'")
+            return pdo
+        pdo = replace(pdo, place=item.place)
         if isinstance(item, Scalar) and item.text.lower() == AUTO:
-            if config.number > PREDEFINED_MAX:
-                return replace(draft, auto=config.enabled)
-            cob_id = draft.direction.default_cob_id(config.number, self._node_id)
-            return replace(draft, config=replace(config, cob_id=cob_id))
+            if pdo.number <= PREDEFINED_MAX:
+                return replace(pdo, cob_id=direction.default_cob_id(pdo.number, self._node_id))
+            return replace(pdo, cob_id=AUTO_ID) if pdo.enabled else pdo
         try:
-            return replace(draft, config=replace(config, cob_id=_explicit(item)))
+            return replace(pdo, cob_id=_explicit(item))
         except RefusedError as reason:
             self._findings.refuse(item.place, reason)
-            return draft
+            return pdo
 
 
 def _no_such_pdo(

@@ -22,7 +22,7 @@ from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
 from ...standard.objects import Index, PDO_COUNT_MAX
 from ..findings import Findings, Place, RefusedError
 from ..keys import Key
-from ..model.bus import SdoWrite, SourceLocation
+from ..model.bus import SdoWrite
 from ..read import scalars
 from ..read.document import Item, Scalar, ScalarKind, YamlMap
 from ..read.section import block, listing, read_section
@@ -58,7 +58,7 @@ def read_writes(
         except RefusedError as reason:
             findings.refuse(value.place, reason)
             continue
-        writes.append(SdoWrite(*address, data, timeout, SourceLocation(place.line, place.key)))
+        writes.append(SdoWrite(*address, data, timeout, place))
     return tuple(writes)
 
 

@@ -25,7 +25,7 @@ def check_master(config: BusConfig, findings: Findings) -> None:
     producer, cycle = master.heartbeat_producer, master.cycle_period
     if not producer:
         findings.warning(
-            _master_place(config, 'heartbeat_producer'),
+            config.place_of('master', 'heartbeat_producer'),
             'the master sends no heartbeat: no device notices when it dies',
             'write heartbeat_producer: 200',
         )
@@ -33,7 +33,7 @@ def check_master(config: BusConfig, findings: Findings) -> None:
     real = math.ceil(producer / cycle - 1e-9) * cycle
     if master.heartbeat_timeout < LATE_FACTOR * real:
         findings.warning(
-            _master_place(config, 'heartbeat_producer'),
+            config.place_of('master', 'heartbeat_producer'),
             f'devices wait {master.heartbeat_timeout * 1e3:g} ms for the heartbeat of the master, '
             f'which comes every {real * 1e3:g} ms (with a cycle): one that is late is a fault',
             'take a larger heartbeat_multiplier, 3 is usual',
@@ -52,7 +52,7 @@ def check_heartbeats(subject: Subject) -> None:
         )
     elif producer and not node.heartbeat_timeout:
         subject.findings.warning(
-            _master_place(subject.bus, 'heartbeat_consumer'),
+            subject.bus.place_of('master', 'heartbeat_consumer'),
             'the master does not watch the heartbeats of the devices',
             'remove heartbeat_consumer: false',
         )
@@ -171,11 +171,11 @@ def check_writes(subject: Subject) -> None:
     last = {(w.index, w.subindex): w for w in subject.node.sdo_writes}
     for write in subject.node.sdo_writes:
         kept = last[write.index, write.subindex]
-        if write.data != kept.data and write.location.line:
+        if write.data != kept.data and write.place.line:
             subject.findings.warning(
-                Place(subject.bus.file, write.location.line, write.location.key),
+                write.place,
                 f'{object_address(write.index, write.subindex)} is written again in line '
-                f'{kept.location.line} with another value',
+                f'{kept.place.line} with another value',
                 'keep one of them, unless the device needs both in this order',
             )
 
@@ -233,8 +233,3 @@ def _check_sdo_server(subject: Subject) -> None:
                 f'takes 0x{base + node_id:03X}',
                 'correct 0x1200 in the EDS; devices have the pre-defined identifiers',
             )
-
-
-def _master_place(config: BusConfig, key: str) -> Place:
-    location = config.place_of('master', key)
-    return Place(config.file, location.line, location.key)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ....exceptions import Problem
-from ...findings import Findings, Place
+from ...findings import Findings
 from ..bus import BusConfig
 from .drive_units import axis_units, AxisUnits, check_units
 from .drives import check_drive
@@ -80,8 +80,7 @@ def check_bus(
 def _check_load(config: BusConfig, load: LoadEstimate, findings: Findings) -> None:
     if load.load <= HIGH_LOAD:
         return
-    written = config.place_of('master', 'sync_period')
-    place = Place(config.file, written.line, written.key)
+    place = config.place_of('master', 'sync_period')
     at = f'{load.frames_per_second:.0f} frames/s at {load.bitrate / 1000:g} kbit/s'
     remedy = 'make sync_period longer, map fewer or shorter PDOs, or raise the bit rate'
     if load.load > 1:

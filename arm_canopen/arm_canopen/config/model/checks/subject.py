@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ....standard.dictionary import object_address
 from ....standard.drive import OperationMode
@@ -14,7 +14,7 @@ from ...findings import Findings, Place
 from ...units import HUNDRED_MICROSECONDS, MILLISECONDS
 from ..bus import BusConfig, NodeConfig, PdoConfig
 from ..drive import DriveConfig
-from ..pdo_direction import Direction, RPDO, TPDO
+from ..pdo_direction import Direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +40,8 @@ class Subject:
 
     def place(self, *names: str) -> Place:
         """Return the place of a key of the device, or of the nearest thing around it."""
-        location = self.bus.place_of(self.node.name, *names)
-        return Place(self.bus.file, location.line or self.node.line, location.key)
+        place = self.bus.place_of(self.node.name, *names)
+        return place if place.line else replace(place, line=self.node.line)
 
     def pdo_place(self, direction: Direction, pdo: PdoConfig, key: str = '') -> Place:
         """Return the place of a PDO, or of one of its keys."""
@@ -51,7 +51,7 @@ class Subject:
         """Return the place of the value of an object: the sdo list, or else the EDS."""
         write = self.node.write_of(index, subindex)
         if write is not None:
-            return Place(self.bus.file, write.location.line, write.location.key)
+            return write.place
         entry = self.node.dictionary.get(index, subindex)
         line = entry.line if entry is not None else 0
         return Place(self.node.eds, line, f'[{index:04X}sub{subindex:X}]')
@@ -73,10 +73,9 @@ class Subject:
 
     def pdos(self) -> Iterator[tuple[Direction, PdoConfig]]:
         """Yield the PDOs that are in use."""
-        for direction, pdos in ((TPDO, self.node.tpdos), (RPDO, self.node.rpdos)):
-            for pdo in pdos:
-                if pdo.enabled and pdo.mapping:
-                    yield direction, pdo
+        for direction, pdo in self.node.pdos:
+            if pdo.enabled and pdo.mapping:
+                yield direction, pdo
 
     def carriers(self, direction: Direction, index: int, subindex: int = 0) -> list[PdoConfig]:
         """Return the PDOs in use that carry an object."""
