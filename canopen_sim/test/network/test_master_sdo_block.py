@@ -89,7 +89,7 @@ class BlockLine:
 
 @given(st.integers(BLOCK_MIN, 3000), st.randoms(use_true_random=False))
 def test_any_long_value_survives_both_ways(size: int, source: random.Random) -> None:
-    """SourceLocation and read in blocks, whatever its length leaves in the last segment."""
+    """Write and read in blocks, whatever its length leaves in the last segment."""
     line = BlockLine()
     value = source.randbytes(size)
     written = line.client.write(BLOB, 0, value, TIMEOUT)
