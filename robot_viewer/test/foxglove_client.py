@@ -24,6 +24,7 @@ from websockets.typing import Origin, Subprotocol
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 TIMEOUT = 60.0  # [s]
 PROTOCOL = Subprotocol('foxglove.sdk.v1')
+FORMER = Subprotocol('foxglove.websocket.v1')
 
 Decoder = Callable[[bytes], Any]
 
@@ -43,22 +44,25 @@ class FoxgloveClient:
         statuses: Texts of the server for people.
     """
 
-    def __init__(self, url: str, origin: str | None = None) -> None:
+    def __init__(
+        self, url: str, origin: str | None = None, protocol: Subprotocol = PROTOCOL
+    ) -> None:
         """Connect.
 
         Args:
             url: Of the server.
             origin: Site of the page, as a browser names it.
+            protocol: Sub-protocol that the client speaks.
         """
         self._socket = connect(
             url,
-            subprotocols=[PROTOCOL],
+            subprotocols=[protocol],
             origin=None if origin is None else Origin(origin),
             open_timeout=TIMEOUT,
             close_timeout=0.0,
             max_size=None,
         )
-        assert self._socket.subprotocol == PROTOCOL
+        assert self._socket.subprotocol == protocol
         self._numbers = itertools.count(1)
         self._subscribed: dict[int, str] = {}
         self._received: dict[str, deque[bytes]] = defaultdict(deque)

@@ -11,7 +11,7 @@ import re
 from socket import gethostname
 import threading
 
-from foxglove_client import encoded, FoxgloveClient
+from foxglove_client import encoded, FORMER, FoxgloveClient
 from geometry_msgs.msg import Twist
 from isolation import Isolation, reserve
 from processes import executable, RunningProcess
@@ -132,6 +132,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
             with bridge(env) as process:
                 yield Rig(robot, isolation, url_of(process), process)
                 assert process.stop(60.0) == 0
+                assert 'number of timers' not in process.output  # of rclpy, at each new client
         finally:
             robot.close()
             rclpy.shutdown()
@@ -169,6 +170,19 @@ def test_who_comes_late_gets_what_is_latched(rig: Rig, client: FoxgloveClient) -
         each.subscribe('/robot_description')
         assert each.next_message('/robot_description').data == '<robot name="r"/>'
     each.close()
+
+
+def test_clients_from_before_the_sdk_are_served(rig: Rig) -> None:
+    """As @foxglove/ws-protocol of npm and older Lichtblick; all are told the distribution."""
+    robot, client = rig.robot, FoxgloveClient(rig.url, protocol=FORMER)
+    assert client.info['metadata']['ROS_DISTRO'] == 'jazzy'
+    client.subscribe('/robot_description')
+    assert client.next_message('/robot_description').data == '<robot name="r"/>'
+    assert client.call('/halt', EMPTY).success
+    client.advertise('/cmd_vel', 'geometry_msgs/msg/Twist')
+    robot.until(lambda: robot.count_publishers('cmd_vel') == 1, 'publisher')
+    client.close()
+    robot.until(lambda: robot.count_publishers('cmd_vel') == 0, 'end of the publisher')
 
 
 def test_clients_publish_until_they_have_gone(rig: Rig) -> None:

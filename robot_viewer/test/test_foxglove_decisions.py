@@ -15,13 +15,16 @@ from robot_viewer.foxglove.admission import Admission, FOXGLOVE_ORIGINS
 from robot_viewer.foxglove.names import EVERYTHING, is_hidden, NameFilter
 from robot_viewer.foxglove.relay import hidden_address, Relay
 
-HEAD = 'GET {path} HTTP/1.1\r\nHost: localhost:8765\r\nUpgrade: websocket\r\n{rest}\r\n'
+HEAD = (
+    'GET {path} HTTP/1.1\r\nHost: localhost:8765\r\nUpgrade: websocket\r\n'
+    'Sec-WebSocket-Protocol: {protocol}\r\n{rest}\r\n'
+)
 
 
-def head(path: str = '/', **headers: str) -> bytes:
+def head(path: str = '/', protocol: str = 'foxglove.sdk.v1', **headers: str) -> bytes:
     """Make the head of a request."""
     rest = ''.join(f'{name}: {value}\r\n' for name, value in headers.items())
-    return HEAD.format(path=path, rest=rest).encode()
+    return HEAD.format(path=path, protocol=protocol, rest=rest).encode()
 
 
 @pytest.mark.parametrize(
@@ -44,6 +47,13 @@ def test_sites_on_loopback(origin: str, admitted: bool) -> None:
     assert not admission.token
     assert admission.refusal(head()) is None
     assert (admission.refusal(head(Origin=origin)) is None) == admitted
+
+
+def test_a_client_of_another_sub_protocol_reads_which_ones_are_spoken() -> None:
+    """One of several that it offers is enough."""
+    admission = Admission.to('127.0.0.1', ())
+    assert admission.refusal(head(protocol='other, foxglove.websocket.v1')) is None
+    assert 'speaks foxglove.sdk.v1' in str(admission.refusal(head(protocol='foxglove.sdk.v2')))
 
 
 def test_all_sites_may_be_allowed() -> None:

@@ -21,6 +21,8 @@ from ..loopback import is_loopback
 FOXGLOVE_ORIGINS = ('https://app.foxglove.dev', 'file://')
 """Foxglove in a browser, and desktop programs, whose pages are files of their own."""
 ANY_ORIGIN = '*'
+SUBPROTOCOL, FORMER = 'foxglove.sdk.v1', 'foxglove.websocket.v1'
+"""Sub-protocols of clients of foxglove-sdk, and of those from before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,12 @@ class Admission:
             return f'not understood: {error}'
         if len(words) != 3 or headers.get('Upgrade', '').lower() != 'websocket':
             return 'this is a WebSocket of Foxglove; open it in Foxglove or Lichtblick'
+        offered = ','.join(headers.get_all('Sec-WebSocket-Protocol', []))
+        if not {SUBPROTOCOL, FORMER} & {each.strip() for each in offered.split(',')}:
+            return (
+                f'the client offers the sub-protocol {offered!r}; this bridge speaks {SUBPROTOCOL}'
+                f' and {FORMER}'
+            )
         origins = headers.get_all('Origin', [])
         if not all(self._is_known(origin) for origin in origins):
             return f'{origins[0]} is not in allowed_origins; add it, if you trust that site'

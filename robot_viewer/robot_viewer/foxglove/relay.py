@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The port of the bridge: admits a connection, then passes its bytes on to the server behind it.
 
-The server of foxglove-sdk asks nobody who connects. So it is bound to a loopback address that
-nobody can guess, and stands behind this. It limits the number of messages that wait for a slow
-client, not their bytes: a thousand images are gigabytes. So messages of topics are dropped here
-while more than a number of bytes waits for their client.
+The server of foxglove-sdk admits every client. So it is bound to a loopback address that cannot be
+guessed, and stands behind this. It limits the number of messages that wait for a slow client, not
+their bytes: a thousand images are gigabytes. So messages of topics are dropped here while more
+than a number of bytes waits for their client. Clients that know only the former sub-protocol are
+served too, as its messages have the same form; all of them are told the distribution of ROS.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from __future__ import annotations
 import asyncio
 from contextlib import suppress
 from http import HTTPStatus
+import json
+import os
 import secrets
 import ssl
 import threading
 
-from .admission import Admission
+from .admission import Admission, FORMER, SUBPROTOCOL
 
 HEAD_TIMEOUT = 5.0
 """Time for the head of a request in [s]."""
@@ -26,8 +29,8 @@ SEND_BUFFER_LIMIT = 10_000_000
 MAX_HEAD = 16 * 1024
 """Its greatest size in [byte]."""
 CHUNK = 64 * 1024
-BINARY = 0x82
-"""First byte of a whole binary frame (RFC 6455, section 5.2)."""
+TEXT, BINARY = 0x81, 0x82
+"""First byte of a whole text frame and of a whole binary frame (RFC 6455, section 5.2)."""
 MESSAGE_DATA = 0x01
 """First byte of a message of a topic (Foxglove WebSocket protocol, Message Data)."""
 
@@ -116,11 +119,19 @@ class Relay:
             writer.write(_forbidden(refusal))
             await writer.drain()
             return
+        former = SUBPROTOCOL.encode() not in head
+        names = (FORMER.encode(), SUBPROTOCOL.encode())
         inner_reader, inner_writer = await asyncio.open_connection(*self._behind)
         try:
-            inner_writer.write(head)
+            inner_writer.write(head.replace(*names) if former else head)
             there = asyncio.create_task(_pass(reader, inner_writer))
-            back = asyncio.create_task(_pass_messages(inner_reader, writer, self._limit))
+            answer = await inner_reader.readuntil(b'\r\n\r\n')
+            writer.write(answer.replace(*reversed(names)) if former else answer)
+            back = asyncio.create_task(
+                _pass_messages(inner_reader, writer, self._limit)
+                if b' 101 ' in answer.partition(b'\r\n')[0]
+                else _pass(inner_reader, writer)
+            )
             try:
                 await asyncio.wait((there, back), return_when=asyncio.FIRST_COMPLETED)
             finally:
@@ -141,11 +152,7 @@ async def _pass_messages(
     reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limit: int
 ) -> None:
     """Pass frames of a WebSocket on; leave messages of topics out while too many bytes wait."""
-    head = await reader.readuntil(b'\r\n\r\n')
-    writer.write(head)
-    if b' 101 ' not in head.partition(b'\r\n')[0]:
-        await _pass(reader, writer)
-        return
+    told = False
     while True:
         start = await reader.readexactly(2)
         size = start[1]
@@ -153,6 +160,8 @@ async def _pass_messages(
             length = await reader.readexactly(2 if size == 126 else 8)
             start, size = start + length, int.from_bytes(length, 'big')
         body = await reader.readexactly(size)
+        if not told and start[0] == TEXT:  # the first message is serverInfo
+            told, (start, body) = True, _with_distribution(start, body)
         waiting = writer.transport.get_write_buffer_size()
         of_topic = start[0] == BINARY and body[:1] == bytes([MESSAGE_DATA])
         if of_topic and waiting and waiting + size > limit:
@@ -160,6 +169,22 @@ async def _pass_messages(
         writer.write(start + body)
         if waiting > 2 * limit:  # of answers, none of which may be lost
             await writer.drain()
+
+
+def _with_distribution(start: bytes, body: bytes) -> tuple[bytes, bytes]:
+    """Add ROS_DISTRO, by which clients choose their definitions, to a text frame of serverInfo."""
+    try:
+        message = json.loads(body)
+    except ValueError:
+        return start, body
+    if not isinstance(message, dict) or message.get('op') != 'serverInfo':
+        return start, body
+    distribution = {'ROS_DISTRO': os.environ.get('ROS_DISTRO', 'jazzy')}
+    message['metadata'] = {**message.get('metadata', {}), **distribution}
+    body = json.dumps(message).encode()
+    size = len(body)
+    length = bytes([size]) if size < 126 else bytes([126]) + size.to_bytes(2, 'big')
+    return bytes([TEXT]) + length, body
 
 
 def _forbidden(reason: str) -> bytes:
