@@ -21,7 +21,6 @@ from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
     Code,
-    Feedback,
     Frame,
     HOST_KINDS,
     Kind,
@@ -36,6 +35,7 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
+from quad_state_frames import state_frame
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -180,14 +180,14 @@ class PtyPeer:
             if self._pushing and time.monotonic() >= next_push:
                 next_push = time.monotonic() + PUSH_PERIOD
                 self._sequence += 1
-                self._send(self._state().frame())
+                self._send(self._state())
 
     def _take(self, frame: Frame) -> None:
         (self._new if self.protocol is V2 else self._old)(frame)
 
-    def _state(self) -> Feedback:
-        return Feedback(
-            attitude=self.behaviour.attitude,
+    def _state(self) -> Frame:
+        return state_frame(
+            euler2=self.behaviour.attitude,
             acceleration=self.behaviour.acceleration,
             battery=80,
             battery_voltage=7.4,

@@ -20,7 +20,6 @@ from quad_hardware.protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
     Code,
-    Feedback,
     Frame,
     HOST_KINDS,
     Kind,
@@ -33,6 +32,7 @@ from quad_hardware.protocol import (
     V2,
 )
 from quad_hardware.report import Report
+from quad_state_frames import state_frame
 
 LEGS = dict.fromkeys(LEG_MOTORS, 10.0)
 IMU = V1.functions[Register.IMU]
@@ -272,7 +272,7 @@ def test_the_new_protocol_asks_until_states_come() -> None:
     asked = [f.address for f in StreamParser(V2, HOST_KINDS).feed(dialect.step(0.0).send)]
     assert asked == [Code.FEEDBACK_RATE, Code.FEEDBACK]
     assert dialect.step(REQUEST_PERIOD / 2).send == b''
-    assert dialect.handle_frame(Feedback().frame(), REQUEST_PERIOD / 2) is not None
+    assert dialect.handle_frame(state_frame(), REQUEST_PERIOD / 2) is not None
     assert dialect.step(REQUEST_PERIOD).send == b''
     assert dialect.step(REQUEST_PERIOD * 1.5).send != b''
 
@@ -293,11 +293,11 @@ def test_lost_states_are_counted_by_their_sequence() -> None:
     """Across the wrap; a robot that restarted lost nothing; frames cut short do not count."""
     dialect = V2Dialect(0.0)
     for sequence in (65533, 65535, 0, 3):
-        dialect.handle_frame(Feedback(sequence=sequence).frame(), 0.0)
+        dialect.handle_frame(state_frame(sequence=sequence), 0.0)
     assert dialect.counters.lost == 3
-    dialect.handle_frame(Feedback(sequence=1).frame(), 0.0)
+    dialect.handle_frame(state_frame(sequence=1), 0.0)
     assert dialect.counters.lost == 3
-    state = Feedback().frame()
+    state = state_frame()
     bad = replace(state, payload=state.payload[:-1])
     assert dialect.handle_frame(bad, 0.0) is None
     assert (dialect.counters.states, dialect.counters.unusable) == (5, 1)

@@ -14,7 +14,6 @@ from quad_hardware import CodecError
 from quad_hardware.protocol import (
     ACTION_RESET,
     Code,
-    Feedback,
     Frame,
     HOST_KINDS,
     Kind,
@@ -28,6 +27,7 @@ from quad_hardware.protocol import (
     V2,
 )
 from quad_protocol_strategies import frames, PROTOCOLS
+from quad_state_frames import state_frame
 
 KINDS = HOST_KINDS | ROBOT_KINDS
 
@@ -71,7 +71,7 @@ def test_the_vendors_frames_are_made_and_read(frame: Frame, text: str) -> None:
 
 def test_the_state_frame_is_as_stated() -> None:
     """254 bytes in all, and the valid attitude at offsets 20 to 31."""
-    wire = Feedback(attitude=(1.5, -2.0, 90.0)).frame().encode(V2)
+    wire = state_frame(euler2=(1.5, -2.0, 90.0)).encode(V2)
     assert len(wire) == 254
     assert wire[:2] + wire[-2:] == bytes.fromhex('55 00 00 AA')
     assert struct.unpack_from('<3f', wire, 6 + 20) == (1.5, -2.0, 90.0)

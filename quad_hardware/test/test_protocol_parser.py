@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 import pytest
 
 from quad_hardware.protocol import (
-    Feedback,
     Frame,
     HOST_KINDS,
     Kind,
@@ -22,11 +21,12 @@ from quad_hardware.protocol import (
     V2,
 )
 from quad_protocol_strategies import cut, frames, PROTOCOLS
+from quad_state_frames import state_frame
 
 pytestmark = pytest.mark.slow
 
 KINDS = HOST_KINDS | ROBOT_KINDS
-STATE_WIRE = Feedback(sequence=7).frame().encode(V2)
+STATE_WIRE = state_frame(sequence=7).encode(V2)
 
 
 @given(st.data(), PROTOCOLS)
@@ -112,7 +112,7 @@ def test_a_flipped_byte_costs_one_frame_only(position: int, flip: int) -> None:
     damaged[position] ^= flip
     parser = StreamParser(V2, ROBOT_KINDS)
     found = parser.feed(STATE_WIRE + bytes(damaged) + STATE_WIRE) + parser.expire()
-    assert found == [Feedback(sequence=7).frame()] * 2
+    assert found == [state_frame(sequence=7)] * 2
     assert parser.counters.skipped == len(STATE_WIRE)
 
 

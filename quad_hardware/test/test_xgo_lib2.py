@@ -18,8 +18,9 @@ from xgo_lib2.feedback import DeviceState, SendStateParser
 from xgo_lib2.registry import feedback_slot_of
 
 from quad_hardware.link.probe import silence_cause
-from quad_hardware.protocol import Feedback, LEG_MOTORS, V1, V2
+from quad_hardware.protocol import LEG_MOTORS, V1, V2
 from quad_pty_peer import PtyPeer
+from quad_state_frames import state_frame
 
 ROOT = Path(__file__).parents[1]
 
@@ -130,7 +131,7 @@ def test_a_port_has_one_user(v2_peer: PtyPeer) -> None:
 def test_slots_of_the_feedback() -> None:
     """Motors stand in the order of their ids, and the states are in that order."""
     assert [feedback_slot_of(motor) for motor in LEG_MOTORS] == list(range(12))
-    wire = Feedback(position=tuple(float(n) for n in range(16))).frame().encode(V2)
+    wire = state_frame(position=tuple(float(n) for n in range(16))).encode(V2)
     (state,) = SendStateParser().feed_bytes(b'\x55\x00noise' + wire)
     assert state.joint_pos_deg[feedback_slot_of(21)] == 3.0
 

@@ -170,9 +170,7 @@ class XgoDog:
                 raise ValueError(f'motor {motor}: {angle} is not an angle')
         if self._is_v2:
             servos = V2.functions[Code.SERVOS]
-            with _as_xgo_errors():
-                groups = (servos.pack(motor=(m,), angle=(a,)) for m, a in angles.items())
-                payload = b''.join(groups)
+            payload = servos.pack(motor=angles, angle=angles.values()) if angles else b''
             self._send(Frame(Kind.WRITE, Code.SERVOS, payload))
             return
         spans = ANGLE_SPANS[self._model]

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from quad_hardware import CodecError
 from quad_hardware.protocol import (
-    decode_feedback,
-    Feedback,
     Kind,
     ParserCounters,
     ROBOT_KINDS,
@@ -53,23 +52,23 @@ class SendStateParser:
         for frame in self._parser.feed(data):
             if frame.kind is Kind.PUSH and frame.address == STATE.address:
                 try:
-                    states.append(device_state(decode_feedback(frame.payload)))
+                    states.append(device_state(STATE.unpack(frame.payload)))
                 except CodecError:
-                    continue  # a number in it is not finite
+                    continue  # it is cut short
         return states
 
 
-def device_state(feedback: Feedback) -> DeviceState:
-    """Return a state by the vendor's names."""
-    roll, pitch, yaw = feedback.attitude
+def device_state(values: Mapping[str, tuple[float, ...]]) -> DeviceState:
+    """Return the values of a state frame by the vendor's names."""
+    (roll, pitch, yaw), (x, y, z) = values['euler2'], values['acceleration']
     return DeviceState(
-        battery=feedback.battery,
+        battery=int(values['battery'][0]),
         roll=roll,
         pitch=pitch,
         yaw=yaw,
-        acceleration=feedback.acceleration,
-        joint_pos_deg=feedback.position,
-        joint_vel_deg_s=feedback.velocity,
-        device_time_ms=feedback.device_time,
-        sequence=feedback.sequence,
+        acceleration=(x, y, z),
+        joint_pos_deg=values['position'],
+        joint_vel_deg_s=values['velocity'],
+        device_time_ms=int(values['device_time'][0]),
+        sequence=int(values['sequence'][0]),
     )

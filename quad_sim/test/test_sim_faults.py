@@ -15,11 +15,12 @@ import serial
 from sim_serial import Listener, serve, TEST_TIMEOUT
 from sim_virtual import VirtualRobot
 
-from quad_hardware.protocol import Code, decode_feedback, Fault, Frame, Kind, V2
+from quad_hardware.protocol import Code, Fault, Frame, Kind, V2
 from quad_sim import SetupError
 from quad_sim.line.faults import Fault as LineFault
 from quad_sim.line.faults import FaultKind, FaultPlan, make_fault, parse_fault
 from quad_sim.line.wire import Wire
+from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 ON = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01')
@@ -98,7 +99,7 @@ def test_silence_begins_and_ends() -> None:
     move = V2.functions[Code.SERVO].pack(motor=(12,), angle=(33.0,))
     robot.send(Frame(Kind.WRITE, Code.SERVO, move))
     assert robot.run(0.4) == []
-    back = [decode_feedback(frame.payload) for frame in robot.run(0.3)]
+    back = [read_state(frame) for frame in robot.run(0.3)]
     assert back
     assert back[0].sequence >= 70
     assert back[-1].position[1] == pytest.approx(33.0, abs=0.1)
@@ -141,7 +142,7 @@ def test_a_brown_out_forgets_everything_and_lets_go() -> None:
     assert robot.run(0.2) == [], 'feedback is off'
     robot.send(ON)
     (first, *_) = robot.run(0.1)
-    state = decode_feedback(first.payload)
+    state = read_state(first)
     assert state.sequence == 0
     assert state.device_time < 2000
     # it lies where it fell
@@ -152,7 +153,7 @@ def test_an_empty_battery_is_reported() -> None:
     """The charge jumps, and the fault bit of the board says so."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'battery,at=0.5,level=7')
     robot.send(ON)
-    before, *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.0))
+    before, *_, after = (read_state(frame) for frame in robot.run(1.0))
     assert (before.battery, after.battery) == (100, 7)
     assert not before.faults & Fault.LOW_BATTERY
     assert after.faults & Fault.LOW_BATTERY
@@ -162,15 +163,15 @@ def test_a_dead_imu_says_no_number_and_the_servos_follow() -> None:
     """The fault bit says so, angles go on, and a servo goes to its target."""
     robot = VirtualRobot(*KINEMATIC, '--fault', 'imu,at=0.5,for=1')
     robot.send(ON)
-    before, *_, dead = (decode_feedback(frame.payload) for frame in robot.run(1.0))
+    before, *_, dead = (read_state(frame) for frame in robot.run(1.0))
     assert not before.faults & Fault.IMU
-    assert all(map(math.isfinite, before.attitude))
+    assert all(map(math.isfinite, before.euler2))
     assert dead.faults & Fault.IMU
-    assert all(map(math.isnan, dead.attitude))
+    assert all(map(math.isnan, dead.euler2))
     robot.send(
         Frame(Kind.WRITE, Code.SERVO, V2.functions[Code.SERVO].pack(motor=(11,), angle=(20.0,)))
     )
-    *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.0))
+    *_, after = (read_state(frame) for frame in robot.run(1.0))
     assert after.position[0] == pytest.approx(20.0, abs=1.0)
     assert not after.faults & Fault.IMU
 
@@ -181,16 +182,16 @@ def test_a_limp_servo_gives_way_and_comes_back() -> None:
     robot = VirtualRobot('--start', 'stand', '--noise', 'none', '--fault', fault)
     robot.send(ON)
     servos = robot.simulation.board.servos
-    before, *_, after = (decode_feedback(frame.payload) for frame in robot.run(1.4))
+    before, *_, after = (read_state(frame) for frame in robot.run(1.4))
     assert [motor for motor in servos.fitted if not servos.torque_on(motor)] == [11]
     assert not before.faults & Fault.SERVO_SILENT
     assert after.faults & Fault.SERVO_SILENT
     assert abs(after.position[0] - before.position[0]) > 3.0
-    assert abs(after.attitude[0]) > 0.3
+    assert abs(after.euler2[0]) > 0.3
     robot.send(Frame(Kind.WRITE, Code.TORQUE, b'\xff\x01'))
     robot.run(0.01)
     assert not servos.torque_on(11), 'no command repairs it'
-    *_, last = (decode_feedback(frame.payload) for frame in robot.run(0.3))
+    *_, last = (read_state(frame) for frame in robot.run(0.3))
     assert all(map(servos.torque_on, servos.fitted))
     assert not last.faults & Fault.SERVO_SILENT
     assert last.position[0] == pytest.approx(after.position[0], abs=1.0), 'it does not jump'
@@ -269,4 +270,4 @@ def test_an_unplugged_port_goes_and_comes_back(tmp_path: Path) -> None:
         again = Listener(served.path)
         (state, *_) = again.count(3)
         again.close()
-    assert decode_feedback(state.payload).sequence > 5
+    assert read_state(state).sequence > 5

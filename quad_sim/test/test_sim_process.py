@@ -23,9 +23,10 @@ from ros_client import RosClient
 from sim_serial import Listener, TEST_TIMEOUT
 from std_srvs.srv import Trigger
 
-from quad_hardware.protocol import Code, decode_feedback, Frame, Kind
+from quad_hardware.protocol import Code, Frame, Kind
 from quad_msgs.srv import InjectFault, Push
 from quad_sim.fake_xgo import run, split_ros_arguments
+from quad_state_frames import read_state
 
 pytestmark = pytest.mark.slow
 
@@ -225,9 +226,7 @@ def test_services_push_the_robot_and_break_its_line(robot: tuple[RosClient, Path
     assert (ended.success, ended.message) == (True, 'all faults have ended')
     listener.count(10)
     assert fault('battery', 'level=9').success
-    listener.until(
-        lambda: decode_feedback(listener.frames[-1].payload).battery == 9, 'an empty battery'
-    )
+    listener.until(lambda: read_state(listener.frames[-1]).battery == 9, 'an empty battery')
     wrong = fault('fire')
     assert (wrong.success, 'there are drop, flip' in wrong.message) == (False, True)
     wrong = fault('drop', 'rate=7')

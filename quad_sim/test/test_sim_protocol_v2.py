@@ -8,6 +8,7 @@ from itertools import pairwise
 import math
 from pathlib import Path
 import struct
+from types import SimpleNamespace
 
 import pytest
 from sim_serial import Listener, serve
@@ -15,8 +16,6 @@ from sim_virtual import VirtualRobot
 
 from quad_hardware.protocol import (
     Code,
-    decode_feedback,
-    Feedback,
     Frame,
     Kind,
     MOTOR_ORDER,
@@ -26,18 +25,19 @@ from quad_hardware.protocol import (
     V1,
     V2,
 )
+from quad_state_frames import read_state
 
 KINEMATIC = ('--physics', 'none', '--noise', 'none')
 FEEDBACK_ON = Frame(Kind.WRITE, Code.FEEDBACK, b'\x01')
 FEEDBACK_OFF = Frame(Kind.WRITE, Code.FEEDBACK, b'\x00')
 
 
-def states(frames: list[Frame]) -> list[Feedback]:
+def states(frames: list[Frame]) -> list[SimpleNamespace]:
     """Decode the states among frames."""
-    return [decode_feedback(frame.payload) for frame in frames if frame.kind is Kind.PUSH]
+    return [read_state(frame) for frame in frames if frame.kind is Kind.PUSH]
 
 
-def last_state(robot: VirtualRobot) -> Feedback:
+def last_state(robot: VirtualRobot) -> SimpleNamespace:
     """Return a state that was measured from now on."""
     robot.send(FEEDBACK_ON)
     return states(robot.run(0.05))[-1]
@@ -199,7 +199,7 @@ def test_a_standing_robots_state_is_that_of_the_physics() -> None:
     """Attitude, specific force, servo angles, loads and battery have their sizes and units."""
     robot = VirtualRobot('--start', 'stand', '--noise', 'none')
     state = last_state(robot)
-    assert state.attitude == pytest.approx((0, 0, 0), abs=0.5)
+    assert state.euler2 == pytest.approx((0, 0, 0), abs=0.5)
     assert state.acceleration == pytest.approx((0, 0, 9.81), abs=0.1)
     for leg in (1, 2, 3, 4):
         calf, thigh, hip = (state.position[slot_of(10 * leg + digit)] for digit in (1, 2, 3))
@@ -221,7 +221,7 @@ def test_a_push_shows_in_the_states() -> None:
     robot.simulation.plant.kick((0.0, 0.6, 0.0))
     felt = states(robot.run(0.3))
     assert max(abs(state.acceleration[1]) for state in felt) > 2.0
-    assert max(abs(state.attitude[0]) for state in felt) > 0.5
+    assert max(abs(state.euler2[0]) for state in felt) > 0.5
 
 
 @pytest.mark.slow

@@ -8,10 +8,12 @@ A dialect is a state machine without clock, thread or port: time comes in, bytes
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Generic, TypeVar
+
+from quad_description.rotations import Vector
 
 from ..protocol import ParserCounters, Protocol
 from ..report import Report
@@ -136,3 +138,9 @@ class Dialect(ABC, Generic[Received]):
     @abstractmethod
     def handle_frame(self, frame: Received, now: float) -> Report | None:
         """Take a frame of the robot; return the report that it completes, if any."""
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Return three numbers as a vector."""
+    x, y, z = values
+    return x, y, z

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import math
 from statistics import median_high
 
-from quad_description.rotations import Vector
-
 from ..protocol import (
     ANGLE_SPANS,
     BULK_READ_ORDER,
@@ -31,7 +29,7 @@ from ..protocol import (
     V1,
 )
 from ..report import Report
-from .dialect import Dialect, Step
+from .dialect import Dialect, Step, vector
 from .unseen_servo import FULL_SPEED, MIN_SPEED, UnseenServo
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
@@ -266,11 +264,11 @@ class V1Dialect(Dialect[Frame]):
         return Report(
             arrival=now,
             wire_time=wire_time,
-            attitude=_vector(values['attitude']),
-            acceleration=_vector(values['acceleration']),
+            attitude=vector(values['attitude']),
+            acceleration=vector(values['acceleration']),
             positions={motor: self._spans[motor].decode(byte) for motor, byte in pairs},
             velocities={},
-            rates=_vector(values['rate']),
+            rates=vector(values['rate']),
             # each answer stands for many reports: one damaged answer must not
             battery=float(median_high(self._charges)) if self._charges else None,
             joints_age=now - wire_time / 2 - self._angles_at,
@@ -280,8 +278,3 @@ class V1Dialect(Dialect[Frame]):
 def _on_the_line(payload: bytes) -> float:
     """Return how long the answer with a payload takes [s]."""
     return V1.wire_time(V1.overhead + len(payload))
-
-
-def _vector(values: tuple[float, ...]) -> Vector:
-    x, y, z = values
-    return x, y, z

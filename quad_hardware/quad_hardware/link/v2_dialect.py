@@ -10,8 +10,6 @@ from ..exceptions import CodecError
 from ..protocol import (
     ALL_MOTORS,
     Code,
-    decode_feedback,
-    Feedback,
     Frame,
     Kind,
     MOTOR_ORDER,
@@ -19,7 +17,7 @@ from ..protocol import (
     V2,
 )
 from ..report import Report
-from .dialect import Dialect, Step
+from .dialect import Dialect, Step, vector
 
 REQUEST_PERIOD = 0.3  # [s] of silence after which the robot is asked to push its state
 _SERVOS = V2.functions[Code.SERVOS]
@@ -63,7 +61,7 @@ class V2Dialect(Dialect[Frame]):
 
     def command(self, angles: Mapping[int, float]) -> None:
         """Set the angles that are sent at the next step, in one frame."""
-        payload = _SERVOS.pack_groups(list(angles.items()))
+        payload = _SERVOS.pack(motor=angles, angle=angles.values())
         self._pending = Frame(Kind.WRITE, Code.SERVOS, payload).encode(V2)
 
     def torque(self, *, on: bool) -> None:
@@ -90,13 +88,13 @@ class V2Dialect(Dialect[Frame]):
         if frame.kind is not Kind.PUSH or frame.address != STATE.address:
             return None
         try:
-            feedback = decode_feedback(frame.payload)
+            values = STATE.unpack(frame.payload)
         except CodecError:
             self._counters.unusable += 1
             return None
-        self._count(feedback.sequence)
+        self._count(int(values['sequence'][0]))
         self._request_at = now + REQUEST_PERIOD
-        return _report(feedback, now)
+        return _report(values, now)
 
     def handle_sent(self, frame: Frame, now: float) -> Mapping[int, float]:
         """Return the angles of a servo frame that was sent."""
@@ -117,17 +115,22 @@ class V2Dialect(Dialect[Frame]):
         self._sequence = sequence
 
 
-def _report(feedback: Feedback, now: float) -> Report:
+def _report(values: Mapping[str, tuple[float, ...]], now: float) -> Report:
+    (voltage,), (device_time,) = values['battery_voltage'], values['device_time']
+    by_motor = {
+        name: dict(zip(MOTOR_ORDER, values[name], strict=True))
+        for name in ('position', 'velocity', 'temperature')
+    }
     return Report(
         arrival=now,
         wire_time=STATE_WIRE_TIME,
-        attitude=feedback.attitude,
-        acceleration=feedback.acceleration,
-        positions=dict(zip(MOTOR_ORDER, feedback.position, strict=True)),
-        velocities=dict(zip(MOTOR_ORDER, feedback.velocity, strict=True)),
-        battery=feedback.battery,
-        voltage=feedback.battery_voltage or None,
-        device_time=feedback.device_time / 1000.0,
-        faults=feedback.faults,
-        temperatures=dict(zip(MOTOR_ORDER, feedback.temperature, strict=True)),
+        attitude=vector(values['euler2']),
+        acceleration=vector(values['acceleration']),
+        positions=by_motor['position'],
+        velocities=by_motor['velocity'],
+        battery=values['battery'][0],
+        voltage=voltage or None,
+        device_time=device_time / 1000.0,
+        faults=int(values['faults'][0]),
+        temperatures=by_motor['temperature'],
     )

@@ -23,7 +23,7 @@ from quad_description.rotations import Vector
 from ..exceptions import LinkError
 from ..protocol import MOTOR_ORDER, ParserCounters, Protocol, V2
 from ..report import Report
-from .dialect import Dialect, Step
+from .dialect import Dialect, Step, vector
 from .port import CHUNK
 from .v2_dialect import REQUEST_PERIOD, STATE_WIRE_TIME
 
@@ -279,7 +279,7 @@ class VendorDialect(Dialect[object]):
             return Report(
                 arrival=now,
                 wire_time=STATE_WIRE_TIME,
-                attitude=_vector(_number(frame, name) for name in ('roll', 'pitch', 'yaw')),
+                attitude=vector(_number(frame, name) for name in ('roll', 'pitch', 'yaw')),
                 acceleration=_acceleration(frame),
                 positions=self._by_motor(frame, 'joint_pos_deg'),
                 velocities=self._by_motor(frame, 'joint_vel_deg_s'),
@@ -301,10 +301,5 @@ def _acceleration(state: object) -> Vector | None:
     name = next((name for name in _ACCELERATIONS if hasattr(state, name)), None)
     if name is None:
         return None
-    acceleration = _vector(float(number) for number in getattr(state, name))
+    acceleration = vector(float(number) for number in getattr(state, name))
     return acceleration if any(acceleration) else None  # no accelerometer on earth reads zero
-
-
-def _vector(values: Iterable[float]) -> Vector:
-    x, y, z = values
-    return x, y, z

@@ -10,7 +10,6 @@ The driver, the simulated robot, ``xgo_lib2`` and the protocol page all read the
             port.write(Frame(Kind.REPLY, frame.address, b'\x55').encode(V1))
 """
 
-from .feedback import decode_feedback, Feedback
 from .frame import checksum, Frame, ParserCounters, StreamParser
 from .function_table import ALL_MOTORS, Code, Fault, Refusal, STATE, V2
 from .motors import (
@@ -67,7 +66,6 @@ __all__ = [
     'Access',
     'Code',
     'Fault',
-    'Feedback',
     'Field',
     'Frame',
     'Function',
@@ -82,7 +80,6 @@ __all__ = [
     'StreamParser',
     'Torque',
     'checksum',
-    'decode_feedback',
     'model_of_firmware',
     'scatter',
     'slot_of',

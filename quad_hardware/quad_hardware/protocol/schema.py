@@ -8,9 +8,10 @@ change of the layout is a change of one row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum, Flag, IntEnum
+from itertools import chain
 import math
 import struct
 
@@ -98,40 +99,24 @@ class Field:
     scale: float = 1.0  # unit of one step on the wire, for integers
     unit: str = ''  # unit of the value
     meaning: str = ''  # for the protocol page
-    layout: str = field(init=False)  # format of the run for :mod:`struct`
-
-    def __post_init__(self) -> None:
-        """Make the format once: states are decoded 50 times a second."""
-        order, letter = self.scalar.value
-        object.__setattr__(self, 'layout', f'{order}{self.count}{letter}')
 
     @property
     def size(self) -> int:
         """Size of the whole run [B]."""
         return self.scalar.size * self.count
 
-    def pack(self, values: Iterable[float]) -> bytes:
-        """Encode a run.
+    def steps(self, values: Iterable[float]) -> tuple[float, ...]:
+        """Return values of one run or more as the numbers on the wire.
 
         Raises:
-            CodecError: A wrong number of values, or one that does not fit.
+            CodecError: A wrong number of values.
         """
         numbers = tuple(values)
-        if len(numbers) != self.count:
+        if not numbers or len(numbers) % self.count:
             raise CodecError(f'{self.name}: {len(numbers)} values given, {self.count} needed')
-        try:
-            if self.scalar is Scalar.F32:
-                return struct.pack(self.layout, *numbers)
-            steps = (round(value / self.scale) for value in numbers)
-            return struct.pack(self.layout, *steps)
-        except (struct.error, ValueError, OverflowError) as error:
-            raise CodecError(
-                f'{self.name}: {numbers} does not fit {self.scalar.name} in steps of {self.scale}'
-            ) from error
-
-    def unpack(self, payload: bytes, start: int = 0) -> tuple[float, ...]:
-        """Decode the run of a payload that begins at a byte of a larger one."""
-        return self.scaled(struct.unpack_from(self.layout, payload, start + self.offset))
+        if self.scalar is Scalar.F32:
+            return numbers
+        return tuple(round(value / self.scale) for value in numbers)
 
     def scaled(self, numbers: tuple[float, ...]) -> tuple[float, ...]:
         """Return numbers of the wire in the unit of the value."""
@@ -156,23 +141,22 @@ class Function:
     unit: str = ''  # unit of the spans
     variable: bool = False  # payloads may also be shorter
     length: int = field(init=False)  # length of a payload, or of one group of it [B]
-    # byte order of the numbers for :mod:`struct`; empty where they are mixed
-    order: str = field(init=False)
+    order: str = field(init=False)  # byte order of the numbers for :mod:`struct`
     # format of the whole payload, or of one group of it, without the order
     layout: str = field(init=False)
 
     def __post_init__(self) -> None:
         """Add up the length and the format once: states come and targets go 50 times a second."""
-        orders = {part.layout[0] for part in self.fields}
         layout, end = '', 0
         for part in self.fields:
             if part.offset < end:
                 raise ValueError(f'{self.name}: {part.name} begins inside the field before it')
-            layout += f'{part.offset - end}x{part.layout[1:]}'
+            layout += f'{part.offset - end}x{part.count}{part.scalar.value[1:]}'
             end = part.offset + part.size
+        (order,) = {part.scalar.value[0] for part in self.fields}  # all numbers have one
         length = max(self.size, end)
         object.__setattr__(self, 'length', length)
-        object.__setattr__(self, 'order', orders.pop() if len(orders) == 1 else '')
+        object.__setattr__(self, 'order', order)
         object.__setattr__(self, 'layout', f'{layout}{length - end}x')
 
     def accepts(self, length: int) -> bool:
@@ -182,38 +166,30 @@ class Function:
         return 0 < length <= self.length if self.variable else length == self.length
 
     def pack(self, **values: Iterable[float]) -> bytes:
-        """Encode one payload (one group of it, where the fields are repeated).
+        """Encode a payload; of repeated fields, each has the values of all groups.
 
         Raises:
             CodecError: A field is missing or unknown, or its values do not fit.
         """
-        wrong = values.keys() ^ {f.name for f in self.fields}
-        if wrong:
+        if wrong := values.keys() ^ {part.name for part in self.fields}:
             raise CodecError(f'{self.name}: {", ".join(sorted(wrong))} missing or unknown')
-        payload = bytearray(self.length)
-        for part in self.fields:
-            payload[part.offset : part.offset + part.size] = part.pack(values[part.name])
-        return bytes(payload)
-
-    def pack_groups(self, groups: Sequence[Sequence[float]]) -> bytes:
-        """Encode several groups of a repeated function in one go.
-
-        Args:
-            groups: One value for each field, in their order; every field is one number.
-
-        Raises:
-            CodecError: A value does not fit.
-        """
-        steps = [None if part.scalar is Scalar.F32 else part.scale for part in self.fields]
+        given = {part.name: tuple(values[part.name]) for part in self.fields}
         try:
+            runs = [(part.count, part.steps(given[part.name])) for part in self.fields]
+            groups = {len(steps) // count for count, steps in runs}
+            if len(groups) > 1 or (groups != {1} and not self.repeated):
+                raise CodecError(f'{self.name}: {given} are not as many as its fields')
             numbers = [
-                value if step is None else round(value / step)
-                for group in groups
-                for value, step in zip(group, steps, strict=True)
+                number
+                for group in range(*groups)
+                for count, steps in runs
+                for number in steps[group * count : (group + 1) * count]
             ]
-            return struct.pack(self.order + len(groups) * self.layout, *numbers)
+            return struct.pack(self.order + self.layout * groups.pop(), *numbers)
         except (struct.error, ValueError, OverflowError) as error:
-            raise CodecError(f'{self.name}: {groups} do not fit its fields') from error
+            if isinstance(error, CodecError):
+                raise
+            raise CodecError(f'{self.name}: {given} do not fit its fields') from error
 
     def unpack(self, payload: bytes) -> dict[str, tuple[float, ...]]:
         """Decode a payload; repeated fields are run together over all groups.
@@ -223,21 +199,11 @@ class Function:
         """
         if not self.accepts(len(payload)) or len(payload) % self.length:
             raise CodecError(f'{self.name}: payload of {len(payload)} bytes, not {self.length}')
-        if len(payload) == self.length:
-            return self._unpack_whole(payload)
-        starts = range(0, len(payload), self.length)
-        return {
-            part.name: tuple(v for start in starts for v in part.unpack(payload, start))
-            for part in self.fields
-        }
-
-    def _unpack_whole(self, payload: bytes) -> dict[str, tuple[float, ...]]:
-        if not self.order:
-            return {part.name: part.unpack(payload) for part in self.fields}
-        numbers = struct.unpack(self.order + self.layout, payload)
+        groups = list(struct.iter_unpack(self.order + self.layout, payload))
         values, at = {}, 0
         for part in self.fields:
-            values[part.name] = part.scaled(numbers[at : at + part.count])
+            runs = (group[at : at + part.count] for group in groups)
+            values[part.name] = part.scaled(tuple(chain.from_iterable(runs)))
             at += part.count
         return values
 

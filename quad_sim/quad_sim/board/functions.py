@@ -9,7 +9,7 @@ import math
 
 from quad_description.rotations import Vector
 from quad_hardware import CodecError
-from quad_hardware.protocol import Access, Code, Feedback, Frame, Kind, Refusal, V2
+from quad_hardware.protocol import Access, Code, Frame, Kind, Refusal, STATE, V2
 
 from ..plant.state import Measurement
 from .board import Board
@@ -76,9 +76,9 @@ class Functions:
         self._next_push += self._period
         if self._next_push < now:  # held up: go on from here, do not send a burst
             self._next_push = now + self._period
-        frame = self._state(self._board.measure()).frame()
+        state = STATE.pack(**self._state(self._board.measure()))
         self._sequence = (self._sequence + 1) % _COUNT
-        return frame
+        return Frame(Kind.PUSH, STATE.address, state)
 
     def _carry_out(self, frame: Frame) -> Frame | None:
         function = V2.functions.get(frame.address)
@@ -149,23 +149,23 @@ class Functions:
         if motor not in self._board.servos.fitted:
             raise RefusedError(Refusal.WRONG_VALUE)
 
-    def _state(self, measured: Measurement) -> Feedback:
+    def _state(self, measured: Measurement) -> Values:
         board, servos = self._board, self._board.servos
-        return Feedback(
-            battery=board.battery.percent,
-            mode=board.mode,
-            faults=board.faults,
-            device_time=int(board.uptime * 1000.0) % _CLOCK,
-            attitude=board.attitude(measured),
-            raw_attitude=_unfused(measured),
-            acceleration=measured.imu.specific_force,
-            position=servos.angles(measured),
-            velocity=servos.speeds(measured),
-            load=board.loads(measured),
-            temperature=board.temperatures,
-            battery_voltage=board.battery.voltage,
-            sequence=self._sequence,
-        )
+        return {
+            'battery': (board.battery.percent,),
+            'mode': (board.mode,),
+            'faults': (board.faults,),
+            'device_time': (int(board.uptime * 1000.0) % _CLOCK,),
+            'euler1': _unfused(measured),
+            'euler2': board.attitude(measured),
+            'acceleration': measured.imu.specific_force,
+            'position': servos.angles(measured),
+            'velocity': servos.speeds(measured),
+            'load': board.loads(measured),
+            'temperature': board.temperatures,
+            'battery_voltage': (board.battery.voltage,),
+            'sequence': (self._sequence,),
+        }
 
 
 def _unfused(measured: Measurement) -> Vector:
