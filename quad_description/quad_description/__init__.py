@@ -24,7 +24,7 @@ from .kinematics.leg import FEET, foot_position, jacobian, LegGeometry, LEGS, Le
 from .kinematics.quadruped import Feet, FootPose, Quadruped, quadruped, raised_feet, Targets
 from .poses import Pose, pose_positions, STREAM_TIMEOUT
 from .presets import PRESETS, robot_urdf
-from .state import ImuSample, JointSample, RobotState
+from .state import ContactSource, ImuSample, JointSample, OdometryState, RobotState
 from .urdf import Joint, JointLimits, movable_joints
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     'PRESETS',
     'STREAM_TIMEOUT',
     'Backend',
+    'ContactSource',
     'DescriptionError',
     'Feet',
     'FootPose',
@@ -42,6 +43,7 @@ __all__ = [
     'JointSample',
     'LegGeometry',
     'LegSolution',
+    'OdometryState',
     'Pose',
     'PresetError',
     'Quadruped',

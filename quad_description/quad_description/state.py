@@ -4,19 +4,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
 import math
 
 from .rotations import (
+    about_z,
+    conjugate,
     down_in_body,
+    multiply,
     normalized,
     Quaternion,
     roll_pitch_yaw,
+    rotate,
     tilt_of,
     Vector,
+    yaw_of,
 )
 
+DRIFT = 0.07  # share of the way that is the standard deviation of the position
+MIN_VARIANCE = 1e-4  # [m²]
 NORM_TOLERANCE = 0.1  # of a quaternion's length; beyond it the message is no orientation
 MAX_DEVIATION = 0.35  # [rad] of an orientation that may be acted upon
 
@@ -93,6 +101,40 @@ class ImuSample:
         return tilt_of(normalized(self.orientation))
 
 
+class ContactSource(Enum):
+    """How it is known which feet stand."""
+
+    COMMANDED_HEIGHT = 'commanded_height'  # where they were sent lowest, a servo's lag ago
+    MEASURED_HEIGHT = 'measured_height'  # lowest by joints and attitude: there are no commands
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryState:
+    """Where the body is, in the frame in which it began."""
+
+    x: float  # position of base_link [m]
+    y: float  # position of base_link [m]
+    height: float  # of base_link above the ground [m]
+    rotation: Quaternion  # from base_link to odom, (x, y, z, w); it began with yaw zero
+    velocity_x: float  # forward, in base_link turned level [m/s]
+    velocity_y: float  # to the left, in base_link turned level [m/s]
+    distance: float  # way so far [m]
+    # feet that are taken to stand, in the order of :data:`.FEET`
+    standing: tuple[bool, ...]
+    contact_source: ContactSource  # how that is known
+
+    @property
+    def velocity_in_base(self) -> Vector:
+        """Velocity over the ground in base_link [m/s]."""
+        level = multiply(about_z(-yaw_of(self.rotation)), self.rotation)
+        return rotate(conjugate(level), (self.velocity_x, self.velocity_y, 0.0))
+
+    @property
+    def position_variance(self) -> float:
+        """Variance of x and y [m²], which grows with the way."""
+        return MIN_VARIANCE + (DRIFT * self.distance) ** 2
+
+
 @dataclass(frozen=True, slots=True)
 class RobotState:
     """State of a robot, as far as it is new; what every back end observes."""
@@ -103,10 +145,17 @@ class RobotState:
     battery: float | None = None  # charge 0 to 1, None while it is unknown
     # of base_link in the world in [m]; None where the back end does not know it
     position: Vector | None = None
-    # of base_link in its own frame in [m/s]; None where nobody estimates it
+    # of base_link in its own frame in [m/s]; None where it is not estimated
     linear_velocity: Vector | None = None
-    # which feet are on the ground, in the order of :data:`.FEET`; None where nobody estimates it
+    # which feet are on the ground, in the order of :data:`.FEET`; None where it is not estimated
     foot_contacts: tuple[bool, ...] | None = None
     # when it was measured, on the clock of the back end in [s]; the joints may have been measured
     # before
     time: float = 0.0
+    # way over the ground by the legs; None without an attitude, and where it is not estimated
+    odometry: OdometryState | None = None
+    imu_problem: str = ''  # why the IMU is of no use; empty while it works
+    voltage: float | None = None  # of the battery in [V]; None where it is not reported
+    faults: int = 0  # bits that the board reports
+    # of the servos in [°C], by motor id; empty where they are not reported
+    temperatures: Mapping[int, float] = field(default_factory=dict)

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 import logging
 from pathlib import Path
 import threading
@@ -13,7 +12,7 @@ import time
 
 from quad_description import Backend, movable_joints, RecordedBackend, RobotState
 
-from .estimation import EstimatorSettings, ImuMounting, OdometryState
+from .estimation import EstimatorSettings, ImuMounting
 from .exceptions import CommandError, NoAnswerError, RecordingError
 from .joints import JointMap, servo_of
 from .link import LinkOptions, LinkState, STALE_TIME
@@ -57,13 +56,9 @@ def recorded_in(log: Path, urdf: str, *, imu_checked: bool = False) -> RecordedB
         OSError: It cannot be read.
     """
     states: list[RobotState] = []
-
-    def keep(state: RobotState) -> None:
-        states.append(_located(state, robot.update_odometry(state)))
-
     robot = ReplayedRobot(
         _settings_of(LinkOptions(str(log)), urdf, imu_checked=imu_checked),
-        on_state=keep,
+        on_state=states.append,
         on_change=lambda state, detail: _log.info('%s: %s', state.value, detail),
         on_refusal=_log.warning,
     )
@@ -157,7 +152,6 @@ class SerialBackend(Backend):
     # -- in the thread of the driver
 
     def _take(self, state: RobotState) -> None:
-        state = _located(state, self._robot.update_odometry(state))
         with self._arrived:
             self._state, self._count = state, self._count + 1
             self._arrived.notify_all()
@@ -189,15 +183,3 @@ def _settings_of(link: LinkOptions, urdf: str, *, imu_checked: bool) -> RobotSet
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     mounting = ImuMounting(checked=imu_checked, rates_checked=imu_checked)
     return RobotSettings(link, urdf, joints, estimator=EstimatorSettings(mounting=mounting))
-
-
-def _located(state: RobotState, odometry: OdometryState | None) -> RobotState:
-    """Return a state with what is known of the body and its feet by the odometry."""
-    if odometry is None:
-        return state
-    return replace(
-        state,
-        position=(odometry.x, odometry.y, odometry.height),
-        linear_velocity=odometry.velocity_in_base,
-        foot_contacts=odometry.standing,
-    )

@@ -5,46 +5,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 import math
 from typing import Any
 
 from quad_description import RobotState
 
-from .estimation import Estimator, Health, OdometryState
 from .exceptions import RecordingError
-from .link import Dialect, DialectCounters, LinkState, LinkStatus, make_dialect, QUIET_TIME
-from .protocol import (
-    Frame,
-    HOST_KINDS,
-    LEG_MOTORS,
-    ParserCounters,
-    PROTOCOLS,
-    ROBOT_KINDS,
-    StreamParser,
-    V1,
-)
+from .link import Dialect, LinkState, LinkStatus, make_dialect, QUIET_TIME
+from .protocol import Frame, HOST_KINDS, LEG_MOTORS, PROTOCOLS, ROBOT_KINDS, StreamParser, V1
 from .recording import Entry, Opened, StateEntered, Transfer
-from .report import Report
-from .serial_robot import RobotSettings
+from .serial_robot import ObservedRobot, RobotSettings
 
 
-@dataclass(slots=True)
-class _Conversation:
-    """A robot that was found."""
-
-    opened: Opened  # what it was found as
-    dialect: Dialect[Any]  # how it was talked to
-    robot: StreamParser  # finds frames in what it sent
-    host: StreamParser  # finds frames in what was sent to it
-
-
-class ReplayedRobot:
+class ReplayedRobot(ObservedRobot):
     """Takes what a serial log has; nothing is written to a port, for there is none.
 
     What a :class:`.SerialRobot` decides by looking at bytes is decided anew, by the same parser,
-    dialect and estimation; states of the link are those of the log. Times are those of the log
-    [s].
+    dialect and estimation; states of the link are those of the log, which has no commands that
+    were not sent. Times are those of the log [s].
     """
 
     def __init__(
@@ -55,58 +34,19 @@ class ReplayedRobot:
         on_change: Callable[[LinkState, str], None],
         on_refusal: Callable[[str], None],
     ) -> None:
-        """Begin without a robot.
-
-        Args:
-            on_state: Takes each report as a state in SI units, without the position.
-            on_change: Takes the state of the link when it changes, and its detail.
-            on_refusal: Takes why a report cannot be.
-
-        Raises:
-            CommandError: The legs of the URDF cannot be read.
-        """
-        self.names = settings.joints.names  # joints in the order of the URDF
-        self._settings = settings
-        self._on_state, self._on_change = on_state, on_change
-        self._on_refusal = on_refusal
-        self._estimator = self._new_estimator()
-        self._conversation: _Conversation | None = None
-        self._latest: tuple[Report, RobotState] | None = None
-        self._state, self._detail = LinkState.CONNECTING, 'the log begins'
+        super().__init__(settings, on_state=on_state, on_change=on_change, on_refusal=on_refusal)
+        self._status = LinkStatus(detail='the log begins')
+        self._dialect: Dialect[Any] | None = None  # how the robot was talked to
         self._now = self._bytes_at = 0.0
         self._reported_at = -math.inf
-        self._connections = self._commands = self._refused = 0
-
-    @property
-    def latest(self) -> tuple[Report, RobotState] | None:
-        """The newest report and its state; None while the link does not run."""
-        return self._latest
 
     def status(self) -> LinkStatus:
-        """Return how the link was; commands that were not sent are in no log."""
-        found = self._conversation
-        return LinkStatus(
-            state=self._state,
-            detail=self._detail,
-            protocol=found.opened.protocol if found else '',
-            baud=found.opened.baud if found else 0,
-            firmware=found.opened.firmware if found else '',
-            connections=self._connections,
-            age=self._now - self._reported_at,
-            commands=self._commands,
-            dropped=0,
-            parser=found.robot.counters if found else ParserCounters(),
-            dialect=found.dialect.counters if found else DialectCounters(),
-            refused=self._refused,
-        )
-
-    def health(self) -> Health:
-        """Return how the robot was, by its latest reports."""
-        return self._estimator.health()
-
-    def update_odometry(self, state: RobotState) -> OdometryState | None:
-        """Return where the body was by a state, to be called once for each."""
-        return self._estimator.update_odometry(state)
+        """Return how the link was."""
+        age = self._now - self._reported_at
+        if self._dialect is None:
+            return replace(self._status, age=age)
+        counters = self._received.counters, self._dialect.counters
+        return replace(self._status, age=age, parser=counters[0], dialect=counters[1])
 
     def take(self, entry: Entry, now: float) -> None:
         """Take the next entry of the log.
@@ -125,18 +65,16 @@ class ReplayedRobot:
     def advance(self, now: float) -> None:
         """Let time pass: the rest of a frame may not come any more."""
         self._now = now
-        found = self._conversation
-        if found is not None and found.robot.pending and now - self._bytes_at > QUIET_TIME:
-            self._handle(found.robot.expire(), found.dialect)
+        if self._dialect is None or not self._received.pending:
+            return
+        if now - self._bytes_at > QUIET_TIME:
+            self._handle(self._received.expire(), self._dialect)
 
     def restart(self) -> None:
         """Forget the robot, as the log begins again; time goes on."""
-        self._estimator = self._new_estimator()
-        self._conversation = None
+        self._begin()
+        self._dialect = None
         self._enter(LinkState.CONNECTING, 'the log begins again')
-
-    def _new_estimator(self) -> Estimator:
-        return Estimator(self._settings.urdf, self._settings.joints, self._settings.estimator)
 
     def _open(self, opened: Opened) -> None:
         protocol = next((each for each in PROTOCOLS if each.name == opened.protocol), None)
@@ -148,40 +86,39 @@ class ReplayedRobot:
             )
         if protocol is V1 and opened.model is None:
             raise RecordingError('the line `open` has no model, whose ranges scale protocol v1')
-        self._conversation = _Conversation(
-            opened,
-            make_dialect(opened.model, self._now),
-            StreamParser(protocol, ROBOT_KINDS),
-            StreamParser(protocol, HOST_KINDS),
-        )
-        self._connections += 1
+        self._dialect = make_dialect(opened.model, self._now)
+        self._received = StreamParser(protocol, ROBOT_KINDS)
+        self._sent = StreamParser(protocol, HOST_KINDS)
+        status = self._status
+        status.protocol, status.baud = opened.protocol, opened.baud
+        status.firmware = opened.firmware
+        status.connections += 1
         self._reported_at = self._now
 
     def _enter(self, state: LinkState, detail: str) -> None:
-        self._state, self._detail = state, detail
+        self._status.state, self._status.detail = state, detail
         if state is not LinkState.RUNNING:
-            self._latest = None
+            self.latest = None
         self._on_change(state, detail)
 
     def _transfer(self, transfer: Transfer) -> None:
-        found = self._conversation
-        if found is None:
+        if self._dialect is None:
             raise RecordingError(
                 'the log has bytes before the line `open`, which has their protocol; keep that '
                 'line when you cut a log'
             )
         if transfer.sent:
-            for frame in found.host.feed(transfer.data):
-                self._command(found.dialect, frame)
+            for frame in self._sent.feed(transfer.data):
+                self._command(self._dialect, frame)
             return
         self._bytes_at = self._now
-        self._handle(found.robot.feed(transfer.data), found.dialect)
+        self._handle(self._received.feed(transfer.data), self._dialect)
 
     def _command(self, dialect: Dialect[Any], frame: Frame) -> None:
         """Take a frame that was sent; targets of the legs show which feet stand."""
         angles = dialect.handle_sent(frame, self._now)
         if angles.keys() >= set(LEG_MOTORS):
-            self._commands += 1
+            self._status.commands += 1
             positions = self._settings.joints.positions(angles)
             legs = self.names[: self._settings.joints.leg_count]
             self._estimator.command(self._now, [positions[name] for name in legs])
@@ -189,15 +126,10 @@ class ReplayedRobot:
     def _handle(self, frames: list[Frame], dialect: Dialect[Any]) -> None:
         for frame in frames:
             report = dialect.handle_frame(frame, self._now)
-            if report is not None:
-                self._report(report)
-
-    def _report(self, report: Report) -> None:
-        state = self._estimator.update(report)
-        if state is None:
-            self._refused += 1
-            self._on_refusal(self._estimator.refusal)
-            return
-        self._reported_at = self._now
-        self._latest = report, state
-        self._on_state(state)
+            if report is None:
+                continue
+            if refusal := self._report(report):
+                self._status.refused += 1
+                self._status.refusal = refusal
+            else:
+                self._reported_at = self._now

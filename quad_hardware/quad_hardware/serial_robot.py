@@ -6,25 +6,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 import time
 
 from black_box import BlackBox, BlackBoxSettings
 from quad_description import RobotState
 
-from .estimation import Estimator, EstimatorSettings, Health, OdometryState
+from .estimation import Estimator, EstimatorSettings
 from .exceptions import CommandError
-from .joints import CommandCounters, JointCommander, JointMap, LimiterSettings, LossReaction
+from .joints import JointCommander, JointMap, LimiterSettings, LossReaction
 from .joints.command import NOMINAL_PERIOD
 from .link import Driver, LinkOptions, LinkState, LinkStatus, Session, STALE_TIME
 from .recording import (
     FaultWatch,
     LossWatch,
-    Recorder,
+    Opened,
     SerialLogFile,
     SerialMemory,
     StateEntered,
-    tapped,
 )
 from .report import Report
 
@@ -49,7 +49,60 @@ class RobotSettings:
     serial_log: Path | None = None  # where all bytes are written to as they pass; None for nowhere
 
 
-class SerialRobot:
+class ObservedRobot:
+    """A robot whose reports become states; on a serial line, or in the log of one."""
+
+    def __init__(
+        self,
+        settings: RobotSettings,
+        *,
+        on_state: Callable[[RobotState], None],
+        on_change: Callable[[LinkState, str], None],
+        on_refusal: Callable[[str], None],
+    ) -> None:
+        """Begin without a report.
+
+        Args:
+            on_state: Takes each report as a state in SI units.
+            on_change: Takes the state of the link when it changes, and its detail.
+            on_refusal: Takes why a report cannot be.
+
+        Raises:
+            CommandError: The legs of the URDF cannot be read.
+        """
+        self.names = settings.joints.names  # joints in the order of the URDF
+        # the newest state, None while the link does not run
+        self.latest: RobotState | None = None
+        self._settings = settings
+        self._on_state, self._on_change = on_state, on_change
+        self._on_refusal = on_refusal
+        self._begin()
+
+    def _begin(self) -> None:
+        settings = self._settings
+        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
+
+    @property
+    def gravity_error(self) -> float | None:
+        """Angle between accelerometer and attitude [rad]; None while it is not known."""
+        return self._estimator.gravity_error
+
+    def status(self) -> LinkStatus:
+        """Return how the link is."""
+        raise NotImplementedError
+
+    def _report(self, report: Report) -> str:
+        """Take a report; return why it cannot be."""
+        state = self._estimator.step(report)
+        if state is None:
+            self._on_refusal(self._estimator.refusal)
+            return self._estimator.refusal
+        self.latest = state
+        self._on_state(state)
+        return ''
+
+
+class SerialRobot(ObservedRobot):
     """Composes driver, estimation and the watch over joint commands.
 
     The callbacks are called in the thread of the driver, except ``warn``; everything else may be
@@ -68,20 +121,15 @@ class SerialRobot:
         """Prepare; :meth:`start` opens the port.
 
         Args:
-            on_state: Takes each report as a state in SI units, without the position.
-            on_change: Takes the state of the link when it changes, and its detail.
-            on_refusal: Takes why a report cannot be.
             warn: Takes what is the matter with a command.
 
         Raises:
             CommandError: The legs of the URDF cannot be read.
             RecordingError: The serial log cannot be written.
         """
-        self.names = settings.joints.names  # joints in the order of targets
+        super().__init__(settings, on_state=on_state, on_change=on_change, on_refusal=on_refusal)
+        self._arrived_at = -math.inf  # [s] when the latest report did
         self._joints = settings.joints
-        self._on_state, self._on_change = on_state, on_change
-        self._on_refusal = on_refusal
-        self._estimator = Estimator(settings.urdf, settings.joints, settings.estimator)
         self._commander = JointCommander(
             settings.joints,
             settings.limiter,
@@ -91,9 +139,10 @@ class SerialRobot:
             obstacle=self._obstacle,
             warn=self._warn,
         )
+        self.counters = self._commander.counters  # what became of joint commands
         self._warning = warn
         self._last_note = ''
-        self._recorders: list[Recorder] = []
+        self._recorders: list[SerialMemory | SerialLogFile] = []
         self._log_file: SerialLogFile | None = None
         # writes the last bytes when a fault happens; None without
         self.black_box: BlackBox | None = None
@@ -106,13 +155,7 @@ class SerialRobot:
             self._log_file = SerialLogFile(settings.serial_log)
             self._recorders.append(self._log_file)
         self._losses, self._faults = LossWatch(), FaultWatch()
-        self._driver = Driver(
-            settings.link,
-            self._report,
-            self._link_changed,
-            self._tapped,
-        )
-        self._latest: tuple[Report, RobotState] | None = None  # while the link is running
+        self._driver = Driver(settings.link, self._report, self._link_changed, self._opened)
         # time after the last command at which :meth:`miss_commands` is to be called [s]
         self.timeout = self._commander.timeout
 
@@ -139,35 +182,15 @@ class SerialRobot:
         if self._log_file is not None:
             self._log_file.close()
 
-    # -- what is known of it
-
-    @property
-    def latest(self) -> tuple[Report, RobotState] | None:
-        """The newest report and its state; None while the link does not run."""
-        return self._latest
-
-    @property
-    def counters(self) -> CommandCounters:
-        """What became of joint commands."""
-        return self._commander.counters
-
     def status(self) -> LinkStatus:
         """Return how the link is now."""
         return self._driver.status()
-
-    def health(self) -> Health:
-        """Return how the robot is, by its latest reports."""
-        return self._estimator.health()
-
-    def update_odometry(self, state: RobotState) -> OdometryState | None:
-        """Return where the body is by a state, to be called once for each."""
-        return self._estimator.update_odometry(state)
 
     # -- what may be done to it
 
     def command(self, positions: Sequence[float]) -> bool:
         """Send targets of the first joints [rad], [m]; return whether they were sent."""
-        self._commander.counters.received += 1
+        self.counters.received += 1
         now = time.monotonic()
         command = self._commander.take(positions, self._place(now), now)
         if command is not None:
@@ -176,7 +199,7 @@ class SerialRobot:
 
     def refuse(self, error: CommandError) -> None:
         """Count a command that is none."""
-        self._commander.counters.received += 1
+        self.counters.received += 1
         self._commander.refuse(error)
 
     @property
@@ -190,8 +213,8 @@ class SerialRobot:
         Returns:
             What it does, or why not; empty when there is no hazard.
         """
-        now, latest = time.monotonic(), self._latest
-        imu = latest[1].imu if latest is not None else None
+        now, latest = time.monotonic(), self.latest
+        imu = None if latest is None else latest.imu
         loss = self._commander.miss(self._place(now), None if imu is None else imu.tilt, now)
         if loss:
             self.fault(COMMANDS, loss)
@@ -242,22 +265,24 @@ class SerialRobot:
 
     # -- in the thread of the driver
 
-    def _tapped(self, session: Session) -> Session:
-        return tapped(session, self._recorders) if self._recorders else session
+    def _opened(self, session: Session) -> None:
+        port, protocol = session.port, session.dialect.protocol
+        now, name, model = time.monotonic(), protocol.name, session.model
+        opened = Opened(now, port.path, port.baud, name, session.firmware, model)
+        for recorder in self._recorders:
+            recorder.event(opened)
+        port.recorders = [recorder.transfer for recorder in self._recorders]
 
     def _report(self, report: Report) -> str:
-        """Take a report; return why it cannot be."""
-        state = self._estimator.update(report)
-        if state is None:
-            self._note(LINK, f'report refused: {self._estimator.refusal}')
-            self._on_refusal(self._estimator.refusal)
-            return self._estimator.refusal
-        self._latest = report, state
-        self._on_state(state)
-        if self.black_box is not None:
-            for fault in self._faults.look(report, state, self._estimator.imu_problem):
+        arrived, self._arrived_at = self._arrived_at, report.arrival
+        refusal = super()._report(report)
+        if refusal:
+            self._arrived_at = arrived
+            self._note(LINK, f'report refused: {refusal}')
+        elif self.black_box is not None and self.latest is not None:
+            for fault in self._faults.check(report, self.latest):
                 self.black_box.fault(ROBOT, fault)
-        return ''
+        return refusal
 
     def _link_changed(self, state: LinkState, detail: str) -> None:
         entered = StateEntered(time.monotonic(), state, detail)
@@ -266,7 +291,7 @@ class SerialRobot:
         keep = self.fault if self._losses.is_lost(state) else self._note
         keep(LINK, f'{state.value}: {detail}')
         if state is not LinkState.RUNNING:
-            self._latest = None  # the robot may be moved while nobody sees it
+            self.latest = None  # the robot may be moved while nobody sees it
             self._commander.lose()
         self._on_change(state, detail)
 
@@ -284,8 +309,7 @@ class SerialRobot:
 
     def _place(self, now: float) -> dict[str, float]:
         """Return where the joints are [rad], [m]; empty when the robot was not seen lately."""
-        latest = self._latest
-        if latest is None or now - latest[0].arrival > STALE_TIME:
+        latest = self.latest
+        if latest is None or latest.joints is None or now - self._arrived_at > STALE_TIME:
             return {}
-        joints = latest[1].joints
-        return {} if joints is None else joints.measured(self.names)
+        return latest.joints.measured(self.names)

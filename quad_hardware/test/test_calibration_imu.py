@@ -143,7 +143,7 @@ def test_reports_are_published_for_the_body(mounting: ImuMounting) -> None:
         positions=dict.fromkeys(LEG_MOTORS, 0.0),
         velocities=dict.fromkeys(LEG_MOTORS, 0.0),
     )
-    state = estimator.update(reported)
+    state = estimator.step(reported)
     assert state is not None
     assert state.imu is not None
     assert state.imu.down == pytest.approx(down_in_body(body), abs=1e-6)

@@ -61,7 +61,7 @@ def test_a_robot_that_is_well_gets_no_remedy() -> None:
         ({'joints': NAMES[1:]}, 'joints', Severity.ERROR, 'fl_hip_joint'),
         ({'joints': (*NAMES, 'tail')}, 'joints', Severity.ERROR, 'tail'),
         ({'urdf': ''}, 'robot_description', Severity.WARNING, 'robot_state_publisher'),
-        ({'urdf': '<robot'}, 'robot_description', Severity.ERROR, 'not XML'),
+        ({'urdf': '<robot'}, 'robot_description', Severity.ERROR, 'no XML'),
         ({'parents': {'base_link': 'odom'}}, 'tf', Severity.ERROR, 'fl_foot'),
         (
             {'publishers': {'joint_command': ['controller_node', 'other']}},

@@ -26,7 +26,6 @@ from quad_description.rotations import (
     Vector,
 )
 from quad_hardware.estimation import (
-    Battery,
     BoardWatch,
     Estimator,
     EstimatorSettings,
@@ -35,11 +34,12 @@ from quad_hardware.estimation import (
 )
 from quad_hardware.estimation.filters import (
     AttitudeRate,
-    BatteryFilter,
     CHARGE_REPORTS,
+    FULL,
     gravity_from_acceleration,
     GravityCheck,
     JointRate,
+    MedianFilter,
 )
 from quad_hardware.estimation.plausibility import MAX_REFUSALS, Plausibility, SampleClock
 from quad_hardware.joints import JointMap, servo_of
@@ -86,7 +86,7 @@ def test_signs_are_checked_when_those_of_the_gyro_are(
     urdf = robot_urdf('lite')
     joints = JointMap(map(servo_of, movable_joints(urdf)))
     settings = EstimatorSettings(rate_source=source, mounting=mounting)
-    state = Estimator(urdf, joints, settings).update(replace(STATE, rates=gyro))
+    state = Estimator(urdf, joints, settings).step(replace(STATE, rates=gyro))
     assert state is not None
     assert state.imu is not None
     assert state.imu.is_uncertain is not checked
@@ -210,15 +210,10 @@ def test_reports_that_were_held_up_keep_their_times() -> None:
 
 def test_one_damaged_report_does_not_empty_the_battery() -> None:
     """Nor a charge that cannot be; a battery that is low is reported within half a second."""
-    battery = BatteryFilter()
-    battery.take(STATE)
-    assert battery.state == Battery()
-    for charge in (80.0, 80.0, 3.0, 200.0, 80.0):
-        battery.take(replace(STATE, battery=charge, voltage=7.4))
-    assert battery.state == Battery(80.0, 7.4)
-    for _ in range(CHARGE_REPORTS):
-        battery.take(replace(STATE, battery=5.0))
-    assert battery.state.charge == 5.0
+    charge = MedianFilter()
+    assert charge.take(None, FULL) is None
+    assert [charge.take(value, FULL) for value in (80.0, 80.0, 3.0, 200.0, 80.0)] == [80.0] * 5
+    assert [charge.take(5.0, FULL) for _ in range(CHARGE_REPORTS)][-1] == 5.0
 
 
 @pytest.mark.parametrize(
@@ -302,7 +297,7 @@ def test_a_joint_that_is_not_reported_is_where_it_was_sent() -> None:
     estimator.command(0.0, targets[:12])
     estimator.command(0.0, targets)
     estimator.command(0.0, [0.0] * 12)
-    state = estimator.update(STATE)
+    state = estimator.step(STATE)
     assert state is not None
     assert state.joints is not None
     assert state.joints.unmeasured == tuple(range(12, len(joints.names)))

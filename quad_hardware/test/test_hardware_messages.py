@@ -21,7 +21,16 @@ from sensor_msgs.msg import Imu
 from tf2_msgs.msg import TFMessage
 
 from message_templates import MessageTemplate, SerializedTemplate
-from quad_description import FEET, ImuSample, JointSample, movable_joints, robot_urdf
+from quad_description import (
+    ContactSource,
+    FEET,
+    ImuSample,
+    JointSample,
+    movable_joints,
+    OdometryState,
+    robot_urdf,
+    RobotState,
+)
 from quad_description.rotations import (
     from_rpy,
     IDENTITY,
@@ -31,11 +40,10 @@ from quad_description.rotations import (
     yaw_of,
 )
 from quad_description.rotations import Quaternion as Rotation
-from quad_hardware.estimation import Battery, Estimator, EstimatorSettings, Health, OdometryState
+from quad_hardware.estimation import Estimator, EstimatorSettings
 from quad_hardware.estimation.imu_mounting import UNCHECKED_DEVIATION
-from quad_hardware.estimation.odometry import ContactSource
 from quad_hardware.joints import CommandCounters, JointMap, servo_of
-from quad_hardware.link import DialectCounters, LinkState, LinkStatus
+from quad_hardware.link import LinkState, LinkStatus
 from quad_hardware.nodes import messages, robot_topics
 from quad_hardware.nodes.diagnostics import (
     command_diagnostic,
@@ -60,8 +68,8 @@ ROTATIONS = st.builds(from_rpy, *[st.floats(-1.2, 1.2)] * 3)
 @given(ROTATIONS, st.sampled_from([FRAMES, PARENT]))
 def test_both_trees_put_frames_at_the_same_place(rotation: Rotation, frames: Frames) -> None:
     """base_link where odometry has it; base_footprint below it on the ground, level."""
-    numbers = messages.transforms_numbers(replace(PLACE, rotation=rotation), frames)
-    first, second = messages.transforms_template(frames).message(STAMP, numbers).transforms
+    template, numbers = messages.transforms(replace(PLACE, rotation=rotation), frames)
+    first, second = template.message(STAMP, numbers).transforms
     chain = {first.child_frame_id: pose(first.transform)}
     (x, y, z), turn = pose(first.transform)
     offset, further = pose(second.transform)
@@ -89,8 +97,8 @@ def pose(transform: Transform) -> tuple[Vector, Rotation]:
 def test_joints_keep_their_order() -> None:
     """Each velocity stands beside its name; efforts, and joints not measured, are left out."""
     joints = JointSample((0.1, 0.5, 0.2), (1.0, 0.0, 2.0), unmeasured=(1,))
-    template = messages.joint_states_template(('b', 'arm', 'a'), joints)
-    message = template.message(STAMP, messages.joint_numbers(joints))
+    template, numbers = messages.joint_states(('b', 'arm', 'a'), joints)
+    message = template.message(STAMP, numbers)
     assert message.name == ['b', 'a']
     assert list(message.position) == [0.1, 0.2]
     assert list(message.velocity) == [1.0, 2.0]
@@ -99,15 +107,14 @@ def test_joints_keep_their_order() -> None:
 
 def imu(sample: ImuSample) -> Imu:
     """The message of a sample."""
-    template = messages.imu_template(sample, DEVIATIONS, 'imu_link')
-    message: Imu = template.message(STAMP, messages.imu_numbers(sample))
+    template, numbers = messages.imu(sample, DEVIATIONS, 'imu_link')
+    message: Imu = template.message(STAMP, numbers)
     return message
 
 
 def odometry(state: OdometryState, frames: Frames) -> Odometry:
     """The message of a place."""
-    template = messages.odometry_template(IMU, DEVIATIONS, frames)
-    numbers = messages.odometry_numbers(IMU, state, frames)
+    template, numbers = messages.odometry(IMU, state, DEVIATIONS, frames)
     message: Odometry = template.message(STAMP, numbers)
     return message
 
@@ -131,9 +138,9 @@ def test_joints_are_stamped_when_they_were_measured(monkeypatch: pytest.MonkeyPa
     clock = SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=100_000_000_000))
     node: Any = SimpleNamespace(create_publisher=create_publisher, get_clock=lambda: clock)
     estimator = Estimator(urdf, joints, EstimatorSettings())
-    robot: Any = SimpleNamespace(names=joints.names, update_odometry=estimator.update_odometry)
+    robot: Any = SimpleNamespace(names=joints.names)
     monkeypatch.setattr(robot_topics, 'time', SimpleNamespace(monotonic=lambda: 5.5))
-    measured = estimator.update(state)
+    measured = estimator.step(state)
     assert measured is not None
     robot_topics.RobotTopics(node, robot, FRAMES, DEVIATIONS).publish(measured)
     assert stamps.pop('joint_states') == pytest.approx(99.492)
@@ -176,15 +183,21 @@ def test_odometry_is_less_sure_the_farther_it_went() -> None:
     assert (level.child_frame_id, level.pose.pose.position.z) == ('base_footprint', 0.0)
 
 
+def joint_template(count: int) -> messages.Template:
+    """Return the template of joint states."""
+    return messages.joint_states(tuple('abcdefghijkl'[:count]), JointSample((0.0,) * count, ()))[0]
+
+
+BARE = replace(IMU, angular_velocity=None, acceleration=None)
 FORMS: list[MessageTemplate] = [
-    messages.JointStates(('a',)),
-    messages.JointStates(tuple('abcdefghijkl')),
-    messages.ImuTemplate('imu_link', 0.02, 0.3, 0.15),
-    messages.ImuTemplate('', 0.02, None, None),
-    messages.OdometryTemplate('odom', 'base_link', 0.02, 0.1),
-    messages.OdometryTemplate('o', 'a longer name', 0.02, None),
-    messages.transforms_template(FRAMES),
-    messages.transforms_template(PARENT),
+    joint_template(1),
+    joint_template(12),
+    messages.imu(IMU, DEVIATIONS, 'imu_link')[0],
+    messages.imu(BARE, DEVIATIONS, '')[0],
+    messages.odometry(IMU, PLACE, DEVIATIONS, FRAMES)[0],
+    messages.odometry(BARE, PLACE, DEVIATIONS, replace(FRAMES, base='a longer name'))[0],
+    messages.transforms(PLACE, FRAMES)[0],
+    messages.transforms(PLACE, PARENT)[0],
 ]
 
 
@@ -206,15 +219,15 @@ def test_every_form_takes_its_numbers(
 def test_each_source_of_contacts_is_one_of_the_message(source: ContactSource) -> None:
     """By the name of its constant; those who subscribe compare with that."""
     assert getattr(FootContacts, source.name) == source.value
-    odometry = replace(PLACE, contact_source=source)
-    message = messages.foot_contacts_template(odometry).message(STAMP, ())
+    template, numbers = messages.foot_contacts(replace(PLACE, contact_source=source))
+    message = template.message(STAMP, numbers)
     assert (message.source, list(message.name)) == (source.value, list(FEET))
 
 
 def test_an_unknown_charge_is_nan() -> None:
     """As the message wants it; a known one is a share."""
-    assert math.isnan(messages.battery(Battery(), STAMP).percentage)
-    known = messages.battery(Battery(80.0, 7.4), STAMP)
+    assert math.isnan(messages.battery(RobotState(), STAMP).percentage)
+    known = messages.battery(RobotState(battery=0.8, voltage=7.4), STAMP)
     assert known.percentage == pytest.approx(0.8)
     assert known.voltage == pytest.approx(7.4)
 
@@ -222,9 +235,8 @@ def test_an_unknown_charge_is_nan() -> None:
 def link_status(**changes: object) -> LinkStatus:
     """A link that runs, but for what is changed."""
     status = LinkStatus(
-        LinkState.RUNNING, 'reports arrive', 'v2', 2_000_000, 'L-2', 1, 0.01, 5, 0,
-        ParserCounters(frames=1000), DialectCounters(),
-    )  # fmt: skip
+        LinkState.RUNNING, 'reports arrive', 'v2', parser=ParserCounters(frames=1000)
+    )
     return replace(status, **changes)  # type: ignore[arg-type]
 
 
@@ -265,12 +277,12 @@ def test_damage_is_reported_as_long_as_it_lasts() -> None:
 @pytest.mark.parametrize(
     ('change', 'charge', 'error', 'level', 'words'),
     [
-        ({}, 80.0, 0.01, DiagnosticStatus.OK, 'no faults'),
-        ({}, 15.0, 0.01, DiagnosticStatus.WARN, 'battery at 15 %'),
-        ({}, 5.0, 0.01, DiagnosticStatus.ERROR, 'battery at 5 %'),
+        ({}, 0.8, 0.01, DiagnosticStatus.OK, 'no faults'),
+        ({}, 0.15, 0.01, DiagnosticStatus.WARN, 'battery at 15 %'),
+        ({}, 0.05, 0.01, DiagnosticStatus.ERROR, 'battery at 5 %'),
         (
             {'temperatures': {11: 80.0, 12: 30.0}},
-            80.0,
+            0.8,
             0.01,
             DiagnosticStatus.WARN,
             'hot servos: 11',
@@ -278,24 +290,20 @@ def test_damage_is_reported_as_long_as_it_lasts() -> None:
         ({}, None, 0.5, DiagnosticStatus.WARN, 'disagree by 29 degrees'),
         (
             {'faults': Fault.IMU | Fault.OVERLOAD},
-            80.0,
+            0.8,
             0.01,
             DiagnosticStatus.ERROR,
             'overload: free its legs, or let it lie down; IMU',
         ),
-        ({'faults': 0x8000}, 80.0, 0.01, DiagnosticStatus.OK, 'no faults'),
+        ({'faults': 0x8000}, 0.8, 0.01, DiagnosticStatus.OK, 'no faults'),
     ],
 )
 def test_the_level_of_the_robot(
     change: dict[str, object], charge: float | None, error: float, level: bytes, words: str
 ) -> None:
     """Battery, heat, an IMU that is mounted otherwise, and faults that the robot reports."""
-    state = replace(
-        Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {}),
-        **change,  # type: ignore[arg-type]
-    )
-    health = Health(Battery(charge), error, refused=0, refusal='')
-    status = robot_diagnostic('hardware_node', '/dev/x', state, health, signs_checked=True)
+    state = RobotState(imu=IMU, battery=charge, **change)  # type: ignore[arg-type]
+    status = robot_diagnostic('node', '/dev/x', state, LinkStatus(), gravity_error=error)
     assert status.level == level
     assert words in status.message
 
@@ -304,13 +312,13 @@ def test_the_level_of_the_robot(
 def test_an_orientation_whose_signs_nobody_checked_is_uncertain(checked: bool) -> None:
     """In /imu and /odom, so that nobody levels by it, and in the diagnostics."""
     sample = replace(IMU, deviation=0.0 if checked else UNCHECKED_DEVIATION)
-    imu = messages.imu_template(sample, DEVIATIONS, 'imu_link')
-    odometry = messages.odometry_template(sample, DEVIATIONS, FRAMES)
-    expected = DEVIATIONS.orientation if checked else pytest.approx(math.pi / 2)
-    assert imu.orientation == odometry.tilt == expected
-    state = Report(0.0, 0.0, (0, 0, 0), (0, 0, 9.8), {}, {})
-    health = Health(Battery(80.0), 0.0, refused=0, refusal='')
-    status = robot_diagnostic('hardware_node', '/dev/x', state, health, signs_checked=checked)
+    expected = DEVIATIONS.orientation if checked else math.pi / 2
+    template, numbers = messages.odometry(sample, PLACE, DEVIATIONS, FRAMES)
+    pose_covariance = template.message(STAMP, numbers).pose.covariance
+    assert pose_covariance[21] == pytest.approx(expected**2)
+    assert imu(sample).orientation_covariance[0] == pytest.approx(expected**2)
+    state = RobotState(imu=sample, battery=0.8)
+    status = robot_diagnostic('node', '/dev/x', state, LinkStatus(), gravity_error=0.0)
     assert ('calibrate imu' in status.message) is not checked
 
 

@@ -9,18 +9,14 @@ from pathlib import Path
 import sys
 import threading
 
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.joints import CommandLimiter, JointMap, servo_of
 from quad_hardware.link import Driver, LinkOptions, LinkState
-from quad_hardware.link.driver import Mailbox
 from quad_hardware.report import Report
 from quad_pty_peer import PtyPeer
 
-ROUNDS, ORDERS = 20, 100
 COMMANDS = 5_000
 
 
@@ -31,50 +27,6 @@ def hurried() -> Iterator[None]:
     sys.setswitchinterval(1e-6)
     yield
     sys.setswitchinterval(before)
-
-
-@given(st.lists(st.sampled_from(['open', 'close', 'take', True, False])))
-def test_an_accepted_order_is_taken_replaced_or_returned(script: list[str | bool]) -> None:
-    """Closed, it refuses; closing returns what nobody will send any more."""
-    mailbox, is_open, held = Mailbox(), False, None
-    for event in script:
-        if event == 'open':
-            mailbox.open()
-            is_open = True
-        elif event == 'close':
-            assert mailbox.close().torque is held
-            is_open, held = False, None
-        elif event == 'take':
-            assert mailbox.take().torque is held
-            held = None
-        else:
-            assert mailbox.put_torque(on=bool(event)) == is_open
-            held = bool(event) if is_open else held
-
-
-@pytest.mark.usefixtures('hurried')
-def test_the_last_accepted_order_arrives() -> None:
-    """Whatever the threads do to each other, the newest order is taken, after all others."""
-    mailbox, taken, done = Mailbox(), list[float](), threading.Event()
-    mailbox.open()
-
-    def serve() -> None:
-        while not done.is_set():
-            if (angles := mailbox.take().angles) is not None:
-                taken.append(angles[11])
-
-    for round_ in range(ROUNDS):
-        done.clear()
-        thread = threading.Thread(target=serve)
-        thread.start()
-        for number in range(ORDERS):
-            assert mailbox.put_angles({11: float(ORDERS * round_ + number)})
-        done.set()
-        thread.join()
-        if (angles := mailbox.take().angles) is not None:
-            taken.append(angles[11])
-        assert taken[-1] == ORDERS * round_ + ORDERS - 1
-    assert taken == sorted(taken)
 
 
 def test_a_change_of_torque_that_is_not_sent_is_reported(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from xgo_lib2 import feedback
 
 from quad_hardware import CommandError, LinkError
 from quad_hardware.link import Driver, LinkOptions, LinkState
-from quad_hardware.link.session import open_session
+from quad_hardware.link.open import open_session
 from quad_hardware.nodes import parameters
 from quad_hardware.protocol import LEG_MOTORS, V2
 from quad_hardware.report import Report

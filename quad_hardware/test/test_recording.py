@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import gc
 import math
+import os
 from pathlib import Path
+import pty
 import time
 
 from hypothesis import given, HealthCheck, settings
@@ -16,7 +18,7 @@ import pytest
 from quad_description import ImuSample, RobotState
 from quad_description.rotations import from_rpy
 from quad_hardware import LinkError, RecordingError
-from quad_hardware.link import LinkState
+from quad_hardware.link import LinkState, SerialPort
 from quad_hardware.protocol import Fault, Model
 from quad_hardware.recording import (
     Entry,
@@ -30,7 +32,6 @@ from quad_hardware.recording import (
     Transfer,
 )
 from quad_hardware.recording.serial_log import format_event, format_transfer, HEADER
-from quad_hardware.recording.tap import TappedPort
 from quad_hardware.report import Report
 
 times = st.integers(0, 2**31 * 10**6).map(lambda micro: micro / 1e6)
@@ -122,52 +123,25 @@ def test_it_makes_no_work_for_the_garbage_collector() -> None:
     assert len(gc.get_objects()) - before < 100
 
 
-class BrokenPort:
-    """A port that takes nothing, and has one byte."""
-
-    path, baud = '/dev/ttyAMA0', 115200
-
-    def fileno(self) -> int:
-        """Return a descriptor that is none."""
-        return -1
-
-    def read(self) -> bytes:
-        """Return a byte."""
-        return b'\x55'
-
-    def write(self, data: bytes) -> None:
-        """Refuse it."""
-        raise LinkError('takes no more bytes')
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
-def test_bytes_that_the_port_refused_were_not_sent() -> None:
-    """Received ones are kept, the error goes on to the driver."""
-    memory = SerialMemory('/dev/ttyAMA0', 60.0)
-    port = TappedPort(BrokenPort(), [memory])
-    assert port.read() == b'\x55'
-    with pytest.raises(LinkError, match='no more bytes'):
-        port.write(bytes(10))
-    assert memory.size == 1
-
-
-def test_bytes_are_stamped_before_they_leave() -> None:
-    """Else an answer could stand before its question."""
-    left: list[float] = []
-    stamps: list[float] = []
-
-    class Answering(BrokenPort):
-        def write(self, data: bytes) -> None:
-            left.append(time.monotonic())
-
-    class Stamps(SerialMemory):
-        def transfer(self, now: float, data: bytes, sent: bool) -> None:
-            stamps.append(now)
-
-    TappedPort(Answering(), [Stamps('/dev/ttyAMA0', 60.0)]).write(bytes(10))
-    assert stamps[0] <= left[0]
+def test_bytes_are_stamped_before_they_leave_and_only_if_they_do() -> None:
+    """Else an answer could stand before its question, or what the port refused in a log."""
+    passed: list[tuple[float, bytes, bool]] = []
+    master, slave = pty.openpty()
+    try:
+        with SerialPort(os.ttyname(slave), 115200) as port:
+            port.recorders = [lambda *each: passed.append(each)]
+            before = time.monotonic()
+            port.write(bytes(10))
+            after = time.monotonic()
+            os.write(master, b'\x55')
+            assert port.read() == b'\x55'
+            with pytest.raises(LinkError, match='no more bytes'):
+                port.write(bytes(10**6))
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert [(data, sent) for _, data, sent in passed] == [(bytes(10), True), (b'\x55', False)]
+    assert before <= passed[0][0] <= after
 
 
 def test_a_log_file_has_all_that_passed_and_replaces_none(tmp_path: Path) -> None:
@@ -232,7 +206,8 @@ def looks(
             device_time=device + number * 0.02,
             faults=bits,
         )
-        begun += watch.look(report, RobotState(None, None if problem else imu, None), problem)
+        state = RobotState(imu=None if problem else imu, imu_problem=problem)
+        begun += watch.check(report, state)
     return begun
 
 

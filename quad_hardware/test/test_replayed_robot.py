@@ -12,11 +12,10 @@ import threading
 
 import pytest
 
-from quad_description import movable_joints, robot_urdf, RobotState
+from quad_description import ContactSource, movable_joints, robot_urdf, RobotState
 from quad_hardware import RecordingError
 from quad_hardware.backend import recorded_in
-from quad_hardware.estimation import EstimatorSettings, ImuMounting, OdometryState
-from quad_hardware.estimation.odometry import ContactSource
+from quad_hardware.estimation import EstimatorSettings, ImuMounting
 from quad_hardware.joints import JointMap, servo_of
 from quad_hardware.link import LinkOptions, LinkState
 from quad_hardware.protocol import Protocol, V1, V2
@@ -39,16 +38,6 @@ def settings_at(port: Path, log: Path) -> RobotSettings:
         JointMap(map(servo_of, movable_joints(URDF))),
         estimator=EstimatorSettings(mounting=ImuMounting(checked=True, rates_checked=True)),
         serial_log=log,
-    )
-
-
-def located(state: RobotState, odometry: OdometryState | None) -> RobotState:
-    """Return a state with what the odometry has found."""
-    assert odometry is not None
-    return replace(
-        state,
-        position=(odometry.x, odometry.y, odometry.height),
-        foot_contacts=odometry.standing,
     )
 
 
@@ -83,11 +72,10 @@ def session(peer: PtyPeer, log: Path) -> Seen:
     arrived = threading.Condition()
 
     def take(state: RobotState) -> None:
-        odometry = robot.update_odometry(state)
-        assert odometry is not None
+        assert state.odometry is not None
         with arrived:
-            sources.append(odometry.contact_source)
-            states.append(located(state, odometry))
+            sources.append(state.odometry.contact_source)
+            states.append(state)
             arrived.notify_all()
 
     robot = SerialRobot(
@@ -165,10 +153,9 @@ def fed(path: Path, *, pause: float = 0.0) -> tuple[ReplayedRobot, list[LinkStat
     changes: list[LinkState] = []
 
     def take(state: RobotState) -> None:
-        odometry = robot.update_odometry(state)
-        assert odometry is not None
-        seen.sources.append(odometry.contact_source)
-        seen.states.append(located(state, odometry))
+        assert state.odometry is not None
+        seen.sources.append(state.odometry.contact_source)
+        seen.states.append(state)
 
     robot = ReplayedRobot(
         replace(settings_at(path, path), serial_log=None),

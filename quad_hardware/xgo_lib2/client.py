@@ -13,7 +13,7 @@ import time
 from typing import TYPE_CHECKING
 
 from quad_hardware import CodecError, HardwareError, NoAnswerError
-from quad_hardware.link import connect, send_request
+from quad_hardware.link import BATTERY, connect, FIRMWARE, read_value, Value
 from quad_hardware.protocol import (
     ANGLE_SPANS,
     Code,
@@ -24,6 +24,7 @@ from quad_hardware.protocol import (
     Register,
     REGISTER_OF_MOTOR,
     slot_of,
+    V1,
     V2,
 )
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
 TIMEOUT = 0.5  # [s] for an answer
 HOST_GAP = 0.001  # [s] between commands of protocol v1
+_IMU = V1.functions[Register.IMU]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +80,7 @@ class XgoDog:
         Raises:
             XgoError: The robot does not answer, or the port was lost.
         """
-        if self._is_v2:
-            answer = self._request(Frame(Kind.READ, Code.VERSION), 10)
-        else:
-            answer = self._read_register(Register.FIRMWARE, 10)
-        return answer.rstrip(b'\0').decode('ascii', 'replace')
+        return self._read(FIRMWARE).rstrip(b'\0').decode('ascii', 'replace')
 
     def system_read_battery(self) -> int:
         """Return the charge of the battery [%].
@@ -90,9 +88,7 @@ class XgoDog:
         Raises:
             XgoError: The robot does not answer, or the port was lost.
         """
-        if self._is_v2:
-            return self._request(Frame(Kind.READ, Code.BATTERY), 1)[0]
-        return self._read_register(Register.BATTERY, 1)[0]
+        return self._read(BATTERY)[0]
 
     def system_set_feedback(self, on: int) -> None:
         """Have the robot push its state about 50 times a second (1), or no longer (0).
@@ -135,8 +131,7 @@ class XgoDog:
             self._states.clear()
             state = self.read_state()
             return Imu(state.roll, state.pitch, state.yaw, state.acceleration)
-        function = self._connection.protocol.functions[Register.IMU]
-        values = function.unpack(self._read_register(Register.IMU, function.length))
+        values = _IMU.unpack(self._read(Value(Code.STATE, Register.IMU, _IMU.length)))
         roll, pitch, yaw = values['attitude']
         x, y, z = values['acceleration']
         return Imu(roll, pitch, yaw, (x, y, z))
@@ -213,15 +208,12 @@ class XgoDog:
         with _as_xgo_errors():
             self._connection.port.write(frame.encode(self._connection.protocol))
 
-    def _read_register(self, register: Register, size: int) -> bytes:
-        return self._request(Frame(Kind.READ, register, bytes((size,))), size)
-
-    def _request(self, request: Frame, size: int) -> bytes:
-        connection = self._connection
+    def _read(self, value: Value) -> bytes:
+        port, protocol, _ = self._connection
         with _as_xgo_errors():
-            answer = send_request(connection.port, connection.protocol, request, size, TIMEOUT)
+            answer = read_value(port, protocol, value, TIMEOUT, attempts=1)
         if answer is None:
-            raise XgoTimeoutError(f'no answer from {connection.port.path} within {TIMEOUT} s')
+            raise XgoTimeoutError(f'no answer from {port.path} within {TIMEOUT} s')
         return answer
 
 

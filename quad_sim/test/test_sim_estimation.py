@@ -12,9 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 import pytest
 
-from quad_description import Pose, pose_positions, quadruped, raised_feet, robot_urdf
+from quad_description import (
+    OdometryState,
+    Pose,
+    pose_positions,
+    quadruped,
+    raised_feet,
+    robot_urdf,
+)
 from quad_description.rotations import from_rpy, rotate
-from quad_hardware.estimation import OdometrySettings, OdometryState
+from quad_hardware.estimation import OdometrySettings
 from quad_hardware.estimation.odometry import LegOdometry
 from quad_sim import Terrain
 from quad_sim.physics import Robot

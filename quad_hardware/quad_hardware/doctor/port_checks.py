@@ -14,7 +14,7 @@ from serial.tools import list_ports
 
 from ..estimation.filters import LOW_BATTERY
 from ..exceptions import LinkError, NoAnswerError
-from ..link import connect, latency_problem, latency_timer, read_battery
+from ..link import BATTERY, connect, latency_problem, latency_timer, read_value
 from ..protocol import model_of_firmware, V1
 from .finding import error, Finding, good, note, warning
 
@@ -102,7 +102,7 @@ def _contact(path: str) -> Iterator[Finding]:
     try:
         connection = connect(path)
         with connection.port as port:
-            charge = read_battery(port, connection.protocol)
+            charge = read_value(port, connection.protocol, BATTERY)
     except NoAnswerError as problem:
         yield error(
             'robot',
@@ -120,7 +120,7 @@ def _contact(path: str) -> Iterator[Finding]:
     if model is None and protocol is V1:
         remedy = 'set the parameter model of hardware_node to mini, lite or wheeled'
         yield warning('firmware', 'its first letter names no quadruped', remedy)
-    yield _judge_battery(charge)
+    yield _judge_battery(None if charge is None else charge[0])
 
 
 def _judge_battery(charge: int | None) -> Finding:

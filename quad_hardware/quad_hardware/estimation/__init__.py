@@ -2,21 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the robot does not report and the controller needs: rates, odometry, height."""
 
-from .estimator import Estimator, EstimatorSettings, Health, RateSource
-from .filters import Battery
+from .estimator import Estimator, EstimatorSettings, RateSource
 from .imu_mounting import ImuMounting
-from .odometry import OdometrySettings, OdometryState, SCALES
+from .odometry import OdometrySettings, SCALES
 from .plausibility import BoardWatch
 
 __all__ = [
     'SCALES',
-    'Battery',
     'BoardWatch',
     'Estimator',
     'EstimatorSettings',
-    'Health',
     'ImuMounting',
     'OdometrySettings',
-    'OdometryState',
     'RateSource',
 ]

@@ -12,6 +12,7 @@ from quad_description import (
     DescriptionError,
     ImuSample,
     JointSample,
+    OdometryState,
     quadruped,
     raised_feet,
     RobotState,
@@ -20,9 +21,9 @@ from quad_description import (
 from ..exceptions import CommandError
 from ..joints import JointMap
 from ..report import Report
-from .filters import AttitudeRate, Battery, BatteryFilter, GravityCheck, JointRate
+from .filters import AttitudeRate, FULL, GravityCheck, JointRate, MedianFilter
 from .imu_mounting import ImuMounting, UNCHECKED_DEVIATION
-from .odometry import LegOdometry, OdometrySettings, OdometryState
+from .odometry import LegOdometry, OdometrySettings
 from .plausibility import BoardWatch, Plausibility, SampleClock
 
 
@@ -45,19 +46,6 @@ class EstimatorSettings:
     mounting: ImuMounting = field(default_factory=ImuMounting)  # how the IMU sits on the body
 
 
-@dataclass(frozen=True, slots=True)
-class Health:
-    """What is looked at now and then."""
-
-    battery: Battery  # state of the battery
-    # between accelerometer and attitude [rad]; None while the body accelerates, and without an
-    # accelerometer
-    gravity_error: float | None
-    refused: int  # reports that could not be
-    refusal: str  # why the last of them could not be
-    imu_problem: str = ''  # why the IMU is of no use; empty while it works
-
-
 class Estimator:
     """Turns reports into states of the robot."""
 
@@ -67,7 +55,6 @@ class Estimator:
         Raises:
             CommandError: The legs of the URDF cannot be read.
         """
-        self._refused = 0
         self.refusal = ''  # why the last report that was refused could not be
         self._joints = joints
         self._sent: dict[str, float] = {}  # targets that were sent last
@@ -81,7 +68,7 @@ class Estimator:
         self._plausibility = Plausibility([servo.motor for servo in joints.servos])
         self._rate = AttitudeRate(settings.rate_cutoff)
         self._joint_rate = JointRate(settings.joint_cutoff)
-        self._battery = BatteryFilter()
+        self._charge, self._voltage = MedianFilter(), MedianFilter()
         self._gravity = GravityCheck()
         self._odometry = LegOdometry(settings.odometry, self._robot.foot_radius)
 
@@ -99,44 +86,44 @@ class Estimator:
         """Return the feet that are in the air at targets of the first joints [rad]."""
         return raised_feet(self._robot.feet(targets))
 
-    def update(self, report: Report) -> RobotState | None:
-        """Return what a report measures; None when it cannot be.
-
-        :meth:`update_odometry` comes next.
-        """
+    def step(self, report: Report) -> RobotState | None:
+        """Return the state that a report shows; None when the report cannot be."""
         if reason := self._plausibility.check(report):
-            self._refused += 1
             self.refusal = reason
             return None
         time = self._clock.time(report)
-        charge = self._battery.take(report).charge
+        joints = self._joint_sample(report, time - report.joints_age)
+        problem = self._plausibility.imu_problem
+        imu = None if problem else self._imu_sample(report, time)
+        # the heading is unknown without an attitude
+        odometry = None if imu is None else self._locate(joints, imu)
+        charge = self._charge.take(report.battery, FULL)
         return RobotState(
-            self._joint_sample(report, time - report.joints_age),
-            None if self._plausibility.imu_problem else self._imu_sample(report, time),
+            joints,
+            imu,
             None if charge is None else charge / 100.0,
+            position=None if odometry is None else (odometry.x, odometry.y, odometry.height),
+            linear_velocity=None if odometry is None else odometry.velocity_in_base,
+            foot_contacts=None if odometry is None else odometry.standing,
             time=time,
+            odometry=odometry,
+            imu_problem=problem,
+            voltage=self._voltage.take(report.voltage),
+            faults=report.faults,
+            temperatures=report.temperatures or {},
         )
 
-    def update_odometry(self, state: RobotState) -> OdometryState | None:
-        """Return where the body is by a state, to be called once for each.
-
-        None without an attitude, for nobody knows the heading then.
-        """
-        if state.imu is None or state.joints is None:
-            return None
-        feet = self._robot.foot_poses(state.joints.positions)
-        return self._odometry.update(state.joints.time, feet, state.imu.orientation)
-
     @property
-    def imu_problem(self) -> str:
-        """Why the IMU is of no use, by the latest report; empty while it works."""
-        return self._plausibility.imu_problem
+    def gravity_error(self) -> float | None:
+        """Angle between accelerometer and attitude [rad].
 
-    def health(self) -> Health:
-        """Return how the robot is, by its latest reports."""
-        imu_problem = self.imu_problem
-        error = None if imu_problem else self._gravity.error
-        return Health(self._battery.state, error, self._refused, self.refusal, imu_problem)
+        None while the body accelerates or the IMU is of no use, and without an accelerometer.
+        """
+        return None if self._plausibility.imu_problem else self._gravity.error
+
+    def _locate(self, joints: JointSample, imu: ImuSample) -> OdometryState:
+        feet = self._robot.foot_poses(joints.positions)
+        return self._odometry.update(joints.time, feet, imu.orientation)
 
     def _joint_sample(self, report: Report, time: float) -> JointSample:
         positions = self._joints.positions(report.positions)

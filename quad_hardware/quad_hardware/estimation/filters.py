@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 import math
 from statistics import median
 
@@ -18,8 +17,6 @@ from quad_description.rotations import (
     rotation_vector,
     Vector,
 )
-
-from ..report import Report
 
 STANDARD_GRAVITY = 9.80665  # [m/s²]
 TOLERANCE = 2.0  # [m/s²] beyond which the body is accelerating
@@ -77,37 +74,21 @@ def _mean(vectors: Sequence[Vector]) -> Vector:
 
 
 CHARGE_REPORTS = 25  # that the median is taken of: half a second
-EMPTY, FULL = 0.0, 100.0  # [%]
+FULL = 100.0  # [%]
 LOW_BATTERY, EMPTY_BATTERY = 20.0, 10.0  # [%] below which it is to be charged, and useless
 
 
-@dataclass(frozen=True, slots=True)
-class Battery:
-    """State of the battery."""
-
-    charge: float | None = None  # [%]; None while unknown
-    voltage: float | None = None  # [V]; None where it is not reported
-
-
-class BatteryFilter:
-    """Takes the median of the last reports."""
+class MedianFilter:
+    """Median of the last values of the battery."""
 
     def __init__(self) -> None:
-        self.state = Battery()  # the state of the battery by now
-        self._charges: deque[float] = deque(maxlen=CHARGE_REPORTS)
-        self._voltages: deque[float] = deque(maxlen=CHARGE_REPORTS)
+        self._values: deque[float] = deque(maxlen=CHARGE_REPORTS)
 
-    def take(self, report: Report) -> Battery:
-        """Take a report, whose charge does not count when it cannot be; return the new state."""
-        if report.battery is not None and EMPTY <= report.battery <= FULL:
-            self._charges.append(report.battery)
-        if report.voltage is not None:
-            self._voltages.append(report.voltage)
-        self.state = Battery(
-            median(self._charges) if self._charges else None,
-            median(self._voltages) if self._voltages else None,
-        )
-        return self.state
+    def take(self, value: float | None, highest: float = math.inf) -> float | None:
+        """Take a value, which does not count when it is missing or beyond 0 to the highest."""
+        if value is not None and 0.0 <= value <= highest:
+            self._values.append(value)
+        return median(self._values) if self._values else None
 
 
 MAX_GAP = 0.2  # [s] a difference over more says nothing about now

@@ -14,11 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 import math
 from operator import itemgetter
 
-from quad_description import FootPose
+from quad_description import ContactSource, FootPose, OdometryState
 from quad_description.rotations import (
     about_z,
     conjugate,
@@ -34,8 +33,6 @@ from .filters import low_pass_share
 Flags = tuple[bool, ...]
 
 MAX_GAP = 0.2  # [s] more than that cannot be bridged: the body may have been carried
-DRIFT = 0.07  # share of the way that is the standard deviation of the position
-MIN_VARIANCE = 1e-4  # [m²]
 KEPT_COMMANDS = 32
 GROUND_TIME = 1.0  # [s] in which every foot stands, whatever the gait
 REST = (0.0, 0.0)
@@ -44,13 +41,6 @@ _Z = itemgetter(2)
 
 SCALES = (0.1, 10.0)
 """What a scale of odometry may be; beyond, a way was given in another unit."""
-
-
-class ContactSource(Enum):
-    """How it is known which feet stand."""
-
-    COMMANDED_HEIGHT = 'commanded_height'  # where they were sent lowest, a servo's lag ago
-    MEASURED_HEIGHT = 'measured_height'  # lowest by joints and attitude: there are no commands
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,33 +55,6 @@ class OdometrySettings:
     command_age: float = 0.3  # commands older than that are not looked at [s]
     scale_x: float = 1.0  # what the way forward is multiplied by
     scale_y: float = 1.0  # what the way sideways is multiplied by
-
-
-@dataclass(frozen=True, slots=True)
-class OdometryState:
-    """Where the body is, in the frame in which it began."""
-
-    x: float  # position of base_link [m]
-    y: float  # position of base_link [m]
-    height: float  # of base_link above the ground [m]
-    rotation: Quaternion  # from base_link to odom, (x, y, z, w); it began with yaw zero
-    velocity_x: float  # forward, in base_link turned level [m/s]
-    velocity_y: float  # to the left, in base_link turned level [m/s]
-    distance: float  # way so far [m]
-    # feet that are taken to stand, in the order of :data:`quad_description.FEET`
-    standing: tuple[bool, ...]
-    contact_source: ContactSource  # how that is known
-
-    @property
-    def velocity_in_base(self) -> Vector:
-        """Velocity over the ground in base_link [m/s]."""
-        level = multiply(about_z(-yaw_of(self.rotation)), self.rotation)
-        return rotate(conjugate(level), (self.velocity_x, self.velocity_y, 0.0))
-
-    @property
-    def position_variance(self) -> float:
-        """Variance of x and y [m²], which grows with the way."""
-        return MIN_VARIANCE + (DRIFT * self.distance) ** 2
 
 
 class LegOdometry:

@@ -2,32 +2,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """The serial line: port, probing, conversation and the thread that keeps it going."""
 
-from .dialect import Dialect, DialectCounters, LinkState, LinkStatus
+from .dialect import Dialect, LinkState, LinkStatus
 from .driver import Driver, QUIET_TIME, STALE_TIME
-from .port import DEFAULT_PORT, latency_problem, latency_timer, Port, SerialPort
-from .probe import connect, Connection, read_battery, read_firmware, send_request
-from .session import FrameParser, LinkOptions, make_dialect, Session
+from .open import (
+    BATTERY,
+    connect,
+    FIRMWARE,
+    LinkOptions,
+    make_dialect,
+    read_value,
+    Session,
+    Value,
+)
+from .port import DEFAULT_PORT, latency_problem, latency_timer, SerialPort
 
 __all__ = [
+    'BATTERY',
     'DEFAULT_PORT',
+    'FIRMWARE',
     'QUIET_TIME',
     'STALE_TIME',
-    'Connection',
     'Dialect',
-    'DialectCounters',
     'Driver',
-    'FrameParser',
     'LinkOptions',
     'LinkState',
     'LinkStatus',
-    'Port',
     'SerialPort',
     'Session',
+    'Value',
     'connect',
     'latency_problem',
     'latency_timer',
     'make_dialect',
-    'read_battery',
-    'read_firmware',
-    'send_request',
+    'read_value',
 ]

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
+import math
 from typing import Generic, TypeVar
 
 from quad_description.rotations import Vector
@@ -31,25 +32,6 @@ class LinkState(Enum):
     STOPPED = 'stopped'
 
 
-@dataclass(frozen=True, slots=True)
-class LinkStatus:
-    """How a link is at one moment."""
-
-    state: LinkState  # what the driver is doing
-    detail: str  # in words; why, when it is not running
-    protocol: str  # what the robot speaks; empty while there is none
-    baud: int  # speed of the line [bit/s]
-    firmware: str  # version of the robot
-    connections: int  # how often a robot was found
-    age: float  # since the last report that was taken [s]; infinite before the first
-    commands: int  # joint commands handed to the line
-    dropped: int  # joint commands that were not sent, because the link was not running
-    parser: ParserCounters  # what the parser saw in this connection
-    dialect: DialectCounters  # what the dialect saw in this connection
-    refused: int = 0  # reports that could not be, and were not taken
-    latency: float | None = None  # latency timer of the adapter [s]; None where there is none
-
-
 Received = TypeVar('Received')
 """What the parser of a session finds: frames, or states of the vendor's library."""
 
@@ -63,6 +45,27 @@ class DialectCounters:
     unanswered: int = 0  # requests without an answer in time (v1)
     refused: int = 0  # frames that the robot refused (v2)
     unusable: int = 0  # valid frames whose contents are not
+
+
+@dataclass(slots=True)
+class LinkStatus:
+    """How a link is at one moment."""
+
+    state: LinkState = LinkState.CONNECTING  # what the driver is doing
+    detail: str = ''  # in words; why, when it is not running
+    protocol: str = ''  # what the robot speaks; empty while there is none
+    baud: int = 0  # speed of the line [bit/s]
+    firmware: str = ''  # version of the robot
+    connections: int = 0  # how often a robot was found
+    age: float = math.inf  # since the last report that was taken [s]
+    commands: int = 0  # joint commands handed to the line
+    dropped: int = 0  # joint commands that were not sent, because the link was not running
+    refused: int = 0  # reports that could not be, and were not taken
+    refusal: str = ''  # why the last of them could not be
+    latency: float | None = None  # latency timer of the adapter [s]; None where there is none
+    # what parser and dialect saw in this connection
+    parser: ParserCounters = field(default_factory=ParserCounters)
+    dialect: DialectCounters = field(default_factory=DialectCounters)
 
 
 @dataclass(frozen=True, slots=True)

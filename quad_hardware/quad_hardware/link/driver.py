@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import logging
 import os
 import select
@@ -15,75 +15,10 @@ import time
 from typing import Any
 
 from ..exceptions import LinkError
-from ..protocol import ParserCounters
 from ..report import Report
-from .dialect import Dialect, DialectCounters, LinkState, LinkStatus
+from .dialect import Dialect, LinkState, LinkStatus
+from .open import LinkOptions, open_session, Session
 from .port import latency_problem, latency_timer
-from .session import LinkOptions, open_session, Session
-
-
-@dataclass(frozen=True, slots=True)
-class Orders:
-    """What is to be sent."""
-
-    # servo angles by motor id [deg]; None for no new ones
-    angles: Mapping[int, float] | None = None
-    torque: bool | None = None  # servos hold, or let go; None to leave it
-
-
-_NONE = Orders()
-
-
-class Mailbox:
-    """Keeps the newest order of each kind until it is taken.
-
-    It takes orders while it is open. An order that was accepted is taken, replaced by a newer one
-    of its kind, or returned by :meth:`close`: it is never lost in silence.
-    """
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._orders = _NONE
-        self._open = False
-
-    def open(self) -> None:
-        """Accept orders from now on."""
-        with self._lock:
-            self._open = True
-
-    def close(self) -> Orders:
-        """Accept no more orders; return those that were not taken."""
-        with self._lock:
-            self._open = False
-            orders, self._orders = self._orders, _NONE
-            return orders
-
-    def put_angles(self, angles: Mapping[int, float]) -> bool:
-        """Leave servo angles by motor id [deg]; return whether they are accepted."""
-        with self._lock:
-            if self._open:
-                self._orders = replace(self._orders, angles=angles)
-            return self._open
-
-    def put_torque(self, *, on: bool) -> bool:
-        """Have the servos hold, or let go; return whether that is accepted."""
-        with self._lock:
-            if self._open:
-                self._orders = replace(self._orders, torque=on)
-            return self._open
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether there is nothing to be taken."""
-        with self._lock:
-            return self._orders == _NONE
-
-    def take(self) -> Orders:
-        """Return what is to be sent now."""
-        with self._lock:
-            orders, self._orders = self._orders, _NONE
-            return orders
-
 
 STALE_TIME = 0.5  # [s] without a report, after which nothing is sent any more
 RECONNECT_TIMEOUT = 3.0  # [s] without a report, after which the robot is looked for anew
@@ -101,7 +36,8 @@ class Driver:
     quick; when one of them fails, the conversation begins anew, and the link says so. Nothing is
     sent to servos while no report is taken: they hold their last target.
 
-    ``command`` and ``torque`` are for one other thread.
+    ``command`` and ``torque`` are for one other thread. An order that was accepted is sent,
+    replaced by a newer one of its kind, or the change of the link's state says that it was not.
     """
 
     def __init__(
@@ -109,34 +45,30 @@ class Driver:
         options: LinkOptions,
         on_state: Callable[[Report], str],
         on_change: Callable[[LinkState, str], None],
-        tap: Callable[[Session], Session] = lambda session: session,
+        on_open: Callable[[Session], None] = lambda _: None,
     ) -> None:
         """Prepare; :meth:`start` begins.
 
         Args:
-            tap: Returns a session that was opened with a port that records what passes.
+            on_open: Takes each session that was opened, before it is used.
         """
         self._options = options
         self._on_state = on_state
         self._on_change = on_change
-        self._tap = tap
+        self._on_open = on_open
         self._thread = threading.Thread(target=self._run, name='serial', daemon=True)
         self._begin: Callable[[], None] = lambda: None
         self._stopping = threading.Event()
         self._wake_read, self._wake_write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-        self._mailbox = Mailbox()
-        self._torque_unsent: bool | None = None  # taken from the mailbox, and not written yet
+        self._lock = threading.Lock()  # of the orders
+        self._accepts = False  # orders
+        self._angles: Mapping[int, float] | None = None  # ordered, by motor id [deg]
+        self._torque: bool | None = None  # ordered
+        self._torque_unsent: bool | None = None  # taken over, and not written yet
         self._released = False  # by the last change of torque that was accepted
         self._limp = False  # from the first byte of an order to let go to the last of one to hold
-        self._state = LinkState.CONNECTING
-        self._detail = 'not started'
+        self._status = LinkStatus(detail='not started')
         self._session: Session | None = None
-        self._connections = 0
-        self._latency: float | None = None
-        self._commands = 0
-        self._dropped = 0
-        self._refused = 0
-        self._refusal = ''
         self._received_at = self._reported_at = -float('inf')
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:
@@ -166,11 +98,13 @@ class Driver:
         Returns:
             False when the link is not running, and nothing will be sent.
         """
-        accepted = self._mailbox.put_angles(angles)
+        with self._lock:
+            if accepted := self._accepts:
+                self._angles = angles
         if accepted:
             self._wake()
         else:
-            self._dropped += 1
+            self._status.dropped += 1
         return accepted
 
     def torque(self, *, on: bool) -> bool:
@@ -183,7 +117,9 @@ class Driver:
         """
         session = self._session
         able = session is not None and session.dialect.can_release
-        accepted = able and self._mailbox.put_torque(on=on)
+        with self._lock:
+            if accepted := able and self._accepts:
+                self._torque = on
         if accepted:
             self._released = not on
             self._wake()
@@ -196,36 +132,33 @@ class Driver:
 
     def status(self) -> LinkStatus:
         """Return how the link is now."""
-        session = self._session
-        return LinkStatus(
-            state=self._state,
-            detail=self._detail,
-            protocol=session.dialect.protocol.name if session else '',
-            baud=session.port.baud if session else 0,
-            firmware=session.firmware if session else '',
-            connections=self._connections,
-            age=time.monotonic() - self._reported_at,
-            commands=self._commands,
-            dropped=self._dropped,
-            parser=session.parser.counters if session else ParserCounters(),
-            dialect=session.dialect.counters if session else DialectCounters(),
-            refused=self._refused,
-            latency=self._latency,
-        )
+        session, age = self._session, time.monotonic() - self._reported_at
+        if session is None:
+            return replace(self._status, age=age)
+        counters = session.parser.counters, session.dialect.counters
+        return replace(self._status, age=age, parser=counters[0], dialect=counters[1])
 
     def _wake(self) -> None:
         with suppress(BlockingIOError):  # a full pipe wakes as well
             os.write(self._wake_write, b'\0')
 
     def _enter(self, state: LinkState, detail: str) -> None:
-        if state is LinkState.RUNNING:
-            self._mailbox.open()
-        elif self._mailbox.close().torque is not None or self._torque_unsent is not None:
-            self._torque_unsent = None
-            detail += '; a change of torque may not have been sent'
-        if (state, detail) != (self._state, self._detail):
-            self._state, self._detail = state, detail
+        with self._lock:
+            self._accepts = state is LinkState.RUNNING
+        if not self._accepts:
+            _, torque = self._take_orders()
+            if torque is not None or self._torque_unsent is not None:
+                self._torque_unsent = None
+                detail += '; a change of torque may not have been sent'
+        status = self._status
+        if (state, detail) != (status.state, status.detail):
+            status.state, status.detail = state, detail
             self._on_change(state, detail)
+
+    def _take_orders(self) -> tuple[Mapping[int, float] | None, bool | None]:
+        with self._lock:
+            orders, self._angles, self._torque = (self._angles, self._torque), None, None
+            return orders
 
     def _run(self) -> None:
         self._begin()
@@ -258,7 +191,8 @@ class Driver:
             self._stopping.wait(RETRY_PERIOD)
             return
         try:
-            self._serve(self._tap(session))
+            self._on_open(session)
+            self._serve(session)
         except LinkError as error:
             self._enter(LinkState.CONNECTING, str(error))
         finally:
@@ -266,15 +200,16 @@ class Driver:
 
     def _serve(self, session: Session) -> None:
         now = bytes_at = self._received_at = self._reported_at = time.monotonic()
-        dialect = session.dialect
+        dialect, port, status = session.dialect, session.port, self._status
         self._session = session
-        self._connections += 1
-        self._latency = latency_timer(session.port.path)
+        status.protocol, status.baud = dialect.protocol.name, port.baud
+        status.firmware, status.latency = session.firmware, latency_timer(port.path)
+        status.connections += 1
         found = (
-            f'{session.firmware} on {session.port.path} speaks protocol '
-            f'{dialect.protocol.name} at {session.port.baud} baud'
+            f'{session.firmware} on {port.path} speaks protocol '
+            f'{dialect.protocol.name} at {port.baud} baud'
         )
-        problem = latency_problem(session.port.path, self._latency)
+        problem = latency_problem(port.path, status.latency)
         self._enter(LinkState.WAITING, '; '.join(filter(None, (found, problem))))
         while not self._stopping.is_set() or self._owes(dialect):
             now = time.monotonic()
@@ -285,7 +220,7 @@ class Driver:
             self._post(dialect)
             step = dialect.step(now)
             if step.send:
-                session.port.write(step.send)
+                port.write(step.send)
             if self._torque_unsent is not None and not dialect.torque_pending:
                 self._limp, self._torque_unsent = not self._torque_unsent, None
             timeout = min(step.wake, self._deadline(now)) - now
@@ -295,8 +230,8 @@ class Driver:
 
     def _owes(self, dialect: Dialect[Any]) -> bool:
         """Return whether an order was accepted that is still to be sent."""
-        running = self._state is LinkState.RUNNING
-        return running and (dialect.pending or not self._mailbox.is_empty)
+        ordered = self._angles is not None or self._torque is not None
+        return self._status.state is LinkState.RUNNING and (dialect.pending or ordered)
 
     def _deadline(self, now: float) -> float:
         """Return when silence has lasted long enough to do something about it [s]."""
@@ -306,26 +241,23 @@ class Driver:
         )
 
     def _fall_silent(self, dialect: Dialect[Any], now: float) -> None:
-        refused = now - self._received_at <= STALE_TIME
-        state = LinkState.REFUSED if refused else LinkState.STALE
-        if state is not self._state:
-            self._enter(state, self._silence(refused=refused))
+        state, what = LinkState.STALE, 'no report'
+        if now - self._received_at <= STALE_TIME:
+            state, what = LinkState.REFUSED, f'every report is refused, {self._status.refusal}'
+        if state is not self._status.state:
+            does = 'the servos hold their last target, nothing is sent'
+            self._enter(state, f'{what} for {STALE_TIME} s: {does}')
         dialect.cancel_pending()  # only now: from here on no order is accepted
 
-    def _silence(self, *, refused: bool) -> str:
-        what = f'every report is refused, {self._refusal}' if refused else 'no report'
-        return f'{what} for {STALE_TIME} s: the servos hold their last target, nothing is sent'
-
     def _post(self, dialect: Dialect[Any]) -> None:
-        orders = self._mailbox.take()
-        if orders.angles is not None:
-            dialect.command(orders.angles)
-            self._commands += 1
-        if orders.torque is not None:
-            dialect.torque(on=orders.torque)
-            self._torque_unsent = orders.torque
-            # half of it may leave before the line breaks
-            self._limp = self._limp or not orders.torque
+        angles, torque = self._take_orders()
+        if angles is not None:
+            dialect.command(angles)
+            self._status.commands += 1
+        if torque is not None:
+            dialect.torque(on=torque)
+            self._torque_unsent = torque
+            self._limp = self._limp or not torque  # half of it may leave before the line breaks
 
     def _listen(self, session: Session, timeout: float, bytes_at: float) -> float:
         """Wait for bytes or a command; return when bytes last came [s]."""
@@ -349,8 +281,8 @@ class Driver:
         self._received_at = now
         reason = self._on_state(report)
         if reason:
-            self._refused += 1
-            self._refusal = reason
+            self._status.refused += 1
+            self._status.refusal = reason
             return
         self._reported_at = now
         # only now: whoever sends a command has a place of the robot to begin from

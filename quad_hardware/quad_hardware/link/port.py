@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 import errno
 import os
@@ -11,7 +12,6 @@ from pathlib import Path
 import select
 import termios
 import time
-from typing import Protocol as Interface
 from typing import TYPE_CHECKING
 
 import serial
@@ -66,27 +66,14 @@ CHUNK = 4096  # [B] more than two frames
 WRITE_TIMEOUT = 0.1  # [s] how long a port may take no bytes before it counts as lost
 
 
-class Port(Interface):
-    """What a conversation needs of a port."""
-
-    path: str  # device file
-    baud: int  # speed [bit/s]
-
-    def fileno(self) -> int:
-        """Return the file descriptor, for :mod:`select`."""
-
-    def read(self) -> bytes:
-        """Return what has arrived; to be called when something has."""
-
-    def write(self, data: bytes) -> None:
-        """Send bytes."""
-
-    def close(self) -> None:
-        """Close the port."""
+Recorder = Callable[[float, bytes, bool], None]
+"""Takes when [s], what, and whether it was sent; in the thread of the driver, without waiting."""
 
 
 class SerialPort:
     """An open serial port, 8N1, which no other program of ours can open at the same time."""
+
+    recorders: Sequence[Recorder] = ()  # take the bytes that pass; those that are refused do not
 
     def __init__(self, path: str, baud: int) -> None:
         """Open the port.
@@ -130,6 +117,7 @@ class SerialPort:
             raise LinkError(f'{self.path} was lost: {error.strerror}') from error
         if not data:  # ready, and nothing there: the line was hung up
             raise LinkError(f'{self.path} was hung up; was the cable pulled?')
+        self._record(time.monotonic(), data, sent=False)
         return data
 
     def write(self, data: bytes) -> None:
@@ -138,11 +126,17 @@ class SerialPort:
         Raises:
             LinkError: The port is gone, or takes no more bytes.
         """
-        deadline = time.monotonic() + WRITE_TIMEOUT
-        while data := data[self._write_some(data) :]:
+        now = time.monotonic()  # the answer may come before this returns
+        left = data
+        while left := left[self._write_some(left) :]:
             _, ready, _ = select.select([], [self], [], WRITE_TIMEOUT)
-            if not ready or time.monotonic() > deadline:
+            if not ready or time.monotonic() > now + WRITE_TIMEOUT:
                 raise LinkError(f'{self.path} takes no more bytes; is the robot on?')
+        self._record(now, data, sent=True)
+
+    def _record(self, now: float, data: bytes, *, sent: bool) -> None:
+        for record in self.recorders:
+            record(now, data, sent)
 
     def _write_some(self, data: bytes) -> int:
         try:

@@ -25,12 +25,12 @@ from ..protocol import (
     Register,
     REGISTER_OF_MOTOR,
     scatter,
+    Span,
     Torque,
     V1,
 )
 from ..report import Report
 from .dialect import Dialect, Step, vector
-from .unseen_servo import FULL_SPEED, MIN_SPEED, UnseenServo
 
 HOST_GAP = 0.001  # [s] the board drops some commands that follow each other faster
 MAX_LATENCY = 0.050  # [s] what an answer may take beyond its time on the line
@@ -40,6 +40,51 @@ BATTERY_PERIOD = 2.0  # [s]
 ARM_REPEAT_PERIOD = 0.5  # [s] after which an arm joint is sent again, for a frame may be lost
 _BOARDS_OWN, _FORGOTTEN = -1, -2  # speeds that nobody set, or that a restart may have undone
 _IMU = V1.functions[Register.IMU]
+
+
+FULL_SPEED, MIN_SPEED = 255, 1
+"""Ends of the register that says how fast a single servo turns (quad.md 1.2)."""
+
+MIN_RATE = 527.0 / FULL_SPEED
+"""What the lowest speed is worth [deg/s] where the highest is that of a servo without load.
+
+No page of the vendor says the unit; 9.2 rad/s is what the servo's data sheet allows.
+"""
+
+
+class UnseenServo:
+    """Keeps the ends of where a servo may be, which move to its target as slowly as it may.
+
+    Protocol v1 reads 15 of 16 servos; the yaw of the arm, 54, is the one that is left out. The
+    first time that it is sent somewhere, it may turn by its whole range, so it is sent at the
+    lowest speed, until it must have arrived.
+    """
+
+    def __init__(self, span: Span, now: float) -> None:
+        """Begin with a servo that may be anywhere in its range [deg]."""
+        self._low, self._high = span.low, span.high
+        self._target = math.nan
+        self._at = now
+
+    def send(self, angle: float, now: float) -> None:
+        """Send it somewhere [deg]."""
+        self._advance(now)
+        self._target = angle
+
+    def arrived(self, now: float) -> bool:
+        """Return whether it must be where it was sent."""
+        self._advance(now)
+        return self._low == self._target == self._high
+
+    def _advance(self, now: float) -> None:
+        way, self._at = MIN_RATE * (now - self._at), now
+        if not math.isnan(self._target):
+            self._low = _toward(self._target, self._low, way)
+            self._high = _toward(self._target, self._high, way)
+
+
+def _toward(target: float, place: float, way: float) -> float:
+    return min(max(target, place - way), place + way)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,11 @@ not found, are the serial port inside XgoDog and the name of the acceleration.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 import importlib
 import inspect
-import os
-from typing import Protocol as Interface
+from typing import Any
 
 from quad_description.rotations import Vector
 
@@ -24,27 +23,10 @@ from ..exceptions import LinkError
 from ..protocol import MOTOR_ORDER, ParserCounters, Protocol, V2
 from ..report import Report
 from .dialect import Dialect, Step, vector
-from .port import CHUNK
+from .port import SerialPort
 from .v2_dialect import REQUEST_PERIOD, STATE_WIRE_TIME
 
 WriteAngle = Callable[[int, float], object]
-
-
-class Dog(Interface):
-    """What is public of the vendor's XgoDog."""
-
-    def read_version(self) -> object:
-        """Return the firmware version."""
-
-    def system_set_feedback(self, on: int, /) -> object:
-        """Have states pushed."""
-
-
-class StateParser(Interface):
-    """What is public of the vendor's SendStateParser."""
-
-    def feed_bytes(self, data: bytes, /) -> Iterable[object]:
-        """Take bytes, return states."""
 
 
 def is_installed() -> bool:
@@ -56,20 +38,13 @@ def is_installed() -> bool:
     return not hasattr(library, 'IS_STAND_IN')
 
 
-@dataclass(frozen=True, slots=True)
-class Descriptor:
-    """Something with a file descriptor."""
-
-    fileno: Callable[[], int]
-
-
-def find_serial(dog: object, depth: int = 2) -> Descriptor | None:
-    """Return the open serial port among the attributes of an object, or of what it holds."""
+def find_descriptor(dog: object, depth: int = 2) -> int | None:
+    """Return the descriptor of the open port among the attributes of an object, or of theirs."""
     slots = (getattr(dog, name, None) for name in getattr(dog, '__slots__', ()))
     for value in (*getattr(dog, '__dict__', {}).values(), *slots):
         if callable(getattr(value, 'fileno', None)) and callable(getattr(value, 'write', None)):
-            return Descriptor(value.fileno)
-        if depth > 1 and (found := find_serial(value, depth - 1)) is not None:
+            return int(value.fileno())
+        if depth > 1 and (found := find_descriptor(value, depth - 1)) is not None:
             return found
     return None
 
@@ -103,14 +78,8 @@ VENDOR = Protocol(
 _ACCELERATIONS = ('acceleration', 'acc', 'accel', 'linear_acceleration')
 
 
-class VendorPort:
-    """The serial port inside the vendor's XgoDog.
-
-    Attributes:
-        path: Device file.
-        baud: Speed that it was opened with [bit/s], as far as is known.
-        dog: The vendor's object.
-    """
+class VendorPort(SerialPort):
+    """The serial port inside the vendor's XgoDog."""
 
     def __init__(self, path: str) -> None:
         """Open a robot by the vendor's library.
@@ -119,20 +88,20 @@ class VendorPort:
             LinkError: The library cannot, or has no serial port that is found.
         """
         self.path = path
-        self.baud = VENDOR.baud
+        self.baud = VENDOR.baud  # as far as is known
         client = importlib.import_module('xgo_lib2.client')
         try:
-            self.dog: Dog = client.XgoDog(path)
+            self.dog = client.XgoDog(path)  # the vendor's object
         except Exception as error:  # whatever the vendor's library raises
             raise LinkError(f'xgo_lib2 cannot open {path}: {error}') from error
-        port = find_serial(self.dog)
-        if port is None:
+        descriptor = find_descriptor(self.dog)
+        if descriptor is None:
             self.close()
             raise LinkError(
                 'no serial port is found in the XgoDog of xgo_lib2; '
                 'set protocol to v2 or v1 to do without it'
             )
-        self._descriptor = int(port.fileno())
+        self._descriptor = descriptor
 
     def read_version(self) -> str:
         """Return the firmware version.
@@ -148,22 +117,6 @@ class VendorPort:
     def fileno(self) -> int:
         """Return the file descriptor."""
         return self._descriptor
-
-    def read(self) -> bytes:
-        """Return what has arrived, when something has.
-
-        Raises:
-            LinkError: The port is gone.
-        """
-        try:
-            data = os.read(self._descriptor, CHUNK)
-        except BlockingIOError:
-            return b''
-        except OSError as error:
-            raise LinkError(f'{self.path} was lost: {error.strerror}') from error
-        if not data:
-            raise LinkError(f'{self.path} was hung up; was the cable pulled?')
-        return data
 
     def write(self, data: bytes) -> None:
         """Send nothing: the vendor's methods send by themselves."""
@@ -184,7 +137,7 @@ class VendorParser:
 
     def __init__(self) -> None:
         feedback = importlib.import_module('xgo_lib2.feedback')
-        self._parser: StateParser = feedback.SendStateParser()
+        self._parser = feedback.SendStateParser()
         self._counters = ParserCounters()
         self.pending = 0
 
@@ -211,7 +164,7 @@ class VendorParser:
 class VendorDialect(Dialect[object]):
     """States of the vendor's parser; commands by the vendor's methods."""
 
-    def __init__(self, dog: Dog, now: float, method: str) -> None:
+    def __init__(self, dog: Any, now: float, method: str) -> None:  # noqa: ANN401
         """Begin a conversation.
 
         Args:

@@ -9,13 +9,13 @@ import math
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from ..estimation import Health
+from quad_description import RobotState
+
 from ..estimation.filters import EMPTY_BATTERY, LOW_BATTERY
 from ..joints import CommandCounters
 from ..link import latency_problem, LinkState, LinkStatus
 from ..protocol import Fault, ParserCounters
 from ..recording import FAULT_TEXTS
-from ..report import Report
 from ..serial_robot import COMMANDS, LINK, ROBOT
 
 HOT_SERVO = 65.0  # [°C]
@@ -93,26 +93,27 @@ class LinkDiagnostic:
 def robot_diagnostic(
     node: str,
     port: str,
-    state: Report,
-    health: Health,
+    state: RobotState,
+    status: LinkStatus,
     *,
-    signs_checked: bool,
+    gravity_error: float | None,
     recording: str = '',
 ) -> DiagnosticStatus:
     """Describe battery, servos and IMU.
 
     Args:
-        signs_checked: Somebody has compared the IMU with gravity, and a gyro with turning.
+        gravity_error: Between accelerometer and attitude [rad]; None while it is not known.
         recording: Last file of the black box with a fault of it; empty before one.
     """
     level, message = DiagnosticStatus.OK, 'no faults'
+    signs_checked = state.imu is not None and not state.imu.is_uncertain
     if not signs_checked:
         level, message = DiagnosticStatus.WARN, UNCHECKED
-    error, charge, voltage = health.gravity_error, health.battery.charge, health.battery.voltage
-    hot = {m: t for m, t in (state.temperatures or {}).items() if t > HOT_SERVO}
-    if error is not None and error > GRAVITY_ERROR:
+    charge = None if state.battery is None else 100.0 * state.battery
+    hot = [motor for motor, t in state.temperatures.items() if t > HOT_SERVO]
+    if gravity_error is not None and gravity_error > GRAVITY_ERROR:
         level = DiagnosticStatus.WARN
-        angle = f'{math.degrees(error):.0f} degrees'
+        angle = f'{math.degrees(gravity_error):.0f} degrees'
         message = (
             f'accelerometer and attitude disagree by {angle}; restart the robot on level ground'
         )
@@ -124,21 +125,21 @@ def robot_diagnostic(
         level = DiagnosticStatus.ERROR if empty else DiagnosticStatus.WARN
         message = f'battery at {charge:.0f} %; charge it'
     faults = Fault(state.faults & sum(Fault))
-    if health.imu_problem:
+    if state.imu_problem:
         level = DiagnosticStatus.ERROR
-        message = f'{health.imu_problem}; lie down, then switch the robot off and on'
+        message = f'{state.imu_problem}; lie down, then switch the robot off and on'
     if faults:
         level = DiagnosticStatus.ERROR
         message = f'the robot reports {"; ".join(FAULT_TEXTS[f] for f in Fault if f in faults)}'
     values = {
         'battery': '' if charge is None else f'{charge:.0f}',
-        'voltage': '' if voltage is None else f'{voltage:.2f}',
+        'voltage': '' if state.voltage is None else f'{state.voltage:.2f}',
         'faults': state.faults,
         'imu_signs_checked': signs_checked,
-        'gravity_error': '' if error is None else f'{error:.3f}',
-        'hottest_servo': max((state.temperatures or {0: 0.0}).values()),
-        'implausible_reports': health.refused,
-        'last_implausible': health.refusal,
+        'gravity_error': '' if gravity_error is None else f'{gravity_error:.3f}',
+        'hottest_servo': max(state.temperatures.values(), default=0.0),
+        'implausible_reports': status.refused,
+        'last_implausible': status.refusal,
         'black_box': recording,
     }
     return _status(level, f'{node}: {ROBOT}', message, port, values)

@@ -3,15 +3,16 @@
 """The state of the robot as ROS messages (REP 103, 105, 145).
 
 What is published with every report comes as a template, which makes the message, and as the
-numbers that change from one message to the next.
+numbers that change from one message to the next. Standard deviations are None where a value is
+not measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 import math
-from typing import ClassVar
+from typing import Any, TypeAlias
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
@@ -20,12 +21,11 @@ from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from quad_description import FEET, ImuSample, JointSample
+from quad_description import FEET, ImuSample, JointSample, OdometryState, RobotState
 from quad_description.rotations import about_z, conjugate, multiply, rotate, yaw_of
 from quad_description.rotations import Quaternion as Rotation
 from quad_msgs.msg import FootContacts
 
-from ..estimation import Battery, OdometryState
 from .parameters import Deviations, Frames
 
 NOT_THERE = [-1.0, *([0.0] * 8)]  # covariance of what is not measured (REP 145)
@@ -34,193 +34,144 @@ VELOCITY_VARIANCE = 0.03**2  # [m²/s²]
 HEIGHT_VARIANCE = 0.01**2  # [m²]
 
 Numbers = Sequence[float]
+Message: TypeAlias = Any
 
 
 @dataclass(frozen=True, slots=True)
-class JointStates:
-    """All joints that are reported, in the order of the URDF; efforts are not known."""
+class Template:
+    """What messages that differ by stamp and numbers have in common."""
 
-    names: tuple[str, ...]  # of the joints
+    make: Callable[..., Message]  # of stamp, numbers, and the arguments
+    count: int  # of the numbers
+    arguments: tuple[Hashable, ...]  # what does not change from one message to the next
 
-    @property
-    def count(self) -> int:
-        """How many numbers a message takes."""
-        return 2 * len(self.names)
-
-    def message(self, stamp: Time, numbers: Numbers) -> JointState:
-        """Make a message of positions, and velocities behind them."""
-        joints = len(self.names)
-        return JointState(
-            header=Header(stamp=stamp),
-            name=list(self.names),
-            position=numbers[:joints],
-            velocity=numbers[joints:],
-        )
+    def message(self, stamp: Time, numbers: Numbers) -> Message:
+        """Make a message."""
+        return self.make(stamp, numbers, *self.arguments)
 
 
-def joint_states_template(names: tuple[str, ...], joints: JointSample) -> JointStates:
-    """Return the template for the joints that are measured, of all joints by name."""
-    return JointStates(tuple(joints.measured(names)) if joints.unmeasured else names)
+def joint_states(names: tuple[str, ...], joints: JointSample) -> tuple[Template, Numbers]:
+    """Return the joints that are measured, of all joints by name; efforts are not known."""
+    columns = joints.positions, joints.velocities or ()
+    if joints.unmeasured:
+        names = tuple(joints.measured(names))
+        left_out = joints.unmeasured
+        numbers = [n for column in columns for i, n in enumerate(column) if i not in left_out]
+        return Template(_joint_states, 2 * len(names), names), numbers
+    return Template(_joint_states, 2 * len(names), names), (*columns[0], *columns[1])
 
 
-def joint_numbers(joints: JointSample) -> Numbers:
-    """Return what :class:`JointStates` takes."""
-    velocities = joints.velocities or ()
-    if not joints.unmeasured:
-        return (*joints.positions, *velocities)
-    return [
-        number
-        for numbers in (joints.positions, velocities)
-        for place, number in enumerate(numbers)
-        if place not in joints.unmeasured
-    ]
-
-
-@dataclass(frozen=True, slots=True)
-class ImuTemplate:
-    """Attitude, angular velocity and specific force."""
-
-    frame: str  # in which they are
-    orientation: float  # its standard deviation [rad]
-    acceleration: float | None  # its standard deviation [m/s²]; None where it is not measured
-    rate: float | None  # its standard deviation [rad/s]; None where it is not published
-    count: ClassVar[int] = 10
-
-    def message(self, stamp: Time, numbers: Numbers) -> Imu:
-        """Make a message of a rotation (x, y, z, w), a rate and an acceleration."""
-        message = Imu(header=Header(stamp=stamp, frame_id=self.frame))
-        message.orientation = _quaternion(numbers[:4])
-        message.orientation_covariance = _diagonal3(self.orientation)
-        message.angular_velocity = _vector(numbers[4:7])
-        message.angular_velocity_covariance = _diagonal3(self.rate)
-        message.linear_acceleration = _vector(numbers[7:])
-        message.linear_acceleration_covariance = _diagonal3(self.acceleration)
-        return message
-
-
-def imu_template(imu: ImuSample, deviations: Deviations, frame: str) -> ImuTemplate:
-    """Return the template for what a sample holds."""
-    return ImuTemplate(
-        frame,
-        max(deviations.orientation, imu.deviation),
-        None if imu.acceleration is None else deviations.acceleration,
-        _rate_deviation(imu, deviations),
+def _joint_states(stamp: Time, numbers: Numbers, *names: str) -> JointState:
+    return JointState(
+        header=Header(stamp=stamp),
+        name=list(names),
+        position=numbers[: len(names)],
+        velocity=numbers[len(names) :],
     )
 
 
-def imu_numbers(imu: ImuSample) -> Numbers:
-    """Return what :class:`ImuTemplate` takes; zeros for what is not measured."""
-    return (*imu.orientation, *(imu.angular_velocity or _ZERO), *(imu.acceleration or _ZERO))
+def imu(sample: ImuSample, deviations: Deviations, frame: str) -> tuple[Template, Numbers]:
+    """Return attitude, angular velocity and specific force; zeros for what is not measured."""
+    acceleration = None if sample.acceleration is None else deviations.acceleration
+    known = _tilt(sample, deviations), _rate(sample, deviations), acceleration
+    rate, felt = sample.angular_velocity or _ZERO, sample.acceleration or _ZERO
+    return Template(_imu, 10, (frame, known)), (*sample.orientation, *rate, *felt)
 
 
-@dataclass(frozen=True, slots=True)
-class OdometryTemplate:
-    """The pose in odom and the velocity in base_link (or in the footprint)."""
-
-    frame: str  # in which the pose is
-    child: str  # in which the velocity is
-    tilt: float  # standard deviation of the rotation [rad]
-    rate: float | None  # that of the angular velocity [rad/s]; None where it is not published
-    count: ClassVar[int] = 14
-
-    def message(self, stamp: Time, numbers: Numbers) -> Odometry:
-        """Make a message: place, rotation, velocity, rate, and the variance of x and y [m²]."""
-        message = Odometry(header=Header(stamp=stamp, frame_id=self.frame))
-        message.child_frame_id = self.child
-        x, y, z = numbers[:3]
-        message.pose.pose.position = Point(x=x, y=y, z=z)
-        message.pose.pose.orientation = _quaternion(numbers[3:7])
-        place, tilt = numbers[13], self.tilt**2
-        message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, tilt, tilt, tilt))
-        message.twist.twist.linear = _vector(numbers[7:10])
-        message.twist.twist.angular = _vector(numbers[10:13])
-        rate = UNUSED if self.rate is None else self.rate**2
-        message.twist.covariance = _diagonal6(
-            (VELOCITY_VARIANCE, VELOCITY_VARIANCE, UNUSED, rate, rate, rate)
-        )
-        return message
+def _imu(
+    stamp: Time,
+    numbers: Numbers,
+    frame: str,
+    deviations: tuple[float, float | None, float | None],
+) -> Imu:
+    orientation, rate, acceleration = map(_diagonal3, deviations)
+    return Imu(
+        header=Header(stamp=stamp, frame_id=frame),
+        orientation=_quaternion(numbers[:4]),
+        orientation_covariance=orientation,
+        angular_velocity=_vector(numbers[4:7]),
+        angular_velocity_covariance=rate,
+        linear_acceleration=_vector(numbers[7:]),
+        linear_acceleration_covariance=acceleration,
+    )
 
 
-def odometry_template(imu: ImuSample, deviations: Deviations, frames: Frames) -> OdometryTemplate:
-    """Return the template for what a sample holds."""
-    child = frames.footprint if frames.footprint_is_parent else frames.base
-    tilt = max(deviations.orientation, imu.deviation)
-    return OdometryTemplate(frames.odom, child, tilt, _rate_deviation(imu, deviations))
-
-
-def odometry_numbers(imu: ImuSample, state: OdometryState, frames: Frames) -> Numbers:
-    """Return what :class:`OdometryTemplate` takes."""
+def odometry(
+    sample: ImuSample, state: OdometryState, deviations: Deviations, frames: Frames
+) -> tuple[Template, Numbers]:
+    """Return the pose in odom and the velocity in base_link (or in the footprint)."""
     rotation, height = state.rotation, state.height
-    rate = imu.angular_velocity or _ZERO  # in the body
+    rate = sample.angular_velocity or _ZERO  # in the body
+    child, velocity = frames.base, state.velocity_in_base
     if frames.footprint_is_parent:
-        velocity = (state.velocity_x, state.velocity_y, 0.0)  # over the ground, level
+        child, velocity = frames.footprint, (state.velocity_x, state.velocity_y, 0.0)  # level
         rate = rotate(_level(rotation), rate)
         rotation, height = about_z(yaw_of(rotation)), 0.0
-    else:
-        velocity = state.velocity_in_base
-    return (state.x, state.y, height, *rotation, *velocity, *rate, state.position_variance)
+    known = _tilt(sample, deviations), _rate(sample, deviations)
+    place = state.x, state.y, height
+    numbers = (*place, *rotation, *velocity, *rate, state.position_variance)
+    return Template(_odometry, len(numbers), (frames.odom, child, known)), numbers
 
 
-@dataclass(frozen=True, slots=True)
-class FootContactsTemplate:
-    """Which feet are taken to stand; one template for each combination."""
-
-    contacts: tuple[bool, ...]  # whether each does, in the order of the legs
-    source: str  # how that is known
-    count: ClassVar[int] = 0
-
-    def message(self, stamp: Time, _numbers: Numbers) -> FootContacts:
-        """Make a message."""
-        return FootContacts(
-            header=Header(stamp=stamp),
-            name=list(FEET),
-            contact=list(self.contacts),
-            source=self.source,
-        )
-
-
-def foot_contacts_template(state: OdometryState) -> FootContactsTemplate:
-    """Return the template for the feet that stand."""
-    return FootContactsTemplate(state.standing, state.contact_source.value)
-
-
-@dataclass(frozen=True, slots=True)
-class TransformsTemplate:
-    """odom to base_link and base_link to base_footprint, or the other way round."""
-
-    frames: tuple[str, str, str]  # from one to the next
-    count: ClassVar[int] = 14
-
-    def message(self, stamp: Time, numbers: Numbers) -> TFMessage:
-        """Make a message: place and rotation (x, y, z, w) of the first, and of the second."""
-        odom, first, second = self.frames
-        return TFMessage(
-            transforms=[
-                _transform(odom, first, numbers[:7], stamp),
-                _transform(first, second, numbers[7:], stamp),
-            ]
-        )
+def _odometry(
+    stamp: Time,
+    numbers: Numbers,
+    frame: str,
+    child: str,
+    deviations: tuple[float, float | None],
+) -> Odometry:
+    tilt, rate = deviations
+    message = Odometry(header=Header(stamp=stamp, frame_id=frame))
+    message.child_frame_id = child
+    x, y, z = numbers[:3]
+    message.pose.pose.position = Point(x=x, y=y, z=z)
+    message.pose.pose.orientation = _quaternion(numbers[3:7])
+    place = numbers[13]
+    message.pose.covariance = _diagonal6((place, place, HEIGHT_VARIANCE, *[tilt**2] * 3))
+    message.twist.twist.linear = _vector(numbers[7:10])
+    message.twist.twist.angular = _vector(numbers[10:13])
+    turning = UNUSED if rate is None else rate**2
+    message.twist.covariance = _diagonal6(
+        (VELOCITY_VARIANCE, VELOCITY_VARIANCE, UNUSED, *[turning] * 3)
+    )
+    return message
 
 
-def transforms_template(frames: Frames) -> TransformsTemplate:
-    """Return the template for names and order of frames."""
+def foot_contacts(state: OdometryState) -> tuple[Template, Numbers]:
+    """Return which feet are taken to stand, and how that is known."""
+    return Template(_foot_contacts, 0, (state.contact_source.value, *state.standing)), ()
+
+
+def _foot_contacts(stamp: Time, _numbers: Numbers, source: str, *contacts: bool) -> FootContacts:
+    return FootContacts(
+        header=Header(stamp=stamp), name=list(FEET), contact=list(contacts), source=source
+    )
+
+
+def transforms(state: OdometryState, frames: Frames) -> tuple[Template, Numbers]:
+    """Return odom to base_link and base_link to base_footprint, or the other way round."""
+    tilt, place = _level(state.rotation), (state.x, state.y)
     if frames.footprint_is_parent:
-        return TransformsTemplate((frames.odom, frames.footprint, frames.base))
-    return TransformsTemplate((frames.odom, frames.base, frames.footprint))
-
-
-def transforms_numbers(state: OdometryState, frames: Frames) -> Numbers:
-    """Return what :class:`TransformsTemplate` takes."""
-    tilt = _level(state.rotation)
-    if frames.footprint_is_parent:
+        names = frames.odom, frames.footprint, frames.base
         heading = about_z(yaw_of(state.rotation))
-        return (state.x, state.y, 0.0, *heading, 0.0, 0.0, state.height, *tilt)
-    upright = conjugate(tilt)
-    below = rotate(upright, (0.0, 0.0, -state.height))
-    return (state.x, state.y, state.height, *state.rotation, *below, *upright)
+        numbers = (*place, 0.0, *heading, 0.0, 0.0, state.height, *tilt)
+    else:
+        names, upright = (frames.odom, frames.base, frames.footprint), conjugate(tilt)
+        below = rotate(upright, (0.0, 0.0, -state.height))
+        numbers = (*place, state.height, *state.rotation, *below, *upright)
+    return Template(_transforms, len(numbers), names), numbers
 
 
-def battery(state: Battery, stamp: Time) -> BatteryState:
+def _transforms(stamp: Time, numbers: Numbers, odom: str, first: str, second: str) -> TFMessage:
+    return TFMessage(
+        transforms=[
+            _transform(odom, first, numbers[:7], stamp),
+            _transform(first, second, numbers[7:], stamp),
+        ]
+    )
+
+
+def battery(state: RobotState, stamp: Time) -> BatteryState:
     """Return the charge; what is not reported is NaN, as the message wants it."""
     unknown = math.nan
     return BatteryState(
@@ -231,7 +182,7 @@ def battery(state: Battery, stamp: Time) -> BatteryState:
         charge=unknown,
         capacity=unknown,
         design_capacity=unknown,
-        percentage=unknown if state.charge is None else state.charge / 100.0,
+        percentage=unknown if state.battery is None else state.battery,
         power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
         power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION,
@@ -242,10 +193,14 @@ def battery(state: Battery, stamp: Time) -> BatteryState:
 _ZERO = (0.0, 0.0, 0.0)
 
 
-def _rate_deviation(imu: ImuSample, deviations: Deviations) -> float | None:
-    if imu.angular_velocity is None:
+def _tilt(sample: ImuSample, deviations: Deviations) -> float:
+    return max(deviations.orientation, sample.deviation)
+
+
+def _rate(sample: ImuSample, deviations: Deviations) -> float | None:
+    if sample.angular_velocity is None:
         return None
-    return deviations.rate if imu.rate_differentiated else deviations.gyro
+    return deviations.rate if sample.rate_differentiated else deviations.gyro
 
 
 def _level(rotation: Rotation) -> Rotation:

@@ -134,9 +134,7 @@ class Replay:
             stop.set()
 
     def _publish(self, state: RobotState) -> None:
-        if self._player.seeking:
-            self._robot.update_odometry(state)  # the way is that from the beginning
-        else:
+        if not self._player.seeking:
             self._topics.publish(state)
 
     def _log_change(self, state: LinkState, detail: str) -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import time
-from typing import Protocol as Interface
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from nav_msgs.msg import Odometry
@@ -18,10 +17,8 @@ from message_templates import FastPublisher
 from quad_description import RobotState
 from quad_msgs.msg import FootContacts
 
-from ..estimation import Health, OdometryState
-from ..link import LinkState, LinkStatus
-from ..report import Report
-from ..serial_robot import ROBOT
+from ..link import LinkState
+from ..serial_robot import ObservedRobot, ROBOT
 from . import messages
 from .diagnostics import LinkDiagnostic, robot_diagnostic
 from .parameters import Deviations, Frames
@@ -40,25 +37,6 @@ def log_link(node: Node, state: LinkState, detail: str) -> None:
         node.get_logger().debug(detail)
     else:
         node.get_logger().info(f'{state.value}: {detail}')
-
-
-class ObservedRobot(Interface):
-    """What is published of a robot."""
-
-    names: tuple[str, ...]  # joints in the order of the URDF
-
-    @property
-    def latest(self) -> tuple[Report, RobotState] | None:
-        """The newest report and its state; None while there is none."""
-
-    def status(self) -> LinkStatus:
-        """Return how the link is."""
-
-    def health(self) -> Health:
-        """Return how the robot is."""
-
-    def update_odometry(self, state: RobotState) -> OdometryState | None:
-        """Return where the body is by a state, to be called once for each."""
 
 
 class RobotTopics:
@@ -97,38 +75,26 @@ class RobotTopics:
         """Publish a report, in the thread that has it."""
         # what a controller waits for comes first
         if (joints := state.joints) is not None:
-            self._joint_states.publish(
-                messages.joint_states_template(self._robot.names, joints),
-                self._stamp(joints.time),
-                messages.joint_numbers(joints),
-            )
-        odometry = self._robot.update_odometry(state)
-        if state.imu is None or odometry is None:
+            template, numbers = messages.joint_states(self._robot.names, joints)
+            self._joint_states.publish(template, self._stamp(joints.time), numbers)
+        imu, odometry = state.imu, state.odometry
+        if imu is None or odometry is None:
             self._node.get_logger().error(
-                f'no /imu, /odom, /foot_contacts and transforms: '
-                f'{self._robot.health().imu_problem}; the joints are published, and the robot can '
-                'lie down',
+                f'no /imu, /odom, /foot_contacts and transforms: {state.imu_problem}; the joints '
+                'are published, and the robot can lie down',
                 throttle_duration_sec=WARN_PERIOD,
             )
             return
         deviations, frames, stamp = self._deviations, self._frames, self._stamp(state.time)
-        self._imu.publish(
-            messages.imu_template(state.imu, deviations, frames.imu),
-            stamp,
-            messages.imu_numbers(state.imu),
-        )
-        self._odom.publish(
-            messages.odometry_template(state.imu, deviations, frames),
-            stamp,
-            messages.odometry_numbers(state.imu, odometry, frames),
-        )
-        self._contacts.publish(messages.foot_contacts_template(odometry), stamp, ())
+        for publisher, (template, numbers) in (
+            (self._imu, messages.imu(imu, deviations, frames.imu)),
+            (self._odom, messages.odometry(imu, odometry, deviations, frames)),
+            (self._contacts, messages.foot_contacts(odometry)),
+        ):
+            publisher.publish(template, stamp, numbers)
         if frames.publish:
-            self._tf.publish(
-                messages.transforms_template(frames),
-                stamp,
-                messages.transforms_numbers(odometry, frames),
-            )
+            template, numbers = messages.transforms(odometry, frames)
+            self._tf.publish(template, stamp, numbers)
 
     def publish_diagnostics(
         self,
@@ -145,27 +111,19 @@ class RobotTopics:
             recording: Returns the last file of the black box, maybe of one subject.
             commands: What became of joint commands; None where nobody knows.
         """
-        latest = self._robot.latest
+        state, status = self._robot.latest, self._robot.status()
         now = self._node.get_clock().now().to_msg()
         array = DiagnosticArray()
         array.header.stamp = now
-        array.status = [self.link.describe(name, port, self._robot.status(), recording(''))]
+        array.status = [self.link.describe(name, port, status, recording(''))]
         if commands is not None:
             array.status.append(commands)
-        if latest is not None:
-            report, state = latest
-            health = self._robot.health()
+        if state is not None:
+            error, box = self._robot.gravity_error, recording(ROBOT)
             array.status.append(
-                robot_diagnostic(
-                    name,
-                    port,
-                    report,
-                    health,
-                    signs_checked=state.imu is not None and not state.imu.is_uncertain,
-                    recording=recording(ROBOT),
-                )
+                robot_diagnostic(name, port, state, status, gravity_error=error, recording=box)
             )
-            self._battery.publish(messages.battery(health.battery, now))
+            self._battery.publish(messages.battery(state, now))
         self._diagnostics.publish(array)
 
     def _stamp(self, moment: float) -> int:

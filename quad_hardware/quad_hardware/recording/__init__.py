@@ -5,7 +5,6 @@
 from .fault_watch import FAULT_TEXTS, FaultWatch, LossWatch
 from .memory import SerialMemory
 from .serial_log import Entry, Opened, read_serial_log, SerialLogFile, StateEntered, Transfer
-from .tap import Recorder, tapped
 
 __all__ = [
     'FAULT_TEXTS',
@@ -13,11 +12,9 @@ __all__ = [
     'FaultWatch',
     'LossWatch',
     'Opened',
-    'Recorder',
     'SerialLogFile',
     'SerialMemory',
     'StateEntered',
     'Transfer',
     'read_serial_log',
-    'tapped',
 ]

@@ -45,12 +45,8 @@ class FaultWatch:
         self._imu_problem = ''
         self._fallen = False
 
-    def look(self, report: Report, state: RobotState, imu_problem: str) -> list[str]:
-        """Return what has begun, in words; empty as a rule.
-
-        Args:
-            imu_problem: Why the IMU is of no use; empty while it works.
-        """
+    def check(self, report: Report, state: RobotState) -> list[str]:
+        """Return what has begun, in words; empty as a rule."""
         begun: list[str] = []
         # without its clock a restart is a silence, which is a fault already
         if self._boards.restarted(report) and report.device_time is not None:
@@ -60,9 +56,9 @@ class FaultWatch:
         if self._differs >= CONFIRMATIONS:
             new, self._bits, self._differs = bits & ~self._bits, bits, 0
             begun += [f'the robot reports {FAULT_TEXTS[bit]}' for bit in Fault if bit & new]
-        if imu_problem and not self._imu_problem:
-            begun.append(imu_problem)
-        self._imu_problem = imu_problem
+        if state.imu_problem and not self._imu_problem:
+            begun.append(state.imu_problem)
+        self._imu_problem = state.imu_problem
         if state.imu is not None:
             tilt = state.imu.tilt
             if tilt > MAX_TILT and not self._fallen:

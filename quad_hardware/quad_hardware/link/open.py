@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: 2026 The arm and quad developers
+# SPDX-License-Identifier: Apache-2.0
+"""Opens a robot: its protocol by its firmware version, at 2 Mbaud, then at 115200."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+import select
+import time
+from typing import Any, NamedTuple
+
+from ..exceptions import LinkError, NoAnswerError
+from ..protocol import (
+    Code,
+    Frame,
+    Kind,
+    Model,
+    model_of_firmware,
+    Protocol,
+    PROTOCOLS,
+    Register,
+    ROBOT_KINDS,
+    StreamParser,
+    V2,
+)
+from .dialect import Dialect
+from .port import SerialPort
+from .v1_dialect import V1Dialect
+from .v2_dialect import V2Dialect
+from .vendor import VendorDialect, VendorParser, VendorPort
+
+PSEUDO_TERMINALS = Path('/dev/pts')  # behind which a simulated robot is
+ANSWER_TIME = 0.15  # [s] a robot takes a few milliseconds
+ATTEMPTS = 2
+
+
+class Value(NamedTuple):
+    """What either protocol can be asked for."""
+
+    code: Code  # of protocol v2
+    register: Register  # of protocol v1
+    size: int  # of the answer [B]
+
+
+FIRMWARE = Value(Code.VERSION, Register.FIRMWARE, 10)
+BATTERY = Value(Code.BATTERY, Register.BATTERY, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkOptions:
+    """Where the robot is, and how to talk to it."""
+
+    path: str  # device file
+    protocols: tuple[Protocol, ...] = PROTOCOLS  # what to try, in this order
+    baud: int = 0  # speed [bit/s]; 0 takes each protocol's own
+    model: Model | None = None  # whose ranges scale bytes in protocol v1; None asks the firmware
+    rate: int = 50  # reports a second [Hz]
+    vendor: bool = False  # go through the vendor's own library, and try nothing else
+    vendor_method: str = ''  # name of its method that writes a servo angle
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """A robot that was found, and how to talk to it."""
+
+    port: SerialPort  # the open port, owned by the holder of the session
+    firmware: str  # version of the robot
+    parser: StreamParser | VendorParser  # finds frames in its bytes
+    dialect: Dialect[Any]  # how to talk to it
+    model: Model | None = None  # whose ranges scale bytes in protocol v1; None in others
+
+
+def open_session(options: LinkOptions) -> Session:
+    """Find the robot: by the vendor's library where that is wanted, else by asking it.
+
+    Raises:
+        LinkError: There is no robot, or it is none that walks; the message says what was tried.
+    """
+    now = time.monotonic()
+    if options.vendor:
+        vendor = VendorPort(options.path)
+        try:
+            firmware = vendor.read_version()
+            dialect = VendorDialect(vendor.dog, now, options.vendor_method)
+            return Session(vendor, firmware, VendorParser(), dialect)
+        except LinkError:
+            vendor.close()
+            raise
+    port, protocol, firmware = connect(options.path, options.protocols, options.baud)
+    try:
+        model = None if protocol is V2 else _model(firmware, options)
+    except LinkError:
+        port.close()
+        raise
+    parser = StreamParser(protocol, ROBOT_KINDS)
+    return Session(port, firmware, parser, make_dialect(model, now, options.rate), model)
+
+
+def make_dialect(model: Model | None, now: float, rate: int = 50) -> Dialect[Frame]:
+    """Return how to talk to a robot.
+
+    Args:
+        model: Whose ranges scale bytes in protocol v1; None speaks v2.
+        rate: Reports a second [Hz].
+    """
+    return V2Dialect(now, rate) if model is None else V1Dialect(now, model, rate)
+
+
+def _model(firmware: str, options: LinkOptions) -> Model:
+    """Return whose ranges scale bytes in protocol v1."""
+    model = options.model or model_of_firmware(firmware)
+    if model is None:
+        raise LinkError(
+            f'firmware {firmware!r} is of no known quadruped (M mini, L lite, W or MW '
+            'wheeled); name its ranges with the parameter or option model'
+        )
+    return model
+
+
+class Connection(NamedTuple):
+    """A robot that answered."""
+
+    port: SerialPort  # the open port, owned by the holder of the connection
+    protocol: Protocol  # what the robot speaks
+    firmware: str  # its version
+
+
+def connect(path: str, protocols: Iterable[Protocol] = PROTOCOLS, baud: int = 0) -> Connection:
+    """Open a port and request the firmware version, in one protocol after the other.
+
+    Args:
+        protocols: What to try, in this order.
+        baud: Speed [bit/s]; 0 takes each protocol's own.
+
+    Returns:
+        The first that answers.
+
+    Raises:
+        LinkError: The port cannot be opened or was lost.
+        NoAnswerError: Nobody answers; the message says what was tried.
+    """
+    tried = []
+    for protocol in protocols:
+        speed = baud or protocol.baud
+        tried.append(f'protocol {protocol.name} at {speed} baud')
+        port = SerialPort(path, speed)
+        try:
+            answer = read_value(port, protocol, FIRMWARE)
+        except LinkError:
+            port.close()
+            raise
+        if answer is not None:
+            return Connection(port, protocol, answer.rstrip(b'\0').decode('ascii', 'replace'))
+        port.close()
+    raise NoAnswerError(f'no robot answers on {path} ({", ".join(tried)}); {silence_cause(path)}')
+
+
+def silence_cause(path: str) -> str:
+    """Return what to look at where nobody answers on a port.
+
+    Args:
+        path: Device file, or a link to one.
+    """
+    if Path(path).resolve().is_relative_to(PSEUDO_TERMINALS):
+        return (
+            'it is a pseudo-terminal: does the simulated robot behind it still start, and is this '
+            'machine too busy?'
+        )
+    return 'is it switched on, and is this its port?'
+
+
+def read_value(
+    port: SerialPort,
+    protocol: Protocol,
+    value: Value,
+    timeout: float = ANSWER_TIME,
+    attempts: int = ATTEMPTS,
+) -> bytes | None:
+    """Ask a robot for a value; return its bytes, None when it does not answer.
+
+    Raises:
+        LinkError: The port was lost.
+    """
+    request = Frame(Kind.READ, value.register, bytes((value.size,)))
+    if protocol is V2:
+        request = Frame(Kind.READ, value.code)
+    answers = (send_request(port, protocol, request, value.size, timeout) for _ in range(attempts))
+    return next((answer for answer in answers if answer is not None), None)
+
+
+def send_request(
+    port: SerialPort, protocol: Protocol, request: Frame, size: int, timeout: float
+) -> bytes | None:
+    """Send a request and wait for its answer.
+
+    Args:
+        size: Length of the answer [B]; others are passed over.
+        timeout: How long to wait [s].
+
+    Returns:
+        Payload of the answer, None when there is none in time.
+
+    Raises:
+        LinkError: The port was lost.
+    """
+    parser = StreamParser(protocol, ROBOT_KINDS)
+    port.write(request.encode(protocol))
+    deadline = time.monotonic() + timeout
+    while (left := deadline - time.monotonic()) > 0:
+        readable, _, _ = select.select([port], [], [], left)
+        frames = parser.feed(port.read()) if readable else parser.expire()
+        for frame in frames:
+            if (
+                frame.kind is Kind.REPLY
+                and frame.address == request.address
+                and len(frame.payload) == size
+            ):
+                return frame.payload
+    return None
