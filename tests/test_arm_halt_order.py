@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from model_robots import ready, robot
 import numpy as np
 import pytest
 from servo_commands import SteppedWorker
-from virtual_network import VirtualNetwork
 
 from arm_canopen import MotionSource, OperationMode
 from arm_servo import DisplacementRequest, MotionCore
@@ -111,7 +111,7 @@ class Arm:
             self._source.attach(self._attach)
 
     def _attach(self, source: MotionSource) -> Future[None]:
-        self.net.group.attach(source)
+        self.net.master.attach(source)
         future = Future[None]()
         future.set_result(None)
         return future

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from itertools import pairwise
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from model_robots import ready, robot
 import numpy as np
 import pytest
 from servo_commands import InlineWorker, outcome
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, MotionSource, OperationMode
 from arm_servo import MotionCore
@@ -67,7 +67,7 @@ class Arm:
         self.net.run(TIME / 3)
 
     def _attach(self, source: MotionSource) -> Future[None]:
-        self.net.group.attach(source)
+        self.net.master.attach(source)
         future = Future[None]()
         future.set_result(None)
         return future

@@ -9,16 +9,14 @@ from concurrent.futures import Future
 from pathlib import Path
 import threading
 import time
-from types import SimpleNamespace
 
 import pytest
 
 from arm_canopen import BusError
 from arm_canopen.can import Frame, VirtualBus, VirtualWire
 from arm_canopen.config import BusConfig, MasterConfig
-from arm_canopen.master import runner
 from arm_canopen.master.network import Network
-from arm_canopen.master.runner import NetworkThread
+from arm_canopen.master.runner import Clock, NetworkThread
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard import CobId
 
@@ -133,13 +131,10 @@ class SlowBus(VirtualBus):
 
 
 @pytest.mark.parametrize('look', [0.1, 0.6, 1.1, 3.3])  # of the period
-def test_each_cycle_that_begins_late_updates_the_set_points(
-    look: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_cycle_that_begins_late_updates_the_set_points(look: float) -> None:
     """However late: where SYNC goes on, so do the drives and their motion."""
     period = 0.01
     bus = SlowBus(look * period)
-    monkeypatch.setattr(runner, 'time', SimpleNamespace(monotonic=lambda: bus.now))
     master = MasterConfig(1, sync_period=period, cycle_period=period)
     done = threading.Event()
     order: list[str] = []
@@ -152,7 +147,7 @@ def test_each_cycle_that_begins_late_updates_the_set_points(
 
     network = Network(BusConfig(Path('bus.yml'), master, ()), send, lambda event: None)
     network.on_cycle = lambda now, period: order.append('update')
-    thread = NetworkThread(bus, network)
+    thread = NetworkThread(bus, network, Clock(now=lambda: bus.now))
     thread.start()
     assert done.wait(TIMEOUT)
     thread.stop()

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, sdo_write, with_defaults
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen.config import Identity, NodeConfig
 from arm_canopen.config.model.boot_plan import (

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bus_rig import VirtualNetwork
 from config_samples import eds_text
 from drive_samples import bus_config
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import Severity
 from arm_canopen.config import BusConfig, load_bus, NodeConfig

@@ -29,7 +29,14 @@ class BusThread:
     Other threads get a future for what they hand over; nothing is locked.
     """
 
-    def __init__(self, bus: Bus, name: str, serve: Callable[[], None], owner: str) -> None:
+    def __init__(
+        self,
+        bus: Bus,
+        name: str,
+        serve: Callable[[], None],
+        owner: str,
+        future: Callable[[], Future[Any]] = Future,
+    ) -> None:
         """Prepare; serve is the owner's loop until :attr:`stopping`. The caller closes the bus."""
         self.stopping = False
         # called in the thread, at its end, with the defect that has ended it
@@ -37,6 +44,7 @@ class BusThread:
         self._bus = bus
         self._serve = serve
         self._owner = owner
+        self._future = future
         self._work: deque[tuple[Future[Any], Callable[[], None]]] = deque()
         self._open: set[Future[Any]] = set()
         self._too_early = ''
@@ -71,7 +79,7 @@ class BusThread:
         Returns:
             Its result or its error; a BusError where the thread has ended or ends before.
         """
-        future: Future[T] = Future()
+        future: Future[T] = self._future()
         self._hand_over(future, lambda: future.set_result(function()))
         return future
 
@@ -81,7 +89,7 @@ class BusThread:
         Returns:
             The future; a BusError where the thread ends before.
         """
-        future: Future[T] = Future()
+        future: Future[T] = self._future()
 
         def start() -> None:
             self._open.add(future)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-import time
 
 from ..cia402.drive_commands import DriveCommands, Sequence
 from ..cia402.position_modes import Move
@@ -51,7 +50,7 @@ class CanopenDrive:
         Raises:
             BusError: The master has ended.
         """
-        return self._thread.call(lambda: drive_status(self._drive, time.monotonic())).result()
+        return self._thread.call(lambda: drive_status(self._drive, self._thread.now())).result()
 
     @property
     def state(self) -> DriveState:

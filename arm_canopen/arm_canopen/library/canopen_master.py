@@ -38,7 +38,7 @@ from ..master.events import Event, EventKind, Report, Severity
 from ..master.network import Network
 from ..master.other_master import describe, listen, refuse_other_master
 from ..master.remote_node import RemoteNode
-from ..master.runner import NetworkThread, OWNER
+from ..master.runner import Clock, NetworkThread, OWNER
 from ..master.scheduler import Scheduler
 from ..standard.cob_id import CobId
 from ..standard.objects import Index
@@ -127,6 +127,7 @@ class CanopenMaster:
         thread_priority: int = THREAD_PRIORITY,
         beside_master: bool = False,
         black_box: BlackBoxSettings | None = None,
+        clock: Clock | None = None,
     ) -> None:
         """Build it; nothing is sent before :meth:`boot`.
 
@@ -137,11 +138,13 @@ class CanopenMaster:
             thread_priority: SCHED_FIFO priority of the cycle, where it is allowed; 0 for none.
             beside_master: Start although another master is found, and command no device of its.
             black_box: How the last frames are written when a fault happens; None for not at all.
+            clock: The time of tests; None for the steady clock.
         """
         self.bus = config
         self.can = can
         can.limit_queue(QUEUED_CYCLES * frames_per_cycle(config))
-        self.load = BusLoad(config.master.bitrate, time.monotonic())  # how busy the bus is
+        self._clock = clock or Clock()
+        self.load = BusLoad(config.master.bitrate, self._clock.now())  # how busy the bus is
         self.black_box: BlackBox | None = None  # writes the last frames when a fault happens
         self.started = False  # the cycle was started, so that the devices are ours to stop
         # called in the thread of the cycle when the last device has booted
@@ -163,7 +166,7 @@ class CanopenMaster:
         self.network = Network(config, self._transmit, self._report, beside_master=beside_master)
         self.network.on_frame = receive
         # of the cycle; it owns all of this once it was started
-        self.thread = NetworkThread(can, self.network)
+        self.thread = NetworkThread(can, self.network, self._clock)
         self.thread.refuse_before_start(f'{OWNER} does not run; call boot() first')
         self.thread.on_defect = self._stop_without_cycle
         self.thread.on_failure = self._booted.set  # who waits there sees the failure
@@ -358,9 +361,9 @@ class CanopenMaster:
             OtherMasterError: There is one, and beside_master is not set.
         """
         if not self._beside_master:
-            refuse_other_master(self.can, self.bus)
+            refuse_other_master(self.can, self.bus, self._clock.now)
             return ''
-        found = listen(self.can, self.bus)
+        found = listen(self.can, self.bus, self._clock.now)
         return describe(found) if found else ''
 
     def start(self, begin: Callable[[], None] = lambda: None) -> None:

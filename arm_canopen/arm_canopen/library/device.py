@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from functools import partial
-import time
 
 from ..config.model import NodeConfig
 from ..master.remote_node import RemoteNode
@@ -82,7 +81,7 @@ class CanopenDevice:
         Raises:
             BusError: The master has ended.
         """
-        return self._thread.call(lambda: node_status(self._device, time.monotonic())).result()
+        return self._thread.call(lambda: node_status(self._device, self._thread.now())).result()
 
     def send_nmt(self, command: NmtCommand) -> None:
         """Send an NMT command to the device; return when the bus has taken it.

@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-import time
 
 from ..can.bus import Bus
 from ..can.frame import Frame
@@ -105,9 +104,7 @@ class OtherMasterWatch:
             self._report(Event(EventKind.BUS, self._severity, '', text))
 
 
-def listen(
-    bus: Bus, config: BusConfig, clock: Callable[[], float] = time.monotonic
-) -> Counter[MasterFrame]:
+def listen(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> Counter[MasterFrame]:
     """Listen for another master on a bus that nobody else reads, without a word.
 
     Returns:
@@ -134,13 +131,13 @@ def describe(found: Counter[MasterFrame]) -> str:
     )
 
 
-def refuse_other_master(bus: Bus, config: BusConfig) -> None:
+def refuse_other_master(bus: Bus, config: BusConfig, clock: Callable[[], float]) -> None:
     """Listen, and refuse a bus that another master leads.
 
     Raises:
         OtherMasterError: There is one; the message names its frames.
     """
-    found = listen(bus, config)
+    found = listen(bus, config, clock)
     if found:
         raise OtherMasterError(
             f'another master is on {bus.name}: it sent {describe(found)} in '

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import partial
 import logging
 import math
@@ -31,14 +32,25 @@ OWNER = 'the CANopen master'  # of the thread, for messages
 logger = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class Clock:
+    """The time of a master, and what its callers wait with; tests have a time of their own."""
+
+    now: Callable[[], float] = time.monotonic  # steady time in [s]
+    future: Callable[[], Future[Any]] = Future  # of what another thread hands over
+
+
 class NetworkThread:
     """Owns the cycle, and all reading and writing of the bus.
 
     Other threads hand work to it with ``call`` and ``run`` and get a future; nothing is locked.
+    Without a thread, :meth:`begin` and then :meth:`step`, again and again, do the same.
     """
 
-    def __init__(self, bus: Bus, network: Network) -> None:
+    def __init__(self, bus: Bus, network: Network, clock: Clock | None = None) -> None:
         """The bus is open, and stays the caller's to close."""
+        clock = clock or Clock()
+        self.now = clock.now  # steady time in [s]
         self.network = network  # the network that it runs
         self.period = network.config.master.cycle_period  # length of the cycle in [s]
         # defect that has ended it; None while it runs, and after a wanted end
@@ -48,7 +60,8 @@ class NetworkThread:
         self.on_failure: Callable[[], None] = lambda: None
         self._statistics = CycleStatistics(self.period)
         self._cycle_time = 0.0
-        self._thread = BusThread(bus, 'canopen', self._serve, OWNER)
+        self._timer = CycleTimer(self.period, clock.now())
+        self._thread = BusThread(bus, 'canopen', self._serve, OWNER, clock.future)
         self._thread.on_failure = self._fail  # called in the thread when there is one
 
     def refuse_before_start(self, reason: str) -> None:
@@ -100,17 +113,36 @@ class NetworkThread:
         self.failure = BusError(text)
         self.on_failure()
 
+    def begin(self) -> None:
+        """Begin to boot the devices; the first cycle is due at once."""
+        self.network.start(self.now())
+        self._timer = CycleTimer(self.period, self.now())
+
+    @property
+    def next_due(self) -> float:
+        """When the next cycle, update or timer is due in [s]."""
+        timer = self.network.scheduler.next_deadline() or math.inf
+        return min(self._timer.deadline, timer, self.network.next_update)
+
+    def step(self) -> None:
+        """Take what comes until something is due, and do that; SYNC comes before all else."""
+        now = self.now()
+        if now < self._timer.deadline:
+            self._take(self._thread.receive(max(0.0, self.next_due - now)))
+            now = self.now()
+            if now < self._timer.deadline:
+                self._log_defects(partial(self.network.advance, now))
+                self._update_when_due(now)
+                return
+        cycle = self._timer.begin(now)
+        self._log_defects(self.network.sync)
+        self._statistics.record(cycle.late + self.now() - now, cycle.skipped)
+        self._begin_cycle(cycle, now)
+
     def _serve(self) -> None:
-        self.network.start(time.monotonic())
-        timer = CycleTimer(self.period, time.monotonic())
+        self.begin()
         while not self._thread.stopping:
-            self._serve_until(timer.deadline)
-            now = time.monotonic()
-            cycle = timer.begin(now)
-            self._log_defects(self.network.sync)
-            sent = time.monotonic()
-            self._statistics.record(cycle.late + sent - now, cycle.skipped)
-            self._begin_cycle(cycle, now)
+            self.step()
 
     def _begin_cycle(self, cycle: Cycle, now: float) -> None:
         """Do what follows SYNC, with what has come before it taken first.
@@ -127,29 +159,13 @@ class NetworkThread:
         self._take([frame for frame in frames if frame.timestamp >= now])
         self._update_when_due(now)  # the deadline may have passed before anybody looks again
 
-    def _serve_until(self, deadline: float) -> None:
-        """Take frames, hand-overs and timers, and update, until the next SYNC is due."""
-        network = self.network
-        while not self._thread.stopping:
-            now = time.monotonic()
-            if now >= deadline:
-                return
-            timer = network.scheduler.next_deadline() or math.inf
-            wake = min(deadline, timer, network.next_update)
-            self._take(self._thread.receive(max(0.0, wake - now)))
-            now = time.monotonic()
-            if now >= deadline:
-                return
-            self._log_defects(partial(network.advance, now))
-            self._update_when_due(now)
-
     def _update_when_due(self, now: float) -> None:
         if now >= self.network.next_update:
             self._log_defects(partial(self.network.update, self._cycle_time, self.period))
 
     def _take(self, frames: list[Frame]) -> None:
         receive = self.network.receive
-        self.network.scheduler.set_time(time.monotonic())
+        self.network.scheduler.set_time(self.now())
         for frame in frames:
             try:
                 receive(frame)

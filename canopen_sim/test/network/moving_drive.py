@@ -7,9 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode, Severity
 from arm_canopen.config.model.drive import RecoveryPolicy

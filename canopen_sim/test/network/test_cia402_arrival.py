@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import AxisFeedback, DriveError, OperationMode, Refusal
 from arm_canopen.cia402.position_modes import Move
@@ -118,6 +118,6 @@ def test_a_motion_source_that_takes_the_drive_replaces_a_motion() -> None:
     motion = client.move_to(0.3)
     drive = client.net.drives[JOINT]
     client.net.run_until(lambda: drive.control.stream_refusal is None)
-    client.net.group.attach(Onwards())
+    client.net.master.attach(Onwards())
     with pytest.raises(DriveError, match='got another target'):
         client.net.result(motion)

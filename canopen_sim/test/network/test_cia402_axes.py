@@ -7,9 +7,9 @@ from __future__ import annotations
 from pathlib import Path
 import re
 
+from bus_rig import VirtualNetwork
 from drive_samples import DRIVE_EDS
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, DriveState, OperationMode
 from arm_canopen.config import load_bus

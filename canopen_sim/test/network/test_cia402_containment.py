@@ -9,9 +9,9 @@ from dataclasses import replace
 import itertools
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import (
     AxisFeedback,
@@ -70,7 +70,7 @@ class Arm:
             self.net.do(name, 'init')
             self.net.select(name, OperationMode.CYCLIC_POSITION)
         self.source = Stream()
-        self.net.group.attach(self.source)
+        self.net.master.attach(self.source)
         self.net.run(0.3)
 
 

@@ -9,9 +9,9 @@ from dataclasses import replace
 import math
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, PERIOD, SCALE, sdo_write
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import AxisFeedback, OperationMode, Refusal, RefusalCause, Setpoint
 
@@ -62,7 +62,7 @@ def follow(source: Ramp, *, mapped: bool = True, mode: OperationMode = MODE) -> 
     net.boot()
     net.do(JOINT, 'init')
     net.select(JOINT, mode)
-    net.group.attach(source)
+    net.master.attach(source)
     net.run(0.5)
     return net
 
@@ -92,7 +92,7 @@ def test_it_ends_with_the_stream() -> None:
     assert offsets(net) == (0, 0)
 
     net = follow(source := Ramp())
-    net.group.detach(source)
+    net.master.detach(source)
     net.run(2 * PERIOD)
     assert offsets(net) == (0, 0)
 
@@ -168,7 +168,7 @@ def test_an_offset_of_somebody_else_stays() -> None:
     net.boot()
     net.do(JOINT, 'init')
     net.select(JOINT, MODE)
-    net.group.attach(Ramp(0.0, 0.0))
+    net.master.attach(Ramp(0.0, 0.0))
     net.run(0.5)
     assert net.drives[JOINT].view.velocity == pytest.approx(SPEED, rel=0.05)
     assert offsets(net) == (0, 17)

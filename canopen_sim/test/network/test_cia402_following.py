@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import replace
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE, sdo_write
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode, RefusalCause, Severity
 from arm_canopen.can import Frame

@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import (
     AxisFeedback,
@@ -182,7 +182,7 @@ class Careless:
 def test_a_source_that_fails_when_it_loses_its_axis_harms_nobody() -> None:
     """The loss of the device is handled all the same, and the source is named."""
     net = pair(OperationMode.CYCLIC_POSITION)
-    net.group.attach(Careless())
+    net.master.attach(Careless())
     net.run(0.1)
     net.power_off(ODD)
     net.run(1.0)
@@ -226,7 +226,7 @@ def test_a_stream_that_jumps_on_its_way_is_refused(jump: float) -> None:
     """Not only its start is checked: the axis is braked and released, and nothing jumps."""
     net = pair(OperationMode.CYCLIC_POSITION)
     source = Script(jump)
-    net.group.attach(source)
+    net.master.attach(source)
     begin = motor(net, GOOD)
     net.run(0.5)
     assert motor(net, GOOD) == pytest.approx(begin, abs=1e-3)
@@ -242,7 +242,7 @@ def test_a_source_that_answers_for_another_number_of_axes_is_detached(
 ) -> None:
     """Nobody could say which set-point is whose."""
     net = pair(OperationMode.CYCLIC_POSITION)
-    net.group.attach(Script(*answers))
+    net.master.attach(Script(*answers))
     net.run(0.5)
     reported = f'answered {len(answers)} set-points for 1 axes'
     assert any(reported in text for text in net.reported(Severity.ERROR))

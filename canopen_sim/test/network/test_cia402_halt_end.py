@@ -12,11 +12,11 @@ from enum import auto, Enum
 from functools import partial
 import math
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, OperationMode, Severity
 from arm_canopen.can import Frame

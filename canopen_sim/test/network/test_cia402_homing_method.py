@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, sdo_write
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, Severity
 from arm_canopen.master.scheduler import Promise

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 import math
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import (
     AxisFeedback,
@@ -170,15 +170,15 @@ def test_a_source_attached_again_goes_on(net: VirtualNetwork) -> None:
     """What it still has is not taken from it; what it had lost it gets back."""
     enabled(net, OperationMode.CYCLIC_POSITION)
     source = Ramp(0.4)
-    net.group.attach(source)
+    net.master.attach(source)
     net.run(0.5)
     begin = net.now
-    net.group.attach(source)
+    net.master.attach(source)
     net.run(0.5)
     assert source.losses == []
     targets = [target / SCALE for target in net.targets(JOINT, since=begin)]
     assert all(b - a == pytest.approx(0.4 * PERIOD, abs=2 / SCALE) for a, b in pairwise(targets))
-    net.group.attach(Ramp(0.0))
+    net.master.attach(Ramp(0.0))
     net.run(0.1)
     assert [loss.cause for loss in source.losses] == [RefusalCause.OTHER_SOURCE]
 
@@ -218,7 +218,7 @@ def test_a_stream_that_jumps_at_the_start_is_refused(net: VirtualNetwork) -> Non
     enabled(net, OperationMode.CYCLIC_POSITION)
     rest = position_inc(net)
     source = Ramp(0.1, jump=0.5)
-    net.group.attach(source)
+    net.master.attach(source)
     net.run(0.5)
     assert position_inc(net) == pytest.approx(rest, abs=1)
     assert source.losses[0].cause is RefusalCause.SETPOINT_REFUSED
@@ -228,7 +228,7 @@ def test_a_single_target_takes_the_axis_from_its_source(net: VirtualNetwork) -> 
     """A target by service ends the stream without a jump, and stays in charge."""
     enabled(net, OperationMode.CYCLIC_POSITION)
     source = Ramp(0.4)
-    net.group.attach(source)
+    net.master.attach(source)
     net.run(0.5)
     net.commands[JOINT].set_target(0.0)
     net.run(3.0)
@@ -252,10 +252,10 @@ def test_bad_sources_move_nothing(net: VirtualNetwork, bad: float) -> None:
     enabled(net, OperationMode.CYCLIC_POSITION)
     rest = position_inc(net)
     nan = Ramp(bad)
-    net.group.attach(nan)
+    net.master.attach(nan)
     net.run(0.2)
     assert len(nan.losses) == 1
-    net.group.attach(Broken(0.1))
+    net.master.attach(Broken(0.1))
     net.run(0.2)
     assert any('a defect' in text for text in net.reported(Severity.ERROR))
     assert position_inc(net) == pytest.approx(rest, abs=1)

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, DriveState, OperationMode, Setpoint
 from arm_canopen.cia402.stop_sequence import SHUTDOWN_MAX

@@ -16,11 +16,11 @@ from itertools import pairwise
 import math
 import struct
 
+from bus_rig import Sent, START, VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, SCALE
 from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
 import pytest
-from virtual_network import Sent, START, VirtualNetwork
 
 from arm_canopen import OperationMode
 from arm_canopen.config import NodeConfig, PdoConfig

@@ -10,6 +10,7 @@ import math
 import struct
 from typing import Any
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -22,7 +23,6 @@ from drive_samples import (
     with_defaults,
 )
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, DriveState, OperationMode, Severity
 from arm_canopen.can import Frame

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import pairwise
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -23,7 +24,6 @@ from drive_samples import (
     sdo_write,
 )
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, DriveState, OperationMode
 from arm_canopen.can import Frame

@@ -9,9 +9,9 @@ from dataclasses import replace
 from itertools import cycle
 import random
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, every_mode, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import (
     DriveError,

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import AxisFeedback, DriveError, DriveState, OperationMode, Refusal, RefusalCause
 
@@ -81,7 +81,7 @@ class Arm:
             self.net.do(name, 'init')
             self.net.select(name, mode)
         self.source = Path()
-        self.net.group.attach(self.source)
+        self.net.master.attach(self.source)
         self.net.run(0.5)
         assert self.motor('joint1') > 0.2
 
@@ -179,7 +179,7 @@ def test_a_source_that_goes_on_moves_a_silent_drive_no_further(mode: OperationMo
             self.losses.clear()
             return super().update(now, period, [replace(axis, refusal=None) for axis in feedback])
 
-    arm.net.group.attach(careless := Careless())
+    arm.net.master.attach(careless := Careless())
     arm.net.run(0.5)
     arm.lose(*TPDOS)
     arm.net.run(TIME_OUT + 1.0 + 0.3)

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 import re
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, drive_dictionary, DRIVE_EDS
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, OperationMode, Severity
 from arm_canopen.config import load_bus, load_eds

@@ -8,6 +8,7 @@ from dataclasses import replace
 import math
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -20,7 +21,6 @@ from drive_samples import (
 )
 from hypothesis import given, strategies
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import OperationMode
 from arm_canopen.can import Frame

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bus_rig import VirtualNetwork
 from drive_samples import DRIVE_EDS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import BusConfig, CanopenError, OperationMode
 from arm_canopen.config import load_bus

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, MOTION_WRITES, PERIOD, SCALE, sdo_write
 from moving_drive import JOINT, MovingDrive, STANDING
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode
 from arm_canopen.cia402.stop_all import stop_all, StopReport

@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, DriveState, OperationMode, Severity
 from arm_canopen.cia402.status import drive_status

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -16,7 +17,6 @@ from drive_samples import (
     with_defaults,
 )
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveError, OperationMode, Setpoint, Severity
 from arm_canopen.config import DriveConfig

@@ -15,6 +15,7 @@ import random
 import re
 from typing import Any
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -26,7 +27,6 @@ from drive_samples import (
     with_defaults,
 )
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import (
     DriveError,

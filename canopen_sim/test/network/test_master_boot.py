@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import itertools
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, sdo_write
 import pytest
 from scripted_device import (
@@ -16,7 +17,6 @@ from scripted_device import (
     ScriptedDevice,
     START,
 )
-from virtual_network import VirtualNetwork
 
 from arm_canopen import EventKind, Severity
 from arm_canopen.config import Identity, NodeConfig

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config
 import pytest
 from scripted_device import (
@@ -18,7 +19,6 @@ from scripted_device import (
     STOP,
 )
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
-from virtual_network import VirtualNetwork
 
 from arm_canopen import CanopenError, Severity
 from arm_canopen.can import Frame

@@ -7,9 +7,9 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
+from bus_rig import FRAME_TIME, VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, PERIOD, sdo_write
 import pytest
-from virtual_network import FRAME_TIME, VirtualNetwork
 
 from arm_canopen import EventKind, SdoAbortError, SdoTimeoutError, Severity
 from arm_canopen.can import Frame

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import itertools
 
+from bus_rig import Sent, START, VirtualNetwork
 from drive_samples import bus_config, drive_config
 import pytest
-from virtual_network import Sent, START, VirtualNetwork
 
 from arm_canopen import BusError, EventKind, Severity
 from arm_canopen.standard import CobId, NmtCommand, NmtState

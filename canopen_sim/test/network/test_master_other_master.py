@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from time import monotonic
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import OtherMasterError, Severity
 from arm_canopen.can import Frame, VirtualBus, VirtualWire
@@ -56,7 +57,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
     """The refusal names frame, sender and remedies, and nothing was sent."""
     with SharedBus(frame) as bus:
         with pytest.raises(OtherMasterError, match='another master is on here') as refusal:
-            refuse_other_master(bus, BUS)
+            refuse_other_master(bus, BUS, monotonic)
         assert bus.counters.sent == 0
     assert words in str(refusal.value)
     assert 'beside_master:=true' in str(refusal.value)
@@ -77,7 +78,7 @@ def test_a_master_that_runs_is_refused_by_name(frame: Frame, words: str) -> None
 def test_devices_and_tools_are_no_master(frame: Frame) -> None:
     """What a device or a tool that only reads may send does not hold up the start."""
     with SharedBus(frame) as bus:
-        refuse_other_master(bus, BUS)
+        refuse_other_master(bus, BUS, monotonic)
         assert bus.counters.received > 0
 
 
@@ -87,7 +88,7 @@ def test_the_last_words_of_a_master_that_ended_do_not_count() -> None:
     with VirtualBus('here', wire) as bus, VirtualBus('there', wire) as ended:
         for _ in range(20):
             ended.send(Frame(0x080))
-        assert not listen(bus, BUS)
+        assert not listen(bus, BUS, monotonic)
 
 
 def test_a_sync_of_somebody_else_is_no_sign_where_the_master_sends_none() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import (
     bus_config,
     drive_config,
@@ -19,7 +20,6 @@ from drive_samples import (
     with_defaults,
 )
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import BusError, CanopenError, CodecError, OperationMode
 from arm_canopen.config import NodeConfig

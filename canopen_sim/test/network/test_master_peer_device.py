@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from bus_rig import VirtualNetwork
 import can
 import canopen
 from drive_samples import bus_config, drive_config, DRIVE_EDS
-from virtual_network import VirtualNetwork
 
 from arm_canopen.can import Frame
 from arm_canopen.config import NodeConfig

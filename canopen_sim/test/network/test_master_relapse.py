@@ -7,11 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 import itertools
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config
 import pytest
 from scripted_device import object_bytes, ScriptedDevice, START
 from test_master_boot import DEVICE_VALUES, io_config, NODE, NODE_ID
-from virtual_network import VirtualNetwork
 
 from arm_canopen import EventKind
 from arm_canopen.can import Frame

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import Severity
 from arm_canopen.can import Frame

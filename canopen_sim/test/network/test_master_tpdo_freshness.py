@@ -9,9 +9,9 @@ from pathlib import Path
 import re
 import struct
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, DRIVE_EDS, SCALE, with_defaults
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode, RefusalCause, Severity
 from arm_canopen.config import BusConfig, load_bus, NodeConfig

@@ -8,9 +8,9 @@ from dataclasses import replace
 from datetime import datetime, timezone
 import re
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, pdo, sdo_write, with_defaults
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import CodecError, EventKind, Severity
 from arm_canopen.can import Frame

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import random
 
+from bus_rig import VirtualNetwork
 from drive_samples import bus_config, drive_config, PERIOD, SCALE
 import pytest
-from virtual_network import VirtualNetwork
 
 from arm_canopen import DriveState, OperationMode
 from arm_canopen.can import Frame

@@ -1,28 +1,28 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A whole CANopen network in virtual time: the master, its drives and simulated devices.
+"""A whole CANopen bus in virtual time: CanopenMaster and simulated devices.
 
-No thread, no clock, no waiting: :meth:`VirtualNetwork.run` jumps from one event to the next, so
-that minutes pass in milliseconds, and each run of a test is the same. Every frame is kept for
-assertions. Stations may fall silent, frames be lost and the bus refuse frames on request.
+No thread and no waiting: :meth:`VirtualNetwork.run` jumps from one event to the next, so that
+minutes pass in milliseconds, and each run of a test is the same. Calls of the master that wait let
+time pass, too. Every frame is kept for assertions. Stations may fall silent, frames be lost and
+the bus refuse frames on request.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
+import logging
 import struct
 from typing import Any, Protocol
 
-from arm_canopen import BusError, Event, OperationMode, Severity
-from arm_canopen.can import Frame
+from arm_canopen import BusError, CanopenMaster, Event, OperationMode, Severity
+from arm_canopen.can import Bus, Frame
 from arm_canopen.can.frame import checked
-from arm_canopen.cia402.drive import Drive
-from arm_canopen.cia402.drive_commands import DriveCommands
-from arm_canopen.cia402.motion_group import MotionGroup
 from arm_canopen.config import BusConfig
-from arm_canopen.master.network import Network
+from arm_canopen.master.runner import Clock
 from arm_canopen.master.scheduler import Promise
 from arm_canopen.standard import ObjectDictionary
 from canopen_sim import Device, ServoModel
@@ -100,16 +100,64 @@ class VirtualWire:
         return sender, frame._replace(timestamp=arrival)
 
 
+class _MasterBus(Bus):
+    """The end of the bus at the master: waiting for frames lets time pass."""
+
+    def __init__(self, net: VirtualNetwork) -> None:
+        super().__init__('virtual')
+        self._net = net
+
+    def send(self, frame: Frame) -> None:
+        """Send as the master."""
+        self._net.wire.put(self._net.now, 'master', frame)
+
+    def receive(self, timeout: float) -> list[Frame]:
+        """Go on to the next event, at most so far; return what it brought for the master."""
+        return self._net.go_on(self._net.now + timeout)
+
+    def wake(self) -> None:
+        """Nothing waits."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+class _Result(Future[Any]):
+    """A result of the master; waiting for it lets time pass."""
+
+    def __init__(self, net: VirtualNetwork) -> None:
+        super().__init__()
+        self._net = net
+
+    def result(self, timeout: float | None = None) -> Any:
+        """Let time pass until it is there."""
+        self._net.run_until(self.done, 60.0 if timeout is None else timeout)
+        return super().result(0.0)
+
+
+class _Defects(logging.Handler):
+    """Keeps what the thread of the master contains and logs, which fails the test."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        logging.getLogger('arm_canopen.master.runner').addHandler(self)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep one."""
+        self.found.append(f'{record.getMessage()}: {record.exc_info}')
+
+
+_defects = _Defects()
+
+
 class VirtualNetwork:
     """A master with its drives, and a simulated device for each node of the configuration.
 
     Attributes:
         now: Virtual time in [s].
         wire: The bus.
-        network: The master.
-        group: Its drives and motion sources.
-        drives: Its drives by name.
-        commands: Their commands by name.
+        master: The master.
         devices: The simulated devices that are switched on, by name.
         stations: All that is connected beside the master, by name.
         events: What the master reported.
@@ -157,24 +205,17 @@ class VirtualNetwork:
 
     def replace_master(self) -> None:
         """Let the master vanish without a word, and another one take its place."""
-        self._cycle_at = NEVER
-        self.network = Network(
+        self._running = False
+        self.master = CanopenMaster(
             self._config,
-            lambda frame: self.wire.put(self.now, 'master', frame),
-            self._note,
+            _MasterBus(self),
+            on_event=self._note,
             beside_master=self._beside_master,
+            clock=Clock(lambda: self.now, lambda: _Result(self)),
         )
-        scheduler = self.network.scheduler
-        drives = [
-            Drive(node, scheduler, axis)
-            for node in self.network.nodes.values()
-            if node.config.is_drive
-            for axis in node.config.axes
-        ]
-        self.drives = {drive.name: drive for drive in drives}
-        self.commands = {drive.name: DriveCommands(drive, scheduler) for drive in drives}
-        self.group = MotionGroup(drives, self._note)
-        self.network.on_cycle = self.group.cycle
+        self.network = self.master.network
+        self.commands = self.master.commands
+        self.drives = {name: each.drive for name, each in self.commands.items()}
         self.network.on_feedback = lambda sync: self.feedback_times.append((self.now, sync))
 
     def connect(self, name: str, station: Station) -> None:
@@ -208,8 +249,9 @@ class VirtualNetwork:
 
     def start(self) -> None:
         """Start the master; its first cycle runs at once."""
-        self.network.start(self.now)
-        self._cycle_at = self.now
+        self.master.started = self._running = True
+        self.master.thread.refuse_before_start('')
+        self.master.thread.begin()
 
     def run(self, duration: float) -> None:
         """Let time pass in [s]."""
@@ -288,48 +330,46 @@ class VirtualNetwork:
         """Say what was reported so far, for messages of failed tests."""
         return '; '.join(self.reported()) or 'nothing was reported'
 
-    def _note(self, event: Event) -> None:
-        self.events.append(event)
-        if not self.allows_defects:
-            assert 'a defect in the CANopen master' not in event.text, event.text
-
-    def _step(self, end: float) -> bool:
-        """Go on to the next event; returns False when there is none until ``end``."""
-        due = min(self._due.values(), default=NEVER)
-        time = min(self.wire.next_arrival, self._cycle_at, due)
-        deadline = self.network.scheduler.next_deadline()
-        if deadline is not None:
-            time = min(time, deadline)
-        if self._cycle_at < NEVER:
-            time = min(time, self.network.next_update)
-        if time > end:
-            self.now = end
-            return False
+    def go_on(self, end: float) -> list[Frame]:
+        """Go on to the next event of bus and stations; return what arrives at the master."""
+        time = min(self.wire.next_arrival, min(self._due.values(), default=NEVER), end)
         self.now = max(self.now, time)
         late = [name for name, deadline in self._due.items() if deadline <= self.now]
+        received = []
         while self.wire.next_arrival <= self.now:
-            self._deliver(*self.wire.take())
+            sender, frame = self.wire.take()
+            if sender != 'master':
+                received.append(frame)
+            self._deliver(sender, frame)
         for name in late:  # what the frames have made due is the next event
             if name in self.stations:
                 self.stations[name].advance(self.now)
                 self._look(name)
-        if self._cycle_at < NEVER:
-            self._serve_master()
+        return received
+
+    def _note(self, event: Event) -> None:
+        self.events.append(event)
+        if not self.allows_defects and 'a defect in the CANopen master' in event.text:
+            _defects.found.append(event.text)
+
+    def _step(self, end: float) -> bool:
+        """Go on to the next event; returns False when there is none until ``end``."""
+        thread = self.master.thread
+        time = min(self.wire.next_arrival, min(self._due.values(), default=NEVER))
+        if self._running:
+            time = min(time, thread.next_due)
+        if time > end:
+            self.now = end
+            return False
+        if self._running:
+            thread.step()
+        else:
+            self.go_on(time)
+        found, _defects.found = _defects.found, []
+        assert not found, found
         return True
 
-    def _serve_master(self) -> None:
-        period = self._config.master.cycle_period
-        if self._cycle_at <= self.now:
-            self.network.sync()
-            self.network.cycle(self.now, period)
-            self._cycle_at += period
-        self.network.advance(self.now)
-        if self.network.next_update <= self.now:
-            self.network.update(self.now, period)
-
     def _deliver(self, sender: str, frame: Frame) -> None:
-        if sender != 'master' and self._cycle_at < NEVER:
-            self.network.receive(frame)
         for name, station in list(self.stations.items()):
             if name == sender or (isinstance(station, Device) and _ignores(station, frame)):
                 continue
