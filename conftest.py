@@ -25,9 +25,9 @@ NICENESS = os.getpriority(os.PRIO_PROCESS, 0)
 OF_ROBOTS = -5  # beside it
 
 _ROOT = Path(__file__).parent
-for _marker in [*_ROOT.glob('*/resource/*'), *_ROOT.glob('libraries/*/resource/*')]:
-    if (_marker.parents[1] / _marker.name / '__init__.py').is_file():
-        importlib.import_module(_marker.name)
+for _setup in [*_ROOT.glob('*/setup.py'), *_ROOT.glob('libraries/*/setup.py')]:
+    for _top in _setup.parent.glob('*/__init__.py'):
+        importlib.import_module(_top.parent.name)
 
 # A shell starts background jobs of a script with SIGINT ignored, which children inherit. Programs
 # that need a handler set it (tests start them with SIGINT ignored); those of the tests need none.

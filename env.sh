@@ -24,12 +24,12 @@ if [ -f "$_workspace_root/.venv/.workspace.json" ]; then
   if [ -f "$_workspace_root/install/local_setup.$_workspace_shell" ]; then
     _workspace_source "$_workspace_root/install/local_setup.$_workspace_shell"
   fi
-  # DDS stays on this host, or is opened as DDS_NETWORK says (libraries/dds_network/README.md)
+  # DDS stays on this host, or is opened as DDS_NETWORK says (libraries/ros_runtime/README.md)
   _workspace_dds=$("$_workspace_root/.venv/bin/python" -I -S -c '
 import sys
 sys.path.insert(0, sys.argv[1])
 from dds_network.shell import main
-sys.exit(main())' "$_workspace_root/libraries/dds_network") && _workspace_status=0 || _workspace_status=1
+sys.exit(main())' "$_workspace_root/libraries/ros_runtime") && _workspace_status=0 || _workspace_status=1
   eval "$_workspace_dds"
   unset _workspace_dds
 else

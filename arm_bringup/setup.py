@@ -7,7 +7,7 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'rich>=13', './arm_canopen', './process_supervisor', './urdf_reader'],
+    requires=['PyYAML>=6', 'rich>=13', './arm_canopen', './robot_primitives', './ros_runtime'],
     extras={
         'motion': [
             'numpy>=1.26',
@@ -16,7 +16,7 @@ runpy.run_path(str(SHARED))['setup_package'](
             './arm_servo',
             './arm_trajectory',
         ],
-        'ros': ['./canopen_sim', './node_runner', './robot_viewer'],
+        'ros': ['./canopen_sim', './robot_viewer'],
     },
     programs=[
         'bringup = arm_bringup.bringup:main',

@@ -11,13 +11,10 @@ runpy.run_path(str(SHARED))['setup_package'](
         'msgpack>=1.0.3',
         'python-can>=4.3',
         'PyYAML>=6',
-        './black_box',
-        './realtime_loop',
-        './urdf_reader',
+        './recording',
+        './robot_primitives',
+        './ros_runtime',
     ],
-    extras={
-        'ros': ['./node_runner'],
-    },
     programs=[
         'canopen_joint_state_publisher = arm_canopen.nodes.joint_state_publisher:main',
         'master = arm_canopen.nodes.master:main',

@@ -13,10 +13,10 @@ runpy.run_path(str(SHARED))['setup_package'](
         'PyYAML>=6',
         './arm_model',
         './arm_trajectory',
-        './urdf_reader',
+        './robot_primitives',
     ],
     extras={
-        'ros': ['./node_runner'],
+        'ros': ['./ros_runtime'],
     },
     programs=[
         'move_group = arm_planning.nodes.move_group:main',

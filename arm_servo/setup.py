@@ -14,11 +14,11 @@ runpy.run_path(str(SHARED))['setup_package'](
         './arm_canopen',
         './arm_model',
         './arm_trajectory',
-        './realtime_loop',
-        './urdf_reader',
+        './robot_primitives',
+        './ros_runtime',
     ],
     extras={
-        'ros': ['./node_runner', './operator_input'],
+        'ros': ['./teleop'],
     },
     programs=[
         'motion_node = arm_servo.ros.motion_node:main',

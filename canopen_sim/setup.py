@@ -9,7 +9,7 @@ SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
     requires=['./arm_canopen'],
     extras={
-        'ros': ['./node_runner'],
+        'ros': ['./ros_runtime'],
     },
     programs=[
         'fake_slave = canopen_sim.nodes.fake_slave:main',

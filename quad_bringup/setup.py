@@ -9,10 +9,9 @@ SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
     requires=[
         'rich>=13',
-        './node_runner',
-        './process_supervisor',
         './quad_controller',
         './quad_description',
+        './ros_runtime',
     ],
     extras={
         'ros': ['./quad_hardware', './quad_sim', './quad_teleop', './robot_viewer'],

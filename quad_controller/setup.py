@@ -12,10 +12,10 @@ runpy.run_path(str(SHARED))['setup_package'](
         'onnxruntime>=1.19',
         'PyYAML>=6.0',
         './quad_description',
-        './rosbag_files',
+        './recording',
     ],
     extras={
-        'ros': ['./message_definitions', './message_templates', './node_runner'],
+        'ros': ['./ros_runtime'],
         'physics': ['./quad_hardware', './quad_sim'],
     },
     programs=[

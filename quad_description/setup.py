@@ -7,9 +7,9 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['PyYAML>=6', 'xacro>=2', './urdf_reader'],
+    requires=['PyYAML>=6', 'xacro>=2', './robot_primitives'],
     extras={
-        'ros': ['./node_runner'],
+        'ros': ['./ros_runtime'],
     },
     programs=[
         'display = quad_description.display:main',

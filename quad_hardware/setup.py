@@ -10,14 +10,11 @@ runpy.run_path(str(SHARED))['setup_package'](
     requires=[
         'pyserial>=3.5',
         'PyYAML>=6',
-        './black_box',
-        './dds_network',
         './quad_description',
-        './urdf_reader',
+        './recording',
+        './robot_primitives',
+        './ros_runtime',
     ],
-    extras={
-        'ros': ['./message_templates', './node_runner'],
-    },
     programs=[
         'calibrate = quad_hardware.calibration.main:main',
         'doctor = quad_hardware.doctor.main:main',
@@ -30,5 +27,4 @@ runpy.run_path(str(SHARED))['setup_package'](
         'xgo-doctor = quad_hardware.doctor.main:main',
         'xgo-protocol = quad_hardware.protocol.page:main',
     ],
-    modules=['quad_hardware', 'xgo_lib2'],
 )

@@ -11,13 +11,12 @@ runpy.run_path(str(SHARED))['setup_package'](
         "mujoco-core; python_version >= '3.11'",
         "mujoco<4; python_version < '3.11'",
         'numpy>=1.26',
-        './process_supervisor',
         './quad_description',
         './quad_hardware',
-        './urdf_reader',
+        './robot_primitives',
+        './ros_runtime',
     ],
     extras={
-        'ros': ['./node_runner'],
         'env': ['gymnasium>=1.1'],
     },
     programs=[

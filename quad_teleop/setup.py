@@ -7,9 +7,9 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['./operator_input', './quad_description'],
+    requires=['./teleop', './quad_description'],
     extras={
-        'ros': ['./node_runner'],
+        'ros': ['./ros_runtime'],
     },
     programs=[
         'teleop_keyboard = quad_teleop.nodes.teleop_keyboard:main',

@@ -7,11 +7,11 @@ import runpy
 
 SHARED = Path(__file__).resolve().parents[1] / 'tools' / 'setup_package.py'
 runpy.run_path(str(SHARED))['setup_package'](
-    requires=['./urdf_reader'],
+    requires=['./robot_primitives'],
     extras={
-        'page': ['numpy', 'trimesh', 'viser', 'websockets', './first_motion'],
+        'page': ['numpy', 'trimesh', 'viser', 'websockets'],
         'foxglove': ['foxglove-sdk>=0.30'],
-        'ros': ['./message_definitions', './node_runner'],
+        'ros': ['./recording', './ros_runtime'],
     },
     programs=[
         'foxglove_bridge = robot_viewer.nodes.foxglove_bridge:main',

@@ -7,6 +7,7 @@ from __future__ import annotations
 import ast
 from functools import cache
 from html.parser import HTMLParser
+import itertools
 import os
 from pathlib import Path
 import re
@@ -24,7 +25,7 @@ SOURCES = (
     'arm_servo/arm_servo',
     'canopen_sim/canopen_sim',
     'canopen_tools/canopen_tools',
-    'libraries/process_supervisor/process_supervisor',
+    'libraries/ros_runtime/process_supervisor',
 )
 SHORTEST = 3  # characters of a text that follows another one
 VALUE = '\0'  # stands for what a text puts in
@@ -88,8 +89,8 @@ def test_executables_exist() -> None:
     foreign = {'plotjuggler', 'rviz2', 'tf2_ros'}
     for package, name in {pair for text in typed() for pair in _executables(text)}:
         if package not in foreign:
-            found = [CHECKOUT / package, CHECKOUT / 'libraries' / package]
-            setup = next(path for path in found if path.is_dir()) / 'setup.py'
+            marks = (CHECKOUT.glob(f'{top}*/resource/{package}') for top in ('', 'libraries/'))
+            setup = next(itertools.chain(*marks)).parents[1] / 'setup.py'
             assert re.search(rf"['\"]{name}\b", setup.read_text('utf-8')), f'{package} {name}'
 
 

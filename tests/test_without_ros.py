@@ -36,8 +36,6 @@ INSTALLED = (
     'quad_teleop',
     'robot_viewer',
     'arm_bringup[motion]',
-    'libraries/message_definitions',
-    'libraries/rosbag_files',
 )
 """Packages that nothing else requires; they bring all others."""
 IMPORTED = [

@@ -24,7 +24,6 @@ def setup_package(
     extras: Mapping[str, Sequence[str]] | None = None,
     programs: Sequence[str] = (),
     commands: Sequence[str] = (),
-    modules: Sequence[str] = (),
     package_data: Sequence[str] = (),
     folders: Sequence[str] = (),
     entry_points: Mapping[str, Sequence[str]] | None = None,
@@ -36,7 +35,6 @@ def setup_package(
         extras: The same for each extra; `ros` is what its nodes need besides.
         programs: Entry points of `ros2 run`.
         commands: Entry points that pip installs.
-        modules: Packages at the top, where there are others than the one of its name.
         package_data: Patterns of files beside its modules.
         folders: Patterns of folders whose files are installed in its share folder.
         entry_points: Other groups.
@@ -46,7 +44,8 @@ def setup_package(
     maintainer = manifest.find('maintainer')
     # colcon runs one of these commands; pip asks for a wheel: what needs `ros2 run` is not in it
     for_ros = not {'develop', 'install'}.isdisjoint(sys.argv)
-    tops = modules or [name]
+    marks = sorted(str(path) for path in Path().glob('resource/*'))
+    tops = [path.parent.name for path in sorted(Path().glob('*/__init__.py'))]
     setuptools.setup(
         name=name,
         version=manifest.findtext('version', ''),
@@ -58,7 +57,7 @@ def setup_package(
         packages=setuptools.find_packages(include=[*tops, *(f'{top}.*' for top in tops)]),
         package_data={top: ['py.typed', *package_data] for top in tops},
         data_files=[
-            ('share/ament_index/resource_index/packages', [f'resource/{name}']),
+            ('share/ament_index/resource_index/packages', marks),
             (f'share/{name}', ['package.xml']),
             *_data_files(name, folders),
         ],

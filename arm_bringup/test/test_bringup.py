@@ -32,7 +32,7 @@ LINES = {
 @pytest.fixture
 def workspace(tmp_path: Path, prefix: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
-    libraries = ('libraries/process_supervisor', 'libraries/dds_network', 'libraries/urdf_reader')
+    libraries = ('libraries/recording', 'libraries/robot_primitives', 'libraries/ros_runtime')
     sources = ('arm_bringup', 'arm_canopen', 'canopen_sim', *libraries)
     workspace = SmallWorkspace(tmp_path, 'arm_bringup', LINES, sources, [prefix])
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)

@@ -14,10 +14,10 @@ ENVIRONMENT = os.environ | {
         for package in (
             'arm_canopen',
             'canopen_tools',
-            'libraries/black_box',
-            'libraries/first_motion',
-            'libraries/operator_input',
-            'libraries/realtime_loop',
+            'libraries/recording',
+            'libraries/robot_primitives',
+            'libraries/ros_runtime',
+            'libraries/teleop',
         )
     )
 }

@@ -37,7 +37,7 @@ bringup.join_ros = lambda given_up, namespace: robot
 @pytest.fixture
 def workspace(tmp_path: Path, isolation: Isolation) -> SmallWorkspace:
     """Install the small programs, in a ROS domain that nobody else is in."""
-    libraries = ('libraries/process_supervisor', 'libraries/dds_network')
+    libraries = ('libraries/recording', 'libraries/ros_runtime')
     sources = ('quad_bringup', 'quad_description', 'quad_hardware', *libraries)
     workspace = SmallWorkspace(tmp_path, 'quad_bringup', LINES, sources)
     workspace.environment['ROS_DOMAIN_ID'] = str(isolation.domain_id)

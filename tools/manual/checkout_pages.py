@@ -95,8 +95,9 @@ def table_of_programs() -> str:
     rows = ['| package | program | what it is |', '|---|---|---|']
     for setup in sorted([*ROOT.glob('*/setup.py'), *ROOT.glob('libraries/*/setup.py')]):
         package = setup.parent
-        link = f'[{package.name}](../../{package.relative_to(ROOT).as_posix()}/README.md)'
+        page = f'../../{package.relative_to(ROOT).as_posix()}/README.md'
         for name, module, function in _executables(setup):
+            link = f'[{module.partition(".")[0]}]({page})'
             rows.append(f'| {link} | `{name}` | {_summary(package, module, function)} |')
     return '\n'.join(rows)
 

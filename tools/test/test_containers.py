@@ -181,7 +181,7 @@ def test_the_image_gets_the_sources_and_nothing_built() -> None:
         'install/x',
         'log/x',
     ]
-    built += ['libraries/urdf_reader/build/x', 'arm_model/a/__pycache__/x', '.workspace.lock']
+    built += ['libraries/recording/build/x', 'arm_model/a/__pycache__/x', '.workspace.lock']
     built += [
         'arm_model/arm_model.egg-info/x',
         '.mypy_cache/x',

@@ -61,8 +61,10 @@ OPTIONAL = {
 """Packages that are used where they are built, and that colcon need not build for this one."""
 FOR_PEOPLE = {'arm_bringup': {'canopen_tools'}}
 """Packages whose commands look at what a bring-up started."""
-OWN = {'quad_hardware': {'quad_hardware', 'xgo_lib2'}}
-"""Modules of a package, where there are others than the one of its name."""
+OF_MODULES = {
+    module.name: name for name, package in PACKAGES.items() for module in package.modules
+}
+"""Package of each module at the top."""
 PHYSICS = {'mujoco'}  # mujoco-core, or below Python 3.11 mujoco
 
 
@@ -87,10 +89,11 @@ def declared(name: str, monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
     return {match[1]: match[2] for match in split if match is not None}
 
 
-def imported(folder: Path) -> Iterator[str]:
+def imported(*folders: Path) -> Iterator[str]:
     """Yield the packages that modules import, but for those that only type checkers do."""
-    for path in folder.rglob('*.py'):
-        yield from modules_of(path)
+    for folder in folders:
+        for path in folder.rglob('*.py'):
+            yield from (OF_MODULES.get(module, module) for module in modules_of(path))
 
 
 def modules_of(path: Path) -> Iterator[str]:
@@ -112,7 +115,7 @@ def modules_of(path: Path) -> Iterator[str]:
 @pytest.mark.parametrize('name', PACKAGES)
 def test_what_is_imported_is_declared(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is missing after `pip install`, and nothing is installed for no use."""
-    used = {each for each in imported(PACKAGES[name].folder / name) if each != name}
+    used = {*imported(*PACKAGES[name].modules)} - {name}
     needed = {DISTRIBUTIONS.get(each, each) for each in used & {*ON_PYPI, *PACKAGES}}
     needed |= STARTED.get(name, set())
     found = {*declared(name, monkeypatch)} - PHYSICS
@@ -157,7 +160,7 @@ def helpers() -> set[str]:
 def test_what_is_imported_has_its_key(name: str) -> None:
     """`rosdep install` and colcon find in package.xml what the modules import, and no more."""
     folder = PACKAGES[name].folder
-    modules = {*imported(folder / name), *imported(folder / 'launch')} - OWN.get(name, {name})
+    modules = {*imported(*PACKAGES[name].modules, folder / 'launch')} - {name}
     found = keys(name, 'exec_depend', 'depend')
     needed = keys_of_imports(modules) | STARTED.get(name, set()) | FOR_PEOPLE.get(name, set())
     missing = needed - found - OPTIONAL.get(name, set())
@@ -170,7 +173,7 @@ def test_what_is_imported_has_its_key(name: str) -> None:
 def test_what_tests_import_has_its_key(name: str) -> None:
     """As a test_depend, unless the modules need it, too."""
     own, found = keys(name, 'exec_depend', 'depend'), keys(name, 'test_depend')
-    modules = {*imported(PACKAGES[name].folder / 'test')} - helpers() - OWN.get(name, {name})
+    modules = {*imported(PACKAGES[name].folder / 'test')} - helpers() - {name}
     missing = keys_of_imports(modules) - own - found - OPTIONAL.get(name, set())
     assert not missing, f'add a test_depend to {name}/package.xml'
     assert not found & own, f'{name}/package.xml names these twice'
@@ -241,8 +244,8 @@ def test_what_runs_on_older_python_than_the_code_is_refused(
 
 
 def test_what_only_linux_has_is_required_there_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rest of operator_input works elsewhere, and evdev cannot be built there."""
-    assert declared('operator_input', monkeypatch)['evdev'].endswith('; sys_platform == "linux"')
+    """The rest of teleop works elsewhere, and evdev cannot be built there."""
+    assert declared('teleop', monkeypatch)['evdev'].endswith('; sys_platform == "linux"')
 
 
 def test_without_its_neighbours_a_package_is_not_installed(

@@ -74,8 +74,8 @@ def test_every_package_is_in_the_contracts() -> None:
     contracts = {each['type']: each for each in configuration['contracts_options']}
     assert contracts['acyclic_siblings']['ancestors'] == named
     packages = find_packages(root).values()
-    python = [package.name for package in packages if package.build_type == 'ament_python']
-    assert sorted(named) == sorted([*python, 'ros2_frontend', 'workspace'])
+    python = [module.name for package in packages for module in package.modules]
+    assert sorted([*named, 'xgo_lib2']) == sorted([*python, 'ros2_frontend', 'workspace'])
 
 
 @pytest.mark.parametrize(

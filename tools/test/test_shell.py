@@ -23,7 +23,7 @@ def checkout(tmp_path: Path) -> Path:
     venv = root / '.venv'
     (venv / 'bin').mkdir(parents=True)
     shutil.copy(this_checkout().root / 'env.sh', root)
-    library = Path('libraries') / 'dds_network'
+    library = Path('libraries') / 'ros_runtime'
     shutil.copytree(this_checkout().root / library, root / library)
     (venv / 'bin' / 'python').symlink_to(sys.executable)
     wheels = Underlay(UnderlayKind.WHEELS, venv)
@@ -83,7 +83,7 @@ def test_discovery_stays_on_this_host_by_default(checkout: Path) -> None:
         done = shell('bash', '. ./env.sh; env', checkout, **outer)
         assert done.returncode == 0
         found = variables(done.stdout)
-        package = checkout / 'libraries' / 'dds_network' / 'dds_network'
+        package = checkout / 'libraries' / 'ros_runtime' / 'dds_network'
         closed = package / 'dds_network_localhost.xml'
         assert found['FASTRTPS_DEFAULT_PROFILES_FILE'] == str(closed)
         assert found['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SYSTEM_DEFAULT'

@@ -107,10 +107,11 @@ class Builder:
             made += [kind / name for kind in index.glob('*')]
             made += (install / 'lib').glob(f'lib{name}__*.so')
             made += (install / link.PYTHON).glob(f'{name}-*.dist-info')
+            # links to modules and marks of other names
             made += [
                 path
-                for path in (install / link.PYTHON).glob('*')
-                if path.is_symlink() and path.readlink().parent.name == name
+                for path in [*(install / link.PYTHON).glob('*'), *index.glob('packages/*')]
+                if path.is_symlink() and name in path.readlink().parts[-3:-1]
             ]
             for path in made:
                 if path.is_dir() and not path.is_symlink():
@@ -125,8 +126,11 @@ class Builder:
             wanted: The packages of the workspace that are not the underlay's.
         """
         keep = set(wanted)
-        marks = 'share/ament_index/resource_index/packages/*'
-        names = {mark.name for mark in self.layout.install.glob(self._prefixes + marks)}
+        marks = self.layout.install.glob(
+            f'{self._prefixes}share/ament_index/resource_index/packages/*'
+        )
+        # a second name of a package, for its programs, has no folder
+        names = {mark.name for mark in marks if (mark.parents[3] / mark.name).is_dir()}
         return sorted(
             name for name in names if name not in keep or self._stamp(name)[0] != self.base
         )

@@ -22,7 +22,7 @@ COMPOSE_SCHEMA = ('--builtin-schema', 'vendor.compose-spec')  # of the Compose S
 def type_check_units(root: Path) -> dict[str, list[Path]]:
     """Group the folders that mypy checks together: modules of two units may have one name."""
     candidates = {
-        package.name: [package.folder / part for part in (package.name, *BESIDE)]
+        package.name: [*package.modules, *(package.folder / part for part in BESIDE)]
         for package in find_packages(root).values()
         if package.build_type == 'ament_python'
     }

@@ -44,6 +44,11 @@ class Package:
     is_interface: bool
     is_copy: bool
 
+    @property
+    def modules(self) -> list[Path]:
+        """The folders of its Python packages; usually one, of its name."""
+        return [path.parent for path in sorted(self.folder.glob('*/__init__.py'))]
+
 
 def read_package(manifest: Path) -> Package:
     """Read a package.xml (REP 149)."""

@@ -18,5 +18,5 @@ import sys
 _LIBRARIES = Path(__file__).resolve().parents[3] / 'libraries'
 
 # of this checkout; they need not be built, as `ros2` itself need not be
-for _library in ('dds_network', 'message_definitions', 'rosbag_files'):
+for _library in ('recording', 'ros_runtime'):
     sys.path.append(str(_LIBRARIES / _library))
