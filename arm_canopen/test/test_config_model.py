@@ -42,7 +42,7 @@ from arm_canopen.config.findings import Place
 from arm_canopen.config.model.drive import RecoveryPolicy
 from arm_canopen.config.read.document import Item, Scalar, ScalarKind, YamlMap
 from arm_canopen.config.resolve.eds_files import DEFAULT_DRIVE
-from arm_canopen.config.resolve.merge import merge_device
+from arm_canopen.config.resolve.layout import merge_device
 from arm_canopen.config.sections import DeviceSettings, MasterSettings
 from arm_canopen.standard import CAN_ID_MASK, DataType
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import CodecError
-from arm_canopen.config.read.object_text import BYTE_TYPES, bytes_from_text, text_from_bytes
+from arm_canopen.config.read.eds_values import BYTE_TYPES, bytes_from_text, text_from_bytes
 from arm_canopen.standard import byte_length, DataType, integer_range, REAL_FORMATS
 
 NUMBERS = [data_type for data_type in DataType if integer_range(data_type) is not None]

@@ -13,7 +13,7 @@ import pytest
 
 from arm_canopen.config import load_eds
 from arm_canopen.config.findings import Findings
-from arm_canopen.config.resolve.parameter_values import parameter_writes
+from arm_canopen.config.resolve.sdo_list import parameter_writes
 from arm_canopen.standard import is_drive
 from canopen_tools import EdsReport, lint_eds
 

@@ -13,8 +13,7 @@ from ..exceptions import DriveError, SdoTimeoutError
 from ..master.events import Severity
 from ..master.scheduler import completed, Promise, Scheduler, Task
 from ..standard.dictionary import object_address
-from ..standard.drive import DriveState, OperationMode
-from ..standard.target_objects import TARGET_OBJECTS
+from ..standard.drive import DriveState, OperationMode, TARGET_OBJECTS
 from .drive import Drive
 from .drive_control import NOT_TAKEN
 from .drive_view import FAULTY

@@ -9,9 +9,8 @@ import math
 
 from ..master.process_image import SentRpdo, Writer
 from ..master.remote_node import RemoteNode
-from ..standard.drive import drive_state, DriveState, OperationMode
+from ..standard.drive import drive_state, DriveState, OperationMode, TARGET_OBJECTS
 from ..standard.objects import AXIS_OFFSET, Index
-from ..standard.target_objects import TARGET_OBJECTS
 
 
 class DriveObjects:

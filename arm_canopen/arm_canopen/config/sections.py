@@ -22,10 +22,8 @@ from ..standard.cob_id import NODE_ID_MAX, NODE_ID_MIN
 from ..standard.dictionary import ObjectDictionary
 from ..standard.lss import BIT_RATES_KBIT
 from .keys import Key, key, keys_of, Kind, Use
-from .model.bus import NodeConfig
+from .model.bus import ANY_DEVICE, MasterConfig, NodeConfig
 from .model.drive import DriveConfig
-from .model.identity import ANY_DEVICE
-from .model.master import MasterConfig
 from .units import HUNDRED_MICROSECONDS, KILOBIT, MICROSECONDS, MILLISECONDS
 
 U8_MAX, U16_MAX, U32_MAX = 0xFF, 0xFFFF, 0xFFFF_FFFF

@@ -10,7 +10,7 @@ from enum import Enum
 from functools import partial
 
 from ..config.model import BusConfig, SdoWrite
-from ..config.model.identity import Identity
+from ..config.model.bus import Identity
 from ..exceptions import BootError, BusError, SdoAbortError, SdoError, SdoTimeoutError
 from ..standard.nmt import NmtCommand, NmtState
 from ..standard.objects import Index

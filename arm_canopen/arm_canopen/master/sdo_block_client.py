@@ -7,8 +7,7 @@ from __future__ import annotations
 import struct
 
 from ..exceptions import SdoError, SdoTimeoutError
-from ..standard.sdo_abort import AbortCode
-from ..standard.sdo_block import (
+from ..standard.sdo import (
     ACKNOWLEDGE_UPLOAD,
     block_frames,
     BLOCK_SEGMENTS_MAX,
@@ -29,6 +28,7 @@ from ..standard.sdo_block import (
     UPLOAD_INITIATE,
     UPLOAD_INITIATED,
 )
+from ..standard.sdo_abort import AbortCode
 from .scheduler import Scheduler
 from .sdo_channel import Match, SdoChannel
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from ..config.model.master import MasterConfig
+from ..config.model.bus import MasterConfig
 from ..standard.nmt import ALL_NODES, NmtCommand
 from .events import Event, EventKind, Report, Severity
 from .nmt_sender import SendNmt

@@ -10,10 +10,9 @@ from dataclasses import replace
 from ..exceptions import BootError, CodecError, SdoAbortError, SdoError
 from ..standard.datatypes import decode
 from ..standard.dictionary import object_address
-from ..standard.drive import OperationMode
+from ..standard.drive import OperationMode, TARGET_OBJECTS
 from ..standard.objects import AXIS_OFFSET, Index, OFFSETS
 from ..standard.pdo import MappedObject, Number
-from ..standard.target_objects import TARGET_OBJECTS
 from .process_image import SentRpdo
 from .remote_node import RemoteNode
 from .remote_objects import start_value

@@ -9,7 +9,7 @@ from functools import partial
 
 from arm_msgs.srv import ReadObject, WriteObject
 
-from ..config.read.object_text import bytes_from_text, text_from_bytes
+from ..config.read.eds_values import bytes_from_text, text_from_bytes
 from ..exceptions import CanopenError, ObjectError
 from ..master.runner import NetworkThread
 from ..standard.dictionary import object_address, ObjectEntry

@@ -27,9 +27,27 @@ from .datatypes import (
     SIGNED_BITS,
     UNSIGNED_BITS,
 )
-from .device_profile import DeviceProfile, drive_axes, is_drive, PROFILE_MASK, profile_number
-from .dictionary import AccessType, object_address, ObjectCode, ObjectDictionary, ObjectEntry
-from .drive import Controlword, drive_state, mode_title, STATE_WORDS, Statusword
+from .dictionary import (
+    AccessType,
+    DeviceProfile,
+    drive_axes,
+    is_drive,
+    object_address,
+    ObjectCode,
+    ObjectDictionary,
+    ObjectEntry,
+    PROFILE_MASK,
+    profile_number,
+)
+from .drive import (
+    Controlword,
+    CYCLIC_MODES,
+    drive_state,
+    mode_title,
+    STATE_WORDS,
+    Statusword,
+    TARGET_OBJECTS,
+)
 from .emcy import Emergency, error_code_text, error_register_text
 from .lss import (
     ADDRESS_BITS,
@@ -77,7 +95,6 @@ from .sdo import (
     UploadSegmentRequest,
 )
 from .sdo_abort import abort_text, AbortCode
-from .target_objects import CYCLIC_MODES, TARGET_OBJECTS
 from .time_of_day import decode_time_of_day, encode_time_of_day
 
 __all__ = [

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from enum import IntEnum, IntFlag
 
+from .objects import Index
+
 
 class DriveState(IntEnum):
     """States of the power drive system (CiA 402-2, figure 4), numbered as in ros2_canopen."""
@@ -146,3 +148,25 @@ def statusword_text(statusword: int) -> str:
     bits = [text for bit, text in STATUS_TEXTS if statusword & bit]
     extra = f' ({", ".join(bits)})' if bits else ''
     return f'0x{statusword:04X} {drive_state(statusword).title}{extra}'
+
+
+TARGET_OBJECTS: dict[OperationMode, tuple[Index, int]] = {
+    OperationMode.PROFILE_POSITION: (Index.TARGET_POSITION, 0),
+    OperationMode.VELOCITY: (Index.VL_TARGET_VELOCITY, 0),
+    OperationMode.PROFILE_VELOCITY: (Index.TARGET_VELOCITY, 0),
+    OperationMode.PROFILE_TORQUE: (Index.TARGET_TORQUE, 0),
+    OperationMode.INTERPOLATED_POSITION: (Index.INTERPOLATION_DATA, 1),
+    OperationMode.CYCLIC_POSITION: (Index.TARGET_POSITION, 0),
+    OperationMode.CYCLIC_VELOCITY: (Index.TARGET_VELOCITY, 0),
+    OperationMode.CYCLIC_TORQUE: (Index.TARGET_TORQUE, 0),
+}
+
+CYCLIC_MODES = frozenset(
+    {
+        OperationMode.INTERPOLATED_POSITION,
+        OperationMode.CYCLIC_POSITION,
+        OperationMode.CYCLIC_VELOCITY,
+        OperationMode.CYCLIC_TORQUE,
+    }
+)
+"""Modes whose targets come with every SYNC (CiA 402-2, clauses 12 to 16)."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 import struct
 
 from arm_canopen.standard import AbortCode
-from arm_canopen.standard.sdo_block import (
+from arm_canopen.standard.sdo import (
     ACKNOWLEDGE_UPLOAD,
     block_frames,
     BLOCK_SEGMENTS_MAX,

@@ -26,8 +26,7 @@ from arm_canopen.standard import (
     UploadResponse,
     UploadSegmentRequest,
 )
-from arm_canopen.standard.sdo import Abort, Segment
-from arm_canopen.standard.sdo_block import CLIENT_DOWNLOAD, CLIENT_UPLOAD
+from arm_canopen.standard.sdo import Abort, CLIENT_DOWNLOAD, CLIENT_UPLOAD, Segment
 
 from ..objects.object_store import ObjectStore, refusal, STRING_BYTES_MAX
 from ..timed import NEVER

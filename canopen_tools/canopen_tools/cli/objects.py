@@ -8,7 +8,7 @@ import argparse
 
 from arm_canopen import CodecError, SdoAbortError
 from arm_canopen.can import open_bus
-from arm_canopen.config.read.object_text import bytes_from_text, text_from_bytes
+from arm_canopen.config.read.eds_values import bytes_from_text, text_from_bytes
 from arm_canopen.standard import DataType, Index, ObjectEntry
 from arm_canopen.standard.sdo import fitted
 

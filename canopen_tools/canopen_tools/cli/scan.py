@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from arm_canopen import SdoError
 from arm_canopen.can import Frame, open_bus
 from arm_canopen.config import BusConfig, Identity, load_bus, NodeConfig
-from arm_canopen.config.model.identity import IDENTITY_OBJECTS
+from arm_canopen.config.model.bus import IDENTITY_OBJECTS
 from arm_canopen.master import SdoClient
 from arm_canopen.standard import (
     CobId,

@@ -6,10 +6,8 @@ It is made of plain values, and imports nothing that reads files.
 """
 
 from ..findings import Place
-from .bus import BusConfig, NodeConfig, PdoConfig, SdoWrite
+from .bus import BusConfig, Identity, MasterConfig, NodeConfig, PdoConfig, SdoWrite
 from .drive import DriveConfig, RecoveryPolicy
-from .identity import Identity
-from .master import MasterConfig
 
 __all__ = [
     'BusConfig',

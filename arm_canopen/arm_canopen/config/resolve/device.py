@@ -9,15 +9,18 @@ from dataclasses import replace
 from itertools import product
 
 from ...standard.datatypes import DataType, UNSIGNED_BITS
-from ...standard.device_profile import drive_axes, is_drive, profile_number
-from ...standard.dictionary import object_address, ObjectDictionary
+from ...standard.dictionary import (
+    drive_axes,
+    is_drive,
+    object_address,
+    ObjectDictionary,
+    profile_number,
+)
 from ...standard.objects import AXIS_OFFSET, Index, is_signed
 from ...standard.pdo import SYNCHRONOUS_MAX
 from ..findings import Findings, Place
-from ..model.bus import NodeConfig
+from ..model.bus import Identity, MasterConfig, NodeConfig
 from ..model.drive import DriveConfig
-from ..model.identity import Identity
-from ..model.master import MasterConfig
 from ..model.pdo_direction import RPDO, TPDO
 from ..model.tpdo_freshness import with_event_timer
 from ..read.document import YamlMap
@@ -29,9 +32,8 @@ from .axes import check_node_name, read_axes, read_drive
 from .drivers import check_driver
 from .eds_files import EdsFiles
 from .master import check_namespace
-from .parameter_values import parameter_writes
 from .pdos import PdoReader
-from .sdo_list import read_writes
+from .sdo_list import parameter_writes, read_writes
 
 DRIVE_PROFILE = 'Cia402'  # in the names of the drivers of drives
 DRIVE_OBJECTS = (Index.CONTROLWORD, Index.STATUSWORD)

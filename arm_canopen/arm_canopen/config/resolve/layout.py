@@ -5,6 +5,14 @@
 New: ``options``, ``master``, ``defaults`` and ``nodes``. Old (dcfgen's own): ``options``,
 ``master``, and every other top-level key a device. A file with ``nodes`` or ``defaults`` is of
 the new one. Top-level keys that begin with a dot are templates for anchors, ignored in both.
+
+A device's own values lie over ``defaults``, and always win:
+
+- Mappings (``tpdo``, ``rpdo``, each PDO in them, ``remappings``, ``error_behavior``) merge key by
+  key, so a device can change one PDO, or one key of it.
+- The list ``sdo`` merges object by object: the defaults' writes, without those of objects that the
+  device names itself, then the device's. An empty list drops the defaults'.
+- Every other list (``mapping``) is replaced, as its order and length mean something.
 """
 
 from __future__ import annotations
@@ -12,12 +20,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import difflib
 
-from ..findings import Findings
+from ..findings import Findings, RefusedError
 from ..read.document import Item, YamlList, YamlMap
-from ..read.scalars import describe
+from ..read.scalars import describe, integer
 from ..read.section import block
 from ..sections import TOP_LEVEL
-from .merge import merge_device
 
 NODES_REMEDY = "write a mapping: 'nodes:', below it 'joint1:', below that 'node_id: 2'"
 
@@ -147,3 +154,43 @@ def _section_remedy(name: str, item: Item) -> str:
     if isinstance(item, YamlMap) and 'node_id' in item.entries:
         return "move the device below 'nodes:'"
     return "a device needs at least 'node_id:' below its name; begin a template's name with a dot"
+
+
+SDO_LIST = 'sdo'
+
+
+def merge_device(defaults: YamlMap, own: YamlMap) -> YamlMap:
+    """Return a device's section with the defaults below it; it keeps its own place."""
+    merged = _merge_mappings(defaults, own)
+    common, special = defaults.entries.get(SDO_LIST), own.entries.get(SDO_LIST)
+    if isinstance(common, YamlList) and isinstance(special, YamlList) and special.items:
+        merged.entries[SDO_LIST] = _merge_sdo(common, special)
+    return merged
+
+
+def _merge_mappings(below: YamlMap, above: YamlMap) -> YamlMap:
+    entries: dict[str, Item] = dict(below.entries)
+    for name, item in above.entries.items():
+        base = below.entries.get(name)
+        if isinstance(base, YamlMap) and isinstance(item, YamlMap):
+            entries[name] = _merge_mappings(base, item)
+        else:
+            entries[name] = item
+    return YamlMap(above.place, entries)
+
+
+def _merge_sdo(common: YamlList, special: YamlList) -> YamlList:
+    replaced = {_address(item) for item in special.items} - {None}
+    kept = tuple(item for item in common.items if _address(item) not in replaced)
+    return YamlList(special.place, kept + special.items)
+
+
+def _address(item: Item) -> tuple[int, int] | None:
+    """Return which object an entry writes; None when that cannot be read (reported elsewhere)."""
+    if not isinstance(item, YamlMap) or 'index' not in item.entries:
+        return None
+    subindex = item.entries.get('sub_index')
+    try:
+        return integer(item.entries['index']), integer(subindex) if subindex is not None else 0
+    except RefusedError:
+        return None

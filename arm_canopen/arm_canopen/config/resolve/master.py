@@ -9,8 +9,7 @@ import re
 
 from ...standard.cob_id import TIME_PRODUCER
 from ..findings import Findings, RefusedError
-from ..model.identity import Identity
-from ..model.master import MasterConfig
+from ..model.bus import Identity, MasterConfig
 from ..read.document import YamlMap
 from ..read.scalars import integer
 from ..read.section import read_section, texts

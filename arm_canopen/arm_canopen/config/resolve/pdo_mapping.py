@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from ...standard.datatypes import bit_length, DataType, SIGNED_BITS, UNSIGNED_BITS
-from ...standard.device_profile import is_drive
-from ...standard.dictionary import object_address, ObjectDictionary, ObjectEntry
+from ...standard.dictionary import is_drive, object_address, ObjectDictionary, ObjectEntry
 from ...standard.objects import is_signed, PDO_BITS_MAX
 from ...standard.pdo import MAPPED_LENGTH_MASK, mapped_place, MappedObject
 from ..findings import Findings, Place, RefusedError

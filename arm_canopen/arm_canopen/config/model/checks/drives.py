@@ -5,10 +5,9 @@
 from __future__ import annotations
 
 from ....standard.dictionary import object_address
-from ....standard.drive import mode_title
+from ....standard.drive import CYCLIC_MODES, mode_title, TARGET_OBJECTS
 from ....standard.objects import AXIS_OFFSET, Index
 from ....standard.pdo import SYNCHRONOUS_MAX
-from ....standard.target_objects import CYCLIC_MODES, TARGET_OBJECTS
 from ..pdo_direction import RPDO, TPDO
 from .subject import object_name, Subject, UsedMode
 
