@@ -7,7 +7,7 @@ The names here are the public API.
 
 from arm_canopen.can import read_log
 
-from .eds_lint.lint import EdsReport, lint_eds
+from .eds_lint import EdsReport, lint_eds
 from .monitor.describe import FrameDescriber
 from .monitor.description import Description
 

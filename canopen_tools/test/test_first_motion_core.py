@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import pytest
 
 from arm_canopen import AxisFeedback, DriveState, load_bus, Refusal, RefusalCause
+from canopen_tools.first_motion.movers import PERMIT, RAMP_TIME, SlowMotion
 from canopen_tools.first_motion.program import apply
-from canopen_tools.first_motion.slow_motion import PERMIT, RAMP_TIME, SlowMotion
 from first_motion import AxisScales, Cause, Judgement, propose, Verdict
 
 BUS = """\

@@ -10,7 +10,7 @@ from pathlib import Path
 from arm_canopen.config import Eds
 from arm_canopen.config.model.pdo_direction import RPDO, TPDO
 
-from ..eds_lint.lint import EdsReport, lint_eds
+from ..eds_lint import EdsReport, lint_eds
 from .arguments import SubParsers
 from .output import counted, print_line, print_problem, RED, YELLOW
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from arm_canopen.standard import AccessType, DataType, ObjectCode
 
-from ..eds_lint.lists import LISTS, proper_list
+from ..eds_lint import LISTS, proper_list
 
 
 @dataclass(frozen=True, slots=True)

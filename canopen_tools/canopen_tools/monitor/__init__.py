@@ -3,7 +3,6 @@
 """Frames in words: what each one on a CANopen bus means."""
 
 from .describe import FrameDescriber
-from .description import Description, FrameKind
-from .frame_filter import FrameFilter
+from .description import Description, FrameFilter, FrameKind
 
 __all__ = ['Description', 'FrameDescriber', 'FrameFilter', 'FrameKind']

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from arm_canopen import CodecError
 from arm_canopen.can import error_text, Frame
-from arm_canopen.config import BusConfig, NodeConfig
+from arm_canopen.config import BusConfig, NodeConfig, PdoConfig
 from arm_canopen.standard import (
     ALL_NODES,
     CAN_ID_MASK,
@@ -24,13 +24,15 @@ from arm_canopen.standard import (
     NmtCommand,
     NmtState,
     NODE_ID_MAX,
+    object_address,
     parse_heartbeat,
+    PdoCodec,
 )
 
 from .description import Description, FrameKind
 from .object_names import ObjectNames
-from .pdo_text import PdoDescriber
 from .sdo_follower import SdoFollower
+from .value_text import value_text
 
 _Handler: TypeAlias = Callable[[Frame], Description]
 _NODE_MASK = 0x7F
@@ -203,3 +205,33 @@ def _cob_id(node: NodeConfig, index: Index) -> int | None:
     """Return the COB-ID that the EDS gives a service, None when it gives none."""
     value = node.dictionary.number(index)
     return None if value is None or value & COB_ID_INVALID else value & CAN_ID_MASK or None
+
+
+class PdoDescriber:
+    """Describes the frames of one PDO."""
+
+    def __init__(self, label: str, node: NodeConfig, pdo: PdoConfig, names: ObjectNames) -> None:
+        """Prepare the mapping; the label is like ``TPDO1``."""
+        self._label = label
+        self._node = node.name
+        self._node_id = node.node_id
+        self._codec = PdoCodec(pdo.mapping)
+        self._titles = [
+            names.name(entry.index, entry.subindex) or object_address(entry.index, entry.subindex)
+            for entry in pdo.mapping
+        ]
+
+    def describe(self, frame: Frame) -> Description:
+        """Name the objects of a frame with their values."""
+        try:
+            text, is_alert = self._values(frame.data), False
+        except CodecError as error:
+            text, is_alert = str(error), not frame.is_remote
+        return Description(FrameKind.PDO, self._label, self._node, text, is_alert, self._node_id)
+
+    def _values(self, data: bytes) -> str:
+        words = []
+        values = self._codec.unpack(data)
+        for title, entry, value in zip(self._titles, self._codec.objects, values, strict=True):
+            words.append(f'{title}={value_text(entry.index, entry.subindex, value)}')
+        return '  '.join(words)
