@@ -16,7 +16,7 @@ import argparse
 
 from quad_controller.exceptions import CheckError
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
+from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import course_for, CourseFigures
 from quad_controller.policy_check.findings import Table, text_of
 from quad_controller.policy_check.trial import (

@@ -169,9 +169,12 @@ def test_a_wrong_layout_of_the_history_is_found(
         (['--duration', '0'], 'must be 0.5 to 600'),
         (['--duration', '-1'], 'must be 0.5 to 600'),
         (['--phase-period', '-0.1'], 'must be 0 or more'),
+        (['--report', '/nowhere/at/all.csv'], 'No such file'),
+        (['--minutes', '0.1'], 'must be 0.7 to 120'),
+        (['--servo', 'soft'], 'invalid choice'),
     ],
 )
-def test_senseless_numbers_are_refused(
+def test_wrong_use_ends_with_two(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Before anything is loaded."""
@@ -182,10 +185,13 @@ def test_senseless_numbers_are_refused(
 
 
 def test_what_does_not_fit_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A renamed joint and a missing file end with 1 and their reason."""
+    """A renamed joint and a missing file end with 1 and their reason; nothing was walked."""
     names = joined(['hip', *ROBOT.names[1:]])
     path = write_policy(tmp_path / 'renamed.onnx', metadata(joint_names=names))
-    assert run([str(path)]) == 1
+    report = tmp_path / 'report.csv'
+    assert run([str(path), '--report', str(report)]) == 1
     assert 'not in the robot: hip' in capsys.readouterr().out
+    (headings,) = report.read_text(encoding='utf-8').splitlines()
+    assert headings.startswith('tried,walker,axis,')
     assert run([str(tmp_path / 'none.onnx')]) == 1
     assert 'is neither a file' in capsys.readouterr().out

@@ -32,7 +32,7 @@ from quad_controller.nodes.messages import (
 from quad_controller.policy.observation import gravity
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, Targets
-from quad_description.rotations import from_roll_pitch_yaw
+from quad_description.rotations import from_rpy
 from quad_gait_rig import ARM_ROBOT, FOLDED, Rig, ROBOT, tilted, UPRIGHT
 
 TEST_TIMEOUT = 10.0  # [s]
@@ -155,7 +155,7 @@ def test_body_pose_is_read_from_a_quaternion(
     """Roll, pitch and yaw come back, of a quaternion that is not quite one as well."""
     message = Pose()
     message.position.z = 0.01
-    rotation = from_roll_pitch_yaw(roll, pitch, yaw)
+    rotation = from_rpy(roll, pitch, yaw)
     turn = message.orientation
     turn.x, turn.y, turn.z, turn.w = (length * part for part in rotation)
     pose = body_pose(message)

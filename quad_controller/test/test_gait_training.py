@@ -41,7 +41,7 @@ from quad_controller.policy.contract.mjlab import read_metadata
 from quad_controller.policy.interface import PolicyInputs, PolicyStep
 from quad_controller.policy.network import OnnxNetwork
 from quad_controller.policy.runner import PolicyRunner
-from quad_controller.policy_check.conditions import Conditions
+from quad_controller.policy_check.arenas import Conditions
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.trial import Candidate
 from quad_description import Targets

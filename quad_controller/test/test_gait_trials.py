@@ -22,19 +22,21 @@ from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.model import CommandRanges, Gains
 from quad_controller.policy.gains import gain_rows, ServoResponse
 from quad_controller.policy_check.arenas import (
-    PatientBackend,
+    Conditions,
     PhysicsArena,
     RobotChoice,
     serial_arena,
     SerialArena,
     servo_response,
+    SWEEPS,
 )
-from quad_controller.policy_check.conditions import Conditions, SWEEPS
 from quad_controller.policy_check.course import (
+    axis_of,
     course_for,
     CourseFigures,
     CourseWalker,
     Passage,
+    WalkingRobot,
 )
 from quad_controller.policy_check.findings import (
     against_gait,
@@ -50,12 +52,11 @@ from quad_controller.policy_check.findings import (
 )
 from quad_controller.policy_check.main import ExitCode, run
 from quad_controller.policy_check.trial import Candidate, chain_duration, run_trials, Trial
-from quad_controller.policy_check.walk import WalkingRobot
 from quad_description import RecordedBackend, RobotState
-from quad_gait_policies import joined, metadata, write_policy
+from quad_gait_policies import metadata, write_policy
 from quad_gait_rig import ROBOT
 from quad_hardware import NoAnswerError
-from quad_sim import CommandTiming
+from quad_sim import CommandTiming, ServedRobot
 from quad_sim.physics import Metered
 
 DEADLINE = 90.0  # [s]
@@ -63,7 +64,7 @@ FAIR = Passage(Velocity(0.2), Velocity(0.19), 10.0, 0, 0.05, 0.02, 0.0, 0.05, 5.
 
 
 def course(*passages: Passage) -> CourseFigures:
-    """What somebody came to."""
+    """Return the figures of some passages."""
     return CourseFigures(passages or (FAIR,))
 
 
@@ -76,11 +77,6 @@ def test_a_course_has_what_a_policy_was_trained_for() -> None:
     ranges = CommandRanges((-0.2, 0.2), (0.0, 0.0), (-9.0, 9.0))
     assert course_for(ranges)[:3] == (Velocity(0.0667), Velocity(0.1333), Velocity(0.2))
     assert {axis_of(each) for each in course_for(ranges)} == {'forward', 'turn'}
-
-
-def axis_of(command: Velocity) -> str:
-    """Along which axis a command goes."""
-    return replace(FAIR, commanded=command).axis
 
 
 def test_minutes_are_shared_among_those_who_walk() -> None:
@@ -164,12 +160,12 @@ class Silent(RecordedBackend):
 
 def test_a_robot_that_is_silent_for_a_while_is_waited_for() -> None:
     """And that is noted, as what interrupted the walk."""
-    backend = PatientBackend(Silent(3))
-    assert backend.step([0.0]) == RobotState()
-    assert 'no report' in backend.interruption
-    backend.interruption = ''
-    backend.step([0.0])
-    assert backend.interruption == ''
+    arena = SerialArena(ServedRobot(), Silent(3))
+    assert arena.step([0.0]) == RobotState()
+    assert 'no report' in arena.interruption
+    arena.interruption = ''
+    arena.step([0.0])
+    assert arena.interruption == ''
 
 
 @pytest.mark.slow
@@ -300,16 +296,6 @@ def test_a_latency_of_the_servos_counts_by_the_period() -> None:
 # --- the report
 
 
-def findings() -> Findings:
-    """What may be found."""
-    turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
-    pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
-    one = Compared('80', course(replace(FAIR, falls=3)), course())
-    swept = Swept(SWEEPS[0], (one,) * len(SWEEPS[0].values))
-    walk = Velocity(0.3), Velocity(0.25), 0.2
-    return Findings(courses=[pair], sweeps=[swept], walks=[walk], reasons=['it fell'])
-
-
 def rows_of(text: str) -> list[dict[str, str]]:
     """Return the rows of a report by their headings."""
     return list(csv.DictReader(text.splitlines()))
@@ -317,47 +303,43 @@ def rows_of(text: str) -> list[dict[str, str]]:
 
 def test_the_report_has_a_row_for_each_command_of_each_walker() -> None:
     """With what was tried, commanded and measured; what was not measured is empty."""
+    turn = replace(FAIR, commanded=Velocity(yaw=1.0), went=Velocity(yaw=0.9))
+    pair = Compared('in a test', course(FAIR, turn), course(FAIR, turn))
+    one = Compared('80', course(replace(FAIR, falls=3)), course())
+    swept = Swept(SWEEPS[0], (one,) * len(SWEEPS[0].values))
+    walked = Velocity(0.3), Velocity(0.25), 0.2
     file = io.StringIO()
-    write_csv(file, findings())
-    walk, forward, turn, *others = rows_of(file.getvalue())
+    write_csv(file, Findings(courses=[pair], sweeps=[swept], walks=[walked]))
+    walk, forward, turned, *others = rows_of(file.getvalue())
     assert walk['tried'] == 'walk'
     assert float(walk['went x [m/s]']) == 0.25
     assert walk['falls'] == forward['latency p50 [s]'] == ''
-    assert (forward['walker'], forward['axis'], turn['axis']) == ('policy', 'forward', 'turn')
-    assert float(turn['commanded yaw [rad/s]']) == 1.0
+    assert (forward['walker'], forward['axis'], turned['axis']) == ('policy', 'forward', 'turn')
+    assert float(turned['commanded yaw [rad/s]']) == 1.0
     assert float(forward['cost of transport']) == FAIR.cost_of_transport
     assert len(others) == 2 + 2 * len(SWEEPS[0].values)
-    assert others[-2]['tried'] == 'mass of the trunk 80 %'
-    assert others[-2]['falls'] == '3'
+    assert (others[-2]['tried'], others[-2]['falls']) == ('mass of the trunk 80 %', '3')
 
 
-def test_tables_have_a_row_for_each_thing() -> None:
-    """As text: columns stand under each other; what is no number is a dash."""
-    (pair,) = findings().courses
+def test_tables_have_a_dash_for_what_was_not_measured() -> None:
+    """As text, columns stand under each other; times of commands need a wire."""
     lost = replace(FAIR, went=Velocity(math.nan, math.nan, math.nan), time=0.0)
-    assert tracking_table(pair)[1] == (
-        *('forward', '+0.200 m/s'), *('+0.190', '0.010') * 2
-    )  # fmt: skip
-    assert tracking_table(Compared('', course(lost), course()))[1][2:4] == ('-', '-')
-    lines = text_of(figures_table(pair)).splitlines()
+    assert tracking_table(Compared('', course(lost), course()))[1] == (
+        *('forward', '+0.200 m/s', '-', '-', '+0.190', '0.010'),
+    )
+    lines = text_of(figures_table(Compared('', course(), course()))).splitlines()
     assert len({len(line) for line in lines}) == 1
     assert not any('observation' in line for line in lines)
     timed = course(replace(FAIR, timing=CommandTiming((0.002,), (0.001,))))
     assert 'observation to command, p50 [ms]' in text_of(figures_table(Compared('', timed, timed)))
 
 
-@pytest.fixture(name='still', scope='module')
-def make_still(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A policy that only stands."""
-    return write_policy(tmp_path_factory.mktemp('policy') / 'still.onnx', metadata())
-
-
 @pytest.mark.slow
 def test_a_policy_that_walks_nowhere_does_not_stand_up_beside_the_gait(
-    still: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The report alone means a course in virtual time."""
-    report = tmp_path / 'report.csv'
+    still, report = write_policy(tmp_path / 'still.onnx', metadata()), tmp_path / 'report.csv'
     assert run([str(still), '--duration', '1', '--report', str(report)]) == ExitCode.DOES_NOT
     output = capsys.readouterr().out
     assert 'does not stand up:\n' in output
@@ -367,32 +349,3 @@ def test_a_policy_that_walks_nowhere_does_not_stand_up_beside_the_gait(
     assert len(rows) == 2 * len(course_for(None))
     slow = next(row for row in rows if row['walker'] == 'policy' and row['axis'] == 'forward')
     assert abs(float(slow['went x [m/s]'])) < 0.05
-
-
-def test_a_policy_that_is_refused_has_an_empty_report(tmp_path: Path) -> None:
-    """Headings, and nothing that was walked."""
-    names = joined(['hip', *ROBOT.names[1:]])
-    path = write_policy(tmp_path / 'other.onnx', metadata(joint_names=names))
-    report = tmp_path / 'report.csv'
-    assert run([str(path), '--report', str(report)]) == ExitCode.DOES_NOT
-    assert report.read_text(encoding='utf-8').startswith('tried,walker,axis,')
-    assert rows_of(report.read_text(encoding='utf-8')) == []
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'words'),
-    [
-        (['--report', '/nowhere/at/all.csv'], 'No such file'),
-        (['--minutes', '0.1'], 'must be 0.7 to 120'),
-        (['--minutes', 'nan'], 'not a finite number'),
-        (['--servo', 'soft'], 'invalid choice'),
-    ],
-)
-def test_wrong_use_ends_with_two(
-    arguments: list[str], words: str, still: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Before anything takes its time."""
-    with pytest.raises(SystemExit) as ended:
-        run([str(still), *arguments])
-    assert ended.value.code == ExitCode.WRONG_USE
-    assert words in capsys.readouterr().err

@@ -12,7 +12,7 @@ from progress import Progress
 
 from quad_controller import Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy_check.conditions import AS_MADE, Conditions, TIPPING_PUSH
+from quad_controller.policy_check.arenas import AS_MADE, Conditions, TIPPING_PUSH
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.main import run as check_policy
 from quad_controller.policy_check.trial import Candidate, run_trials, shipped_walkers, Trial

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import time
 
 from quad_description import Backend, robot_urdf, RobotState
@@ -27,11 +27,61 @@ from quad_sim.physics import ImuBias, Meter, Metered, PhysicsBackend, Robot, Var
 
 from ..exceptions import CheckError
 from ..policy.gains import ServoResponse
-from .conditions import AS_MADE, Conditions
 
 MAX_PAUSE = 0.15  # [s] between two steps, which the controller is not to blame for
 SILENCE_TIMEOUT = 20.0  # [s] with a robot that does not report
 FRESH = 3  # reports after which what was observed before the robot was put down is gone
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """How robot and ground differ."""
+
+    trunk_mass: float = 1.0  # factor of the mass of the trunk
+    friction: float | None = None  # of the ground; None leaves it as it is
+    delay: float = 0.0  # from targets that are sent to servos that have them in [s]
+    gyro_bias: float = 0.0  # of each axis of the gyro in [rad/s]
+    level_bias: float = 0.0  # of measured roll and pitch in [rad]
+    push: float = 0.0  # change of the velocity at once, to any side, every two seconds, in [m/s]
+    roughness: float = 0.0  # height of the highest bumps of the ground in [m]
+
+
+AS_MADE = Conditions()
+"""The robot as it is, on level ground."""
+
+TIPPING_PUSH = 1.3
+"""A push that tips the gait in about half of the cases, in [m/s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """One parameter and the values that are tried."""
+
+    name: str  # an attribute of :class:`Conditions`
+    title: str  # what a person reads
+    unit: str  # of the values as they are shown
+    values: tuple[float, ...]  # in their order
+    factor: float = 1.0  # from a value to how it is shown
+
+    def conditions(self, value: float) -> Conditions:
+        """Return what differs at a value."""
+        return replace(AS_MADE, **{self.name: value})
+
+    def text(self, value: float) -> str:
+        """Return a value as it is shown."""
+        return f'{value * self.factor:g}'
+
+
+SWEEPS = (
+    Sweep('trunk_mass', 'mass of the trunk', '%', (0.8, 1.0, 1.2, 2.0, 3.0), 100.0),
+    Sweep('friction', 'friction of the ground', '', (0.03, 0.06, 0.12, 0.3, 0.8)),
+    Sweep('delay', 'delay of targets', 'ms', (0.0, 0.02, 0.04, 0.08), 1e3),
+    Sweep('gyro_bias', 'bias of the gyro', 'rad/s', (0.0, 0.3, 0.6, 1.2)),
+    Sweep('level_bias', 'bias of roll and pitch', 'mrad', (0.0, 0.06, 0.12, 0.24), 1e3),
+    Sweep('push', 'pushes every 2 s', 'm/s', (0.0, 0.8, 1.2, 1.6, 2.0)),
+    Sweep('roughness', 'rough ground', 'mm', (0.0, 0.01, 0.02, 0.03), 1e3),
+)
+"""What is tried: up to where the gait or what was trained for it has trouble."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,19 +159,27 @@ class PhysicsArena:
         return ''
 
 
-class PatientBackend(Backend):
-    """A robot in real time whose machine may be busy: it is waited for, and that is noted."""
+class SerialArena(Backend):
+    """A robot in physics behind its serial line, in another process and in real time.
 
-    def __init__(self, backend: Backend) -> None:
-        """Wait for a robot."""
-        self._backend = backend
-        self.names, self.period = backend.names, backend.period
-        self.interruption = ''  # what came between two steps last; empty for nothing
+    Its machine may be busy: the robot is waited for, and that is noted.
+
+    Attributes:
+        interruption: What the machine did since the robot stood or was measured; empty for
+            nothing.
+    """
+
+    def __init__(self, served: ServedRobot, driver: Backend) -> None:
+        """Watch a robot by the driver of its serial port."""
+        self._served, self._driver = served, driver
+        self.names, self.period = driver.names, driver.period
+        self.backend: Backend = self
+        self.interruption = ''
         self._stepped_at: float | None = None
 
     def reset(self) -> RobotState:
         """Wait for a report."""
-        return self._backend.reset()
+        return self._driver.reset()
 
     def step(self, targets: Sequence[float] | None) -> RobotState:
         """Send targets, and wait for the next report.
@@ -133,7 +191,7 @@ class PatientBackend(Backend):
         if before is not None and now - before > MAX_PAUSE:
             self.interruption = f'a pause of {now - before:.2f} s'
         try:
-            state = self._backend.step(targets)
+            state = self._driver.step(targets)
         except (NoAnswerError, CommandError) as error:
             self.interruption = str(error)
             state = self._wait(now + SILENCE_TIMEOUT)
@@ -141,34 +199,25 @@ class PatientBackend(Backend):
         return state
 
     def observe(self) -> RobotState:
-        """Return what the newest report says."""
-        return self._backend.observe()
+        """Return what the newest report has."""
+        return self._driver.observe()
 
     def close(self) -> None:
-        """Leave the robot to whoever opened it."""
+        """Leave the robot to :func:`serial_arena`."""
 
     def _wait(self, deadline: float) -> RobotState:
         """Return the next report; a time-out of the driver is no end before the deadline."""
         while time.monotonic() < deadline:
             with suppress(NoAnswerError):
-                return self._backend.step(None)
-        return self._backend.step(None)
-
-
-class SerialArena:
-    """A robot in physics behind its serial line, in another process and in real time."""
-
-    def __init__(self, served: ServedRobot, backend: Backend) -> None:
-        """Watch a robot."""
-        self._served, self._patient = served, PatientBackend(backend)
-        self.backend: Backend = self._patient  # the driver of its serial port
+                return self._driver.step(None)
+        return self._driver.step(None)
 
     def stand(self) -> RobotState:
         """Put the robot on its feet."""
         self._served.stand()
         for _ in range(FRESH):
-            state = self.backend.step(None)
-        self._patient.interruption = ''
+            state = self.step(None)
+        self.interruption = ''
         return state
 
     def kick(self, x: float, y: float) -> None:
@@ -181,17 +230,12 @@ class SerialArena:
     def begin(self) -> None:
         """Measure from now on."""
         self._served.begin()
-        self._patient.interruption = ''
+        self.interruption = ''
 
     def read(self) -> tuple[Metered, CommandTiming | None]:
         """Return what was measured."""
         watched = self._served.read()
         return watched.metered, watched.timing
-
-    @property
-    def interruption(self) -> str:
-        """What the machine did since it stood or was measured; empty for nothing."""
-        return self._patient.interruption
 
 
 @contextmanager

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""A course of commanded velocities, and the figures of who walked it: a policy or the gait."""
+"""A course of commanded velocities, and the figures of who walked it: a policy or the gait.
+
+Both walk through the same controller that runs on the robot.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from quad_description import Quadruped
+from quad_description import Backend, Quadruped, RobotState
 
 from ..exceptions import CheckError, QuadControllerError
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.contract.model import CommandRanges
 from ..policy.interface import Policy
-from .walk import WalkingRobot
+from ..policy.network import Floats
+from ..states.controller import Controller
+from ..states.modes import State
+from ..states.parameters import StateParameters
 
 if TYPE_CHECKING:
     from quad_sim import CommandTiming
@@ -28,7 +34,11 @@ if TYPE_CHECKING:
 
     from .arenas import PhysicsArena, SerialArena
 
+STAND_TIME = 2.5  # [s] to stand up, and for the policy to take over
+STAND_TIMEOUT = 8.0  # [s]
 SETTLE_TIME = 1.0  # [s] to take up speed
+WALK_SETTLE_TIME = 1.5  # [s] the same before a single walk
+FALLEN = math.radians(60.0)
 REST_TIME = 1.0  # [s] at the end, to come to rest on all feet
 PUSH_INTERVAL = 2.0  # [s]
 MAX_INTERRUPTIONS = 8
@@ -135,6 +145,111 @@ def course_for(ranges: CommandRanges | None) -> tuple[Velocity, ...]:
     return tuple(commands)
 
 
+class WalkingRobot:
+    """A back end and the controller that walks it.
+
+    Attributes:
+        controller: The controller.
+        observed: What the policy saw so far.
+    """
+
+    def __init__(
+        self,
+        backend: Backend,
+        robot: Quadruped,
+        policy: Policy | None,
+        state: RobotState,
+        gait: GaitParameters = AS_TUNED,
+    ) -> None:
+        """Begin with a robot on the ground.
+
+        Args:
+            policy: What walks; None for the gait.
+        """
+        self._backend, self._robot, self._policy, self._gait = backend, robot, policy, gait
+        self.restart(state)
+
+    def restart(self, state: RobotState) -> None:
+        """Begin anew, with a new controller."""
+        self._state, self._dt = state, self._backend.period
+        states = StateParameters(period=self._backend.period)
+        self.controller = Controller(self._robot, self._gait, states, policy=self._policy)
+        self.forget()
+
+    def forget(self) -> None:
+        """Count targets and observations from now on."""
+        self.observed: list[Floats] = []
+        self._targets: list[np.ndarray] = []
+        self._bends, self._bend_count = 0.0, 0
+
+    @property
+    def smoothness(self) -> float:
+        """How much targets bend: root mean square of their second difference in [rad]."""
+        return math.sqrt(self._bends / self._bend_count) if self._bend_count else 0.0
+
+    @property
+    def mode(self) -> State:
+        """The state in which it walks."""
+        return State.WALK if self._policy is None else State.POLICY
+
+    @property
+    def is_down(self) -> bool:
+        """Whether it fell, or does not walk any more."""
+        imu = self._state.imu
+        fallen = imu is not None and imu.tilt > FALLEN
+        return fallen or self.controller.status.state is not self.mode
+
+    @property
+    def trouble(self) -> str:
+        """Why it does not walk; empty when it does."""
+        status = self.controller.status
+        if status.faults:
+            return '; '.join(status.faults)
+        if status.state is not self.mode:
+            return f'{self.mode.value} was left for {status.title}'
+        return ''
+
+    def stand_up(self) -> None:
+        """Stand, ready to walk.
+
+        Raises:
+            QuadControllerError: It does not come to that; the message has the reason.
+        """
+        self.step(REST)  # modes are refused before the robot is known
+        answer = self.controller.set_mode(self.mode.value)
+        self.run(STAND_TIME, REST)
+        for _ in range(round((STAND_TIMEOUT - STAND_TIME) / self._backend.period)):
+            if not self.trouble:
+                return
+            self.step(REST)
+        if self.trouble:
+            raise QuadControllerError(self.trouble if answer.accepted else answer.message)
+
+    def run(self, duration: float, velocity: Velocity) -> None:
+        """Pass some time [s] with a velocity that is commanded."""
+        for _ in range(round(duration / self._backend.period)):
+            self.step(velocity)
+
+    def step(self, velocity: Velocity) -> None:
+        """Pass one period with a velocity that is commanded."""
+        self.controller.set_velocity(velocity)
+        output = self.controller.step(self._state, self._dt)
+        before, self._state = self._state, self._backend.step(output.targets)
+        passed = self._state.time - before.time  # a report may have been lost
+        self._dt = passed if passed > 0.0 else self._backend.period
+        if output.asked is not None and output.asked.answer.observation is not None:
+            self.observed.append(output.asked.answer.observation[0])
+        if output.targets is not None:
+            self._add_targets(np.array(output.targets))
+
+    def _add_targets(self, targets: np.ndarray) -> None:
+        self._targets = [*self._targets[-2:], targets]
+        if len(self._targets) == 3:
+            first, second, third = self._targets
+            self._bends += float(np.mean((third - 2.0 * second + first) ** 2))
+            self._bend_count += 1
+
+
 class CourseWalker:
     """Walks courses in an arena, and stands up again after each fall.
 
@@ -233,6 +348,36 @@ class CourseWalker:
         except QuadControllerError:  # it falls at once, or its watchdogs do not let it walk
             return False
         return True
+
+
+@dataclass(frozen=True, slots=True)
+class Walked:
+    """How a single walk went."""
+
+    velocity: Velocity  # mean velocity in the robot's own frame
+    tilt: float  # largest angle between the body's z axis and up in [rad]
+    trouble: str  # why it ended early; empty when it did not
+    observed: Floats  # what the policy saw, an observation in each row
+
+
+def walk(
+    arena: PhysicsArena, robot: Quadruped, policy: Policy, velocity: Velocity, duration: float
+) -> Walked:
+    """Walk once with a policy that has been checked, from lying on the ground."""
+    walker = WalkingRobot(arena.backend, robot, policy, arena.backend.reset())
+    try:
+        walker.stand_up()
+    except QuadControllerError as error:
+        return Walked(REST, 0.0, str(error), np.array(walker.observed))
+    walker.run(WALK_SETTLE_TIME, velocity)
+    walker.observed.clear()
+    arena.begin()
+    for _ in range(round(duration / arena.backend.period)):
+        walker.step(velocity)
+        arena.watch()
+    way, _ = arena.read()
+    went = Velocity(way.x, way.y, way.yaw).scaled(1.0 / duration)
+    return Walked(went, way.tilt, walker.trouble, np.array(walker.observed))
 
 
 def _passage_of(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import csv
 from dataclasses import dataclass, field
 import math
-from typing import TextIO
+from typing import TextIO, TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from ..gait.velocity import Velocity
 from ..policy.contract.model import PolicyContract, Source
 from ..policy.network import Floats, Network
 from ..policy.observation import observed_places
-from .conditions import Sweep
 from .course import AXES, axis_of, CourseFigures, Passage
+
+if TYPE_CHECKING:
+    from .arenas import Sweep
 
 MAX_LACK, MAX_EXCESS = 0.5, 0.2
 """Shares of what is commanded along an axis that may be missing, and be too much."""

@@ -13,8 +13,9 @@ import math
 from pathlib import Path
 import signal
 import sys
+from typing import TYPE_CHECKING
 
-from quad_description import Backend, DescriptionError, PRESETS, quadruped, robot_urdf
+from quad_description import DescriptionError, PRESETS, quadruped, robot_urdf
 
 from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
@@ -25,8 +26,7 @@ from ..policy.network import OnnxNetwork
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
 from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
-from .conditions import SWEEPS
-from .course import course_for
+from .course import course_for, walk
 from .findings import (
     against_gait,
     astray,
@@ -43,7 +43,9 @@ from .findings import (
     velocity_text,
     write_csv,
 )
-from .walk import walk
+
+if TYPE_CHECKING:
+    from .arenas import PhysicsArena
 
 SERVOS = ('firm', 'vendor_rl')
 """Servo models of the simulation; policies of the vendor's training expect ``vendor_rl``."""
@@ -135,7 +137,7 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
     if not (options.walk or compare or options.chain or options.sweep):
         return
     try:
-        from .arenas import PhysicsArena, RobotChoice
+        from .arenas import PhysicsArena, RobotChoice, SWEEPS
         from .trial import Candidate, chain_duration, run_chain, run_trials, Trial
     except ImportError as error:
         raise CheckError(f'a walk needs quad_sim and MuJoCo: {error}') from error
@@ -143,7 +145,7 @@ def _try_out(options: argparse.Namespace, loaded: LoadedPolicy, found: Findings)
     policy = Candidate(find_policy(options.policy), _policy_options(options), choice)
     both = policy, Candidate(robot=choice)
     if options.walk is not None:
-        _walk(options, loaded, PhysicsArena(choice).backend, found)
+        _walk(options, loaded, PhysicsArena(choice), found)
     commands = course_for(loaded.contract.commands)
     if compare:
         duration = options.duration or COMPARE_DURATION
@@ -187,11 +189,11 @@ def _add_course(found: Findings, compared: Compared) -> None:
 
 
 def _walk(
-    options: argparse.Namespace, loaded: LoadedPolicy, backend: Backend, found: Findings
+    options: argparse.Namespace, loaded: LoadedPolicy, arena: PhysicsArena, found: Findings
 ) -> None:
     velocity, duration = Velocity(*options.walk), options.duration or WALK_DURATION
     robot = quadruped(robot_urdf(options.preset, arm=options.arm))
-    walked = walk(backend, robot, loaded.runner, velocity, duration)
+    walked = walk(arena, robot, loaded.runner, velocity, duration)
     found.walks.append((velocity, walked.velocity, walked.tilt))
     _print(
         f'walked with {options.servo} servos for {duration:g} s: commanded '

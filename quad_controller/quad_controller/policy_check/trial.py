@@ -22,10 +22,8 @@ from ..policy.load import load_policy, LoadedPolicy
 from ..policy.options import PolicyOptions
 from ..policy.shipped import shipped_policies
 from ..states.parameters import StateParameters
-from .arenas import PhysicsArena, RobotChoice, serial_arena
-from .conditions import AS_MADE, Conditions
-from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME
-from .walk import STAND_TIME
+from .arenas import AS_MADE, Conditions, PhysicsArena, RobotChoice, serial_arena
+from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME, STAND_TIME
 
 
 @dataclass(frozen=True, slots=True)
