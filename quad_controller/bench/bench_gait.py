@@ -25,7 +25,7 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.gait.body import UPRIGHT
-from quad_controller.policy.interface import PolicyInputs
+from quad_controller.policy.observation import PolicyInputs
 from quad_description import ImuSample, JointSample, quadruped, robot_urdf, RobotState
 
 STEPS = 5000

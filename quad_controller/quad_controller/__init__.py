@@ -30,9 +30,8 @@ from .gait.parameters import GaitParameters
 from .gait.schedule import Gait
 from .gait.servo_compensation import ServoModel
 from .gait.velocity import Velocity
-from .policy.load import load_policy
+from .policy.load import find_policy, load_policy
 from .policy.options import PolicyOptions
-from .policy.shipped import find_policy
 from .states.controller import Controller
 from .states.modes import Answer, MODES, State
 from .states.parameters import StateParameters

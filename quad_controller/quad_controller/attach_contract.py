@@ -12,10 +12,10 @@ import sys
 
 from .exceptions import PolicyError, QuadControllerError
 from .policy import onnx_file
-from .policy.contract.build import build_contract
 from .policy.contract.document import ContractDocument, setting
 from .policy.contract.files import read_contract_file
 from .policy.contract.mjlab import CONTRACT_KEY, read_metadata
+from .policy.contract.model import build_contract
 from .policy.network import OnnxNetwork
 
 

@@ -18,8 +18,8 @@ from rosbag_files import BagError, BagReader, load_metadata, METADATA_FILE
 
 from .exceptions import ParameterError, PolicyError
 from .gait.velocity import Velocity
-from .policy.interface import PolicyInputs
 from .policy.network import Floats
+from .policy.observation import PolicyInputs
 from .policy.options import PolicyOptions
 from .states.parameters import StateParameters
 

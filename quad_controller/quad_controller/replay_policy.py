@@ -19,12 +19,11 @@ from .exceptions import PolicyError, QuadControllerError
 from .gait.generator import GaitGenerator
 from .gait.parameters import GaitParameters
 from .policy.contract.model import PolicyContract
-from .policy.load import load_policy, LoadedPolicy
+from .policy.load import find_policy, load_policy, LoadedPolicy
 from .policy.network import Floats
 from .policy.observation import observed_places
 from .policy.options import PolicyOptions
 from .policy.runner import PolicyRunner
-from .policy.shipped import find_policy
 from .policy.statistics import ObservationStatistics, STATISTICS_KEY
 from .recording import inputs_of, PolicyRun, read_recording, Step
 from .states.controller import MAX_STEP

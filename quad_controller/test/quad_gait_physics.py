@@ -10,7 +10,7 @@ import math
 
 from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
 from quad_controller.gait.velocity import REST
-from quad_controller.policy.interface import Policy
+from quad_controller.policy.runner import PolicyRunner
 from quad_description import Quadruped, quadruped, robot_urdf, RobotState
 from quad_sim.physics import PhysicsBackend, Robot
 
@@ -42,7 +42,7 @@ class PhysicsRig:
         self,
         robot: Robot | None = None,
         gait: GaitParameters | None = None,
-        policy: Policy | None = None,
+        policy: PolicyRunner | None = None,
         model: Quadruped = MODEL,
         sense: Callable[[RobotState], RobotState] = lambda state: state,
     ) -> None:

@@ -13,7 +13,7 @@ from policy_export import export, Layers
 
 from quad_controller import GaitGenerator, GaitParameters
 from quad_controller.policy.contract.model import RecurrentState
-from quad_controller.policy.network import FLOAT, Floats, Port
+from quad_controller.policy.network import FLOAT, Floats, OnnxNetwork, Port
 from quad_gait_rig import ROBOT
 
 STAND = GaitGenerator(ROBOT, GaitParameters()).stand_targets
@@ -34,7 +34,7 @@ def metadata(**changes: str | None) -> dict[str, str]:
     return {key: value for key, value in (fitting | changes).items() if value is not None}
 
 
-class FakeNetwork:
+class FakeNetwork(OnnxNetwork):
     """Answers as it is set up to, and keeps the requests."""
 
     def __init__(self, values: Mapping[str, str], joints: int = 12) -> None:
@@ -42,13 +42,13 @@ class FakeNetwork:
         self.metadata = values
         self.inputs: tuple[Port, ...] = (('obs', FLOAT, (1, 11 + 3 * joints)),)
         self.outputs: tuple[Port, ...] = (('actions', FLOAT, (1, joints)),)
-        self.digest = 'abc'
+        self.name, self.digest = 'test', 'abc'
         self.warnings: tuple[str, ...] = ()
         self.action: Floats = np.zeros((1, joints), np.float32)
         self.blind = False
         self.asked: list[Floats] = []
 
-    def recur(self, _states: tuple[RecurrentState, ...], _actions: str = '') -> None:
+    def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
         """Have no states."""
 
     def reset(self) -> None:

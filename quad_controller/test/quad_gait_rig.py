@@ -9,7 +9,8 @@ import math
 
 from quad_builds import Build, urdf
 from quad_controller import Controller, GaitParameters, State, StateParameters, Velocity
-from quad_controller.policy.interface import PolicyInputs, PolicyStep
+from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.runner import PolicyRunner, PolicyStep
 from quad_description import ImuSample, JointSample, quadruped, RobotState, Targets
 
 PERIOD = 0.02  # [s]
@@ -26,13 +27,8 @@ def tilted(angle: float) -> ImuSample:
     return replace(UPRIGHT, orientation=(math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2)))
 
 
-class StillPolicy:
+class StillPolicy(PolicyRunner):
     """A policy that stands, and answers wrongly on request."""
-
-    name = 'still'
-    needs_linear_velocity = False
-    needs_foot_contacts = False
-    digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Return what it has to see: what every policy sees."""
@@ -42,6 +38,7 @@ class StillPolicy:
 
     def __init__(self, targets: Targets) -> None:
         """Answer always the same targets."""
+        self.name, self.digest = 'still', ''
         self.targets: Targets | None = targets
         self.resets = 0
         self.velocities: list[Velocity] = []

@@ -23,13 +23,12 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.attach_contract import run
-from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.document import document_of, flatten, read_yaml
 from quad_controller.policy.contract.files import read_contract_file
-from quad_controller.policy.contract.model import RecurrentState
-from quad_controller.policy.interface import PolicyInputs
+from quad_controller.policy.contract.model import build_contract, RecurrentState
 from quad_controller.policy.load import LoadedPolicy
 from quad_controller.policy.network import OnnxNetwork
+from quad_controller.policy.observation import PolicyInputs
 from quad_controller.policy.options import GravitySource
 from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import normalized

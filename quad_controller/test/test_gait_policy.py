@@ -26,10 +26,9 @@ from quad_controller import (
 )
 from quad_controller.gait.velocity import REST
 from quad_controller.policy.contract.mjlab import VENDOR
-from quad_controller.policy.interface import PolicyInputs
 from quad_controller.policy.load import LoadedPolicy, validate_policy
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.observation import gravity
+from quad_controller.policy.observation import gravity, PolicyInputs
 from quad_controller.policy.options import GravitySource, ImuFrame
 from quad_description import ImuSample, JointSample
 from quad_gait_physics import MODEL, PhysicsRig
@@ -47,10 +46,7 @@ MJLAB_TERMS = 'base_ang_vel,projected_gravity,command,phase,joint_pos,joint_vel,
 
 def check(network: FakeNetwork, options: PolicyOptions | None = None) -> LoadedPolicy:
     """Check a network as a policy of the test's robot."""
-    return validate_policy(
-        'test', network, ROBOT, STAND,
-        options=options or PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
-    )  # fmt: skip
+    return validate_policy(network, ROBOT, STAND, options or PolicyOptions(), PERIOD)
 
 
 @pytest.mark.parametrize(
@@ -105,10 +101,8 @@ def test_a_policy_runs_at_the_rate_of_its_training_only(rate: float) -> None:
     for changes, fits in (({}, False), ({'step_dt': f'{1.0 / rate}'}, True)):
         report = ''
         try:
-            validate_policy(
-                'test', FakeNetwork(metadata(**changes)), ROBOT, STAND,
-                options=PolicyOptions(), period=1.0 / rate, clock=lambda: 0.0,
-            )  # fmt: skip
+            network = FakeNetwork(metadata(**changes))
+            validate_policy(network, ROBOT, STAND, PolicyOptions(), 1.0 / rate)
         except PolicyError as refusal:
             report = refusal.reason
         assert report == (
@@ -325,10 +319,8 @@ def test_joints_that_the_robot_lacks_may_be_held() -> None:
 def test_joints_that_the_policy_lacks_stay() -> None:
     """An arm that the policy does not know keeps the targets that it had."""
     network = FakeNetwork(metadata())
-    loaded = validate_policy(
-        'test', network, ARM_ROBOT, (*STAND, 0.7),
-        options=PolicyOptions(), period=PERIOD, clock=lambda: 0.0,
-    )  # fmt: skip
+    options = PolicyOptions()
+    loaded = validate_policy(network, ARM_ROBOT, (*STAND, 0.7), options, PERIOD)
     loaded.runner.reset((*STAND, 0.7))
     joints = JointSample((*STAND, 0.1), (0.0,) * 13)
     targets = loaded.runner.step(PolicyInputs(joints, UPRIGHT, REST), PERIOD).targets

@@ -19,8 +19,8 @@ from quad_controller import (
     StateParameters,
     Velocity,
 )
-from quad_controller.policy.interface import PolicyInputs, PolicyStep
-from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.runner import PolicyRunner, PolicyStep
 from quad_description import Targets
 from quad_gait_physics import MODEL, PhysicsRig
 from quad_gait_rig import PERIOD, Rig, ROBOT, StillPolicy, tilted

@@ -35,12 +35,11 @@ from quad_controller import (
     Velocity,
 )
 from quad_controller.policy.check import check_contract
-from quad_controller.policy.contract.build import build_contract
-from quad_controller.policy.contract.declared import read_declared
 from quad_controller.policy.contract.mjlab import read_metadata
-from quad_controller.policy.interface import PolicyInputs, PolicyStep
+from quad_controller.policy.contract.model import build_contract
 from quad_controller.policy.network import OnnxNetwork
-from quad_controller.policy.runner import PolicyRunner
+from quad_controller.policy.observation import PolicyInputs
+from quad_controller.policy.runner import PolicyRunner, PolicyStep
 from quad_controller.policy_check.arenas import Conditions
 from quad_controller.policy_check.course import CourseFigures, Passage
 from quad_controller.policy_check.trial import Candidate
@@ -53,19 +52,15 @@ pytestmark = pytest.mark.slow
 TRAINING = Path(__file__).parents[1] / 'training'
 
 
-class Lesson:
+class Lesson(PolicyRunner):
     """The teacher as a policy: what is imitated has to walk."""
-
-    name = 'teacher'
-    needs_linear_velocity = False
-    needs_foot_contacts = False
-    digest = ''
 
     def missing(self, inputs: PolicyInputs) -> str:
         """Need nothing more."""
         return ''
 
     def __init__(self, teacher: GaitTeacher) -> None:
+        self.name, self.digest = 'teacher', ''
         self._teacher = teacher
         self._phase = 0.0
 
@@ -121,7 +116,7 @@ def test_what_is_trained_is_what_runs() -> None:
     env = walking_env(NO_RANDOMIZATION)
     seen, _ = env.reset(seed=1, options={'command': (0.2, 0.0, 0.3)})
     runner = PolicyRunner(
-        'run', FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
+        FakeNetwork({}), env.contract, MODEL, options=PolicyOptions(), period=PERIOD
     )
     phase = math.atan2(seen[9], seen[10]) % math.tau / math.tau
     runner.reset(tuple(env.simulation.stand.tolist()))
@@ -164,8 +159,7 @@ def test_the_contract_is_in_the_file(tmp_path: Path) -> None:
     stand = GaitGenerator(MODEL, GaitParameters()).stand_targets
     for row in check_contract(
         network, contract, MODEL, stand,
-        document=document, declared=read_declared(network.metadata), hold_missing=False,
-        period=PERIOD,
+        document=document, hold_missing=False, period=PERIOD,
     ):  # fmt: skip
         assert row.verdict.value == 'ok', row
 

@@ -8,7 +8,7 @@ limiter of speeds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 import math
 from typing import Any
 
@@ -25,9 +25,9 @@ from trained_contract import (
 
 from quad_controller import PolicyOptions, Velocity
 from quad_controller.gait.parameters import LOW_AND_WIDE
-from quad_controller.policy.contract.model import PolicyContract, RecurrentState, Source
-from quad_controller.policy.interface import PolicyInputs
-from quad_controller.policy.network import Floats, Port
+from quad_controller.policy.contract.model import PolicyContract, Source
+from quad_controller.policy.network import Floats, OnnxNetwork
+from quad_controller.policy.observation import PolicyInputs
 from quad_controller.policy.runner import PolicyRunner
 from quad_controller.states.motion import StepLimiter
 from quad_description import Quadruped, quadruped, robot_urdf, Targets
@@ -45,28 +45,14 @@ def walking_contract(robot: Quadruped, kind: str = '') -> Values:
     return walking_values(robot.names, teacher.stand, teacher.schedule.period, kind)
 
 
-class NoNetwork:
+class NoNetwork(OnnxNetwork):
     """Stands where the network will be: the trainer answers instead of it."""
 
-    metadata: Mapping[str, str] = {}
-    inputs: tuple[Port, ...] = ()
-    outputs: tuple[Port, ...] = ()
-    digest = ''
-    warnings: tuple[str, ...] = ()
-
-    def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
-        """Have none."""
+    def __init__(self) -> None:
+        self.name, self.digest = 'training', ''
 
     def reset(self) -> None:
         """Have no past."""
-
-    def run(self, observation: Floats) -> Floats:
-        """Refuse: nobody asks it.
-
-        Raises:
-            NotImplementedError: Always.
-        """
-        raise NotImplementedError('the trainer answers')
 
 
 class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
@@ -79,7 +65,7 @@ class ContractEnv(gymnasium.Wrapper[Floats, Floats, Floats, Floats]):
         robot = quadruped(robot_urdf())
         self.contract = contract_of(values)
         self._runner = PolicyRunner(
-            'training', NoNetwork(), self.contract, robot, options=PolicyOptions(), period=PERIOD
+            NoNetwork(), self.contract, robot, options=PolicyOptions(), period=PERIOD
         )
         self._limiter = StepLimiter(robot.limits, PERIOD)
         count = len(robot.names)

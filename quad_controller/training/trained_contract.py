@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from quad_controller.policy.contract.build import build_contract
 from quad_controller.policy.contract.document import document_of
 from quad_controller.policy.contract.mjlab import CONTRACT_KEY
-from quad_controller.policy.contract.model import PolicyContract
+from quad_controller.policy.contract.model import build_contract, PolicyContract
 from quad_description import Targets
 from quad_sim import ServoModel
 from quad_sim.env import CommandRanges

@@ -48,9 +48,9 @@ from quad_msgs.srv import LoadPolicy, SetMode
 from ..exceptions import PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..gait.velocity import Velocity
-from ..policy.interface import Policy
-from ..policy.load import load_policy, LoadedPolicy
-from ..policy.shipped import find_policy
+from ..policy.contract.model import Source
+from ..policy.load import find_policy, load_policy, LoadedPolicy
+from ..policy.runner import PolicyRunner
 from ..recording import PolicyRun
 from ..states.controller import Controller
 from ..states.modes import Answer, Fault
@@ -187,7 +187,7 @@ class ControllerNode(Node):
             stamp = self.get_clock().now().nanoseconds
             self._recorder.offer(output, stamp, dt, computing, latency)
 
-    def _load_first_policy(self) -> tuple[Policy | None, str]:
+    def _load_first_policy(self) -> tuple[PolicyRunner | None, str]:
         """Return the policy, or None and why there is none; the gait does not need it."""
         if not self._settings.policy:
             return None, NO_POLICY
@@ -217,7 +217,7 @@ class ControllerNode(Node):
         self.get_logger().info(str(loaded))
         return loaded
 
-    def _wait_for_estimates(self, policy: Policy) -> None:
+    def _wait_for_estimates(self, policy: PolicyRunner) -> None:
         """Wait for what a policy needs, in another thread; without it, the refusal says so."""
         topics = [t for t in _estimates_for(policy) if not self._arrived[t].is_set()]
         if self.executor is None or not topics:
@@ -427,10 +427,10 @@ class ControllerNode(Node):
         self._stop.set()
 
 
-def _estimates_for(policy: Policy) -> list[str]:
+def _estimates_for(policy: PolicyRunner) -> list[str]:
     """Return the topics of estimates that a policy needs."""
-    needs = {'odom': policy.needs_linear_velocity, 'foot_contacts': policy.needs_foot_contacts}
-    return [topic for topic, needed in needs.items() if needed]
+    needs = {'odom': Source.LINEAR_VELOCITY, 'foot_contacts': Source.FOOT_CONTACTS}
+    return [topic for topic, source in needs.items() if policy.contract.needs(source)]
 
 
 def main() -> int:

@@ -5,18 +5,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
 
 import numpy as np
 
 from quad_description import Quadruped, Targets
 
-from .contract.declared import Declared
+from .contract import mjlab
 from .contract.document import ContractDocument
-from .contract.mjlab import FILE as METADATA
-from .contract.mjlab import VENDOR
 from .contract.model import PolicyContract
 from .gains import gain_rows, ServoResponse
-from .network import FLOAT, Floats, Network, observation_ports
+from .network import FLOAT, Floats, observation_ports, OnnxNetwork
 from .observation import observed_places
 from .report import Row, Verdict
 
@@ -34,13 +33,12 @@ MIN_NEWEST = 0.1  # share of what the oldest step of a history does that the new
 
 
 def check_contract(
-    network: Network,
+    network: OnnxNetwork,
     contract: PolicyContract,
     robot: Quadruped,
     stand: Targets,
     *,
     document: ContractDocument,
-    declared: Declared,
     hold_missing: bool,
     period: float,
     servo: ServoResponse | None = None,
@@ -49,7 +47,6 @@ def check_contract(
 
     Args:
         document: Where the values of the contract come from.
-        declared: What its file says of sizes and rate besides.
         hold_missing: Joints that the robot lacks count as being at their default.
         period: Time between two steps of the control loop in [s].
         servo: How the servos of the robot follow; None when nobody knows.
@@ -69,9 +66,10 @@ def check_contract(
     for warning in network.warnings:
         yield Row('weights', 'in the file', warning, Verdict.WARN)
     yield from _recurrent(network, contract)
-    yield from _sizes('observation', declared.observation_sizes, contract.width)
-    yield from _sizes('action', declared.action_sizes, count)
-    yield from _rates(contract, declared, document, period)
+    metadata = network.metadata
+    yield from _sizes('observation', mjlab.observation_sizes(metadata), contract.width)
+    yield from _sizes('action', mjlab.action_sizes(metadata), count)
+    yield from _rates(contract, mjlab.step_periods(metadata), document, period)
     yield from _joints(contract.joint_names, robot, hold_missing=hold_missing)
     yield from _defaults(contract, robot, stand)
     largest = max((abs(scale) for scale in contract.action.scale), default=0.0)
@@ -80,29 +78,26 @@ def check_contract(
     yield from _scales(contract, document)
     yield from gain_rows(contract.gains, servo, period)
     yield from _commands(contract)
-    if declared.unknown:
-        unknown = ', '.join(f'{key} = {value}' for key, value in declared.unknown.items())
+    if strange := mjlab.not_understood(metadata):
+        unknown = ', '.join(f'{key} = {value}' for key, value in strange.items())
         yield Row('keys', 'understood', f'not understood: {unknown}', Verdict.WARN)
     for path, value, origin in document.rows():
-        if origin == VENDOR:
-            yield Row(path, 'known', f'{value}, of {VENDOR}', Verdict.WARN)
+        if origin == mjlab.VENDOR:
+            yield Row(path, 'known', f'{value}, of {mjlab.VENDOR}', Verdict.WARN)
 
 
 def check_answers(
-    network: Network,
+    network: OnnxNetwork,
     standing: Floats,
     contract: PolicyContract,
     stand: Floats,
-    *,
     period: float,
-    clock: Callable[[], float],
 ) -> Iterator[Row]:
     """Ask a policy for actions as it will be asked, and look at them.
 
     Args:
         standing: The observation of a robot that stands.
         stand: Where the robot stands, in the order of the policy [rad].
-        clock: A monotonic clock in [s].
     """
 
     def run(observation: Floats) -> Floats:
@@ -135,9 +130,9 @@ def check_answers(
     yield from _history(run, standing, contract)
     times = []
     for _ in range(TIMED_RUNS):
-        start = clock()
+        start = time.perf_counter()
         run(standing)
-        times.append(clock() - start)
+        times.append(time.perf_counter() - start)
     late = sorted(times)[int(0.99 * (TIMED_RUNS - 1))]
     most = MAX_LATENCY_RATIO * period
     verdict = Verdict.OK if late < most else Verdict.WARN
@@ -189,33 +184,29 @@ def _sizes(what: str, sizes: Mapping[str, float], expected: int) -> Iterator[Row
         yield _row(f'{key} ({what})', f'{expected}', f'{size:g}', size == expected)
 
 
-def _recurrent(network: Network, contract: PolicyContract) -> Iterator[Row]:
-    """Compare each recurrent input with its output."""
+def _recurrent(network: OnnxNetwork, contract: PolicyContract) -> Iterator[Row]:
+    """Compare each recurrent input with its output: type, and sizes that are fixed."""
     inputs = {name: (kind, shape) for name, kind, shape in network.inputs}
     outputs = {name: (kind, shape) for name, kind, shape in network.outputs}
     for state in contract.recurrence:
         fed, kept = inputs.get(state.input), outputs.get(state.output)
+        fits = fed is not None and kept is not None and fed[0] == kept[0] == FLOAT
+        if fits and fed and kept:
+            sizes = list(zip(fed[1], kept[1], strict=False))
+            fits = len(fed[1]) == len(kept[1]) and not any(
+                one != two and isinstance(one, int) and isinstance(two, int) for one, two in sizes
+            )
         found = f'{fed} from {kept}'
-        fits = fed is not None and kept is not None and _same_port(fed, kept)
         yield _row(f'recurrence.{state.input}', f'an input, from {state.output}', found, fits)
 
 
-def _same_port(fed: tuple[str, tuple[object, ...]], kept: tuple[str, tuple[object, ...]]) -> bool:
-    """Return whether an output may be fed to an input: type and sizes that are fixed."""
-    (kind, shape), (other, others) = fed, kept
-    fixed = (
-        one == two
-        for one, two in zip(shape, others, strict=False)
-        if isinstance(one, int) and isinstance(two, int)
-    )
-    return kind == other == FLOAT and len(shape) == len(others) and all(fixed)
-
-
 def _rates(
-    contract: PolicyContract, declared: Declared, document: ContractDocument, period: float
+    contract: PolicyContract,
+    periods: Mapping[str, float],
+    document: ContractDocument,
+    period: float,
 ) -> Iterator[Row]:
     """Compare the rate that the policy was trained for with that of the loop."""
-    periods = declared.step_periods
     origin = document.origins.get('period', '')
     for key, step in (periods or {origin: contract.period}).items():
         fits = abs(step - contract.period) <= MAX_PERIOD_ERROR * contract.period
@@ -235,7 +226,7 @@ def _scales(contract: PolicyContract, document: ContractDocument) -> Iterator[Ro
         if least == 0.0:
             found = '0: the policy would not observe it; exporters write 0.0004 as 0.000'
             yield Row(name, 'not 0', found, Verdict.REFUSE)
-        elif least < ROUNDED and document.origins.get(name) == METADATA:
+        elif least < ROUNDED and document.origins.get(name) == mjlab.FILE:
             found = f'{least:g}, with three decimals: up to {0.0005 / least:.0%} off'
             yield Row(name, f'{ROUNDED:g} or more', found, Verdict.WARN)
 

@@ -58,44 +58,38 @@ def gain_rows(gains: Gains | None, servo: ServoResponse | None, period: float) -
         found = f'{_span(gains.stiffness)} N m/rad, {_span(gains.damping)} N m s/rad'
         yield Row(STATED, 'stiffness above 0', found, Verdict.WARN)
         return
-    yield _stiffness(gains, servo)
-    yield _bandwidth(gains, servo)
+    yield _row(
+        'stiffness of the training',
+        f"the servos' {servo.stiffness:g}",
+        f'{_span(gains.stiffness)} N m/rad',
+        servo.stiffness / _farthest(gains.stiffness, servo.stiffness),
+        ('a target pulls {:.1f} times as hard, steps get hard and overshoot',
+         'joints sag {:.1f} times as far, it goes lower and slower'),
+    )  # fmt: skip
+    trained = [
+        ServoResponse(stiffness, damping, servo.inertia).bandwidth
+        for stiffness, damping in zip(gains.stiffness, gains.damping, strict=True)
+    ]
+    yield _row(
+        'bandwidth of the training',
+        f"the servos' {servo.bandwidth:.1f} Hz with {servo.damping:g}",
+        f'{_span(trained, ".1f")} Hz with {_span(gains.damping)} N m s/rad',
+        servo.bandwidth / _farthest(trained, servo.bandwidth),
+        ('joints follow {:.1f} times as fast, what it smoothed gets through',
+         'joints follow {:.1f} times as slowly, feet lift and land late'),
+    )  # fmt: skip
     verdict = Verdict.OK if servo.latency <= 0.5 * period else Verdict.WARN
     found = f'{servo.latency * 1e3:g} ms more than a training without any'
     expected = f'up to {0.5 * period * 1e3:g} ms'
     yield Row('latency of the servos', expected, found, verdict)
 
 
-def _stiffness(gains: Gains, servo: ServoResponse) -> Row:
-    ratio = servo.stiffness / _farthest(gains.stiffness, servo.stiffness)
-    does, verdict = '', Verdict.OK
-    if ratio > MAX_RATIO:
-        does = f': here a target pulls {ratio:.1f} times as hard, steps get hard and overshoot'
-        verdict = Verdict.WARN
-    elif ratio < 1.0 / MAX_RATIO:
-        does = f': here joints sag {1.0 / ratio:.1f} times as far, it goes lower and slower'
-        verdict = Verdict.WARN
-    found = f'{_span(gains.stiffness)} N m/rad{does}'
-    return Row('stiffness of the training', f"the servos' {servo.stiffness:g}", found, verdict)
-
-
-def _bandwidth(gains: Gains, servo: ServoResponse) -> Row:
-    trained = [
-        ServoResponse(stiffness, damping, servo.inertia).bandwidth
-        for stiffness, damping in zip(gains.stiffness, gains.damping, strict=True)
-    ]
-    ratio = servo.bandwidth / _farthest(trained, servo.bandwidth)
-    does, verdict = '', Verdict.OK
-    if ratio > MAX_RATIO:
-        does = f': here joints follow {ratio:.1f} times as fast, what it smoothed gets through'
-        verdict = Verdict.WARN
-    elif ratio < 1.0 / MAX_RATIO:
-        does = f': here joints follow {1.0 / ratio:.1f} times as slowly, feet lift and land late'
-        verdict = Verdict.WARN
-    damping = _span(gains.damping)
-    found = f'{_span(trained, ".1f")} Hz with {damping} N m s/rad{does}'
-    expected = f"the servos' {servo.bandwidth:.1f} Hz with {servo.damping:g}"
-    return Row('bandwidth of the training', expected, found, verdict)
+def _row(subject: str, expected: str, found: str, ratio: float, does: tuple[str, str]) -> Row:
+    """Warn where the servos have much more or much less than the training."""
+    if 1.0 / MAX_RATIO <= ratio <= MAX_RATIO:
+        return Row(subject, expected, found, Verdict.OK)
+    text = does[0].format(ratio) if ratio > 1.0 else does[1].format(1.0 / ratio)
+    return Row(subject, expected, f'{found}: here {text}', Verdict.WARN)
 
 
 def _farthest(values: Sequence[float], from_value: float) -> float:

@@ -4,29 +4,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-import time
 
 from quad_description import FEET, ImuSample, JointSample, Quadruped, Targets
 
 from ..exceptions import PolicyError
 from ..gait.velocity import REST
 from .check import check_answers, check_contract
-from .contract.build import build_contract
-from .contract.declared import read_declared
 from .contract.document import ContractDocument, document_of
 from .contract.files import read_contract_file
 from .contract.mjlab import CONTRACT_KEY, read_metadata
-from .contract.model import PolicyContract, Source
-from .interface import PolicyInputs
-from .network import Floats, Network, OnnxNetwork
+from .contract.model import build_contract, PolicyContract, Source
+from .network import Floats, OnnxNetwork
+from .observation import PolicyInputs
 from .options import ImuFrame, PolicyOptions
 from .report import Report, Row
 from .runner import PolicyRunner
 from .statistics import STATISTICS_KEY
 
+SHIPPED = Path(__file__).parents[1] / 'policies'
 UPRIGHT = ImuSample((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81))
 
 
@@ -53,7 +50,7 @@ class LoadedPolicy:
         return '\n'.join(lines)
 
 
-def document_for(network: Network, options: PolicyOptions) -> ContractDocument:
+def document_for(network: OnnxNetwork, options: PolicyOptions) -> ContractDocument:
     """Return all that is known of a policy's contract; what counts most lies on top.
 
     Args:
@@ -70,25 +67,21 @@ def document_for(network: Network, options: PolicyOptions) -> ContractDocument:
 
 
 def _settings(document: ContractDocument, options: PolicyOptions) -> ContractDocument:
-    """Return what parameters say of terms."""
+    """Return what parameters set of terms."""
     terms = document.values.get('observation', {}).get('terms', {})
-    settings: dict[str, dict[str, object]] = {}
-    for name, source, key, value in _term_settings(terms, options):
-        if terms[name].get('source') == source.value:
-            settings.setdefault(name, {})[key] = value
-    if not settings:
+    values: dict[str, dict[str, object]] = {
+        Source.ANGULAR_VELOCITY.value: {},
+        Source.PHASE.value: {},
+    }
+    if options.imu_frame is not ImuFrame.AUTO:
+        values[Source.ANGULAR_VELOCITY.value] = {'frame': options.imu_frame.value}
+    if options.phase_period:
+        values[Source.PHASE.value] = {'phase_period': options.phase_period}
+    found = {name: values.get(str(term.get('source')), {}) for name, term in terms.items()}
+    set_terms = {name: each for name, each in found.items() if each}
+    if not set_terms:
         return ContractDocument({})
-    return document_of({'observation': {'terms': settings}}, 'parameter')
-
-
-def _term_settings(
-    terms: dict[str, dict[str, object]], options: PolicyOptions
-) -> Iterator[tuple[str, Source, str, object]]:
-    for name in terms:
-        if options.imu_frame is not ImuFrame.AUTO:
-            yield name, Source.ANGULAR_VELOCITY, 'frame', options.imu_frame.value
-        if options.phase_period:
-            yield name, Source.PHASE, 'phase_period', options.phase_period
+    return document_of({'observation': {'terms': set_terms}}, 'parameter')
 
 
 def load_policy(
@@ -99,36 +92,17 @@ def load_policy(
     Raises:
         PolicyError: It cannot be loaded or does not fit; the message has the table.
     """
-    network = OnnxNetwork(path)
-    return validate_policy(
-        path.name,
-        network,
-        robot,
-        stand,
-        options=options,
-        period=period,
-        clock=time.perf_counter,
-    )
+    return validate_policy(OnnxNetwork(path), robot, stand, options, period)
 
 
 def validate_policy(
-    name: str,
-    network: Network,
+    network: OnnxNetwork,
     robot: Quadruped,
     stand: Targets,
-    *,
     options: PolicyOptions,
     period: float,
-    clock: Callable[[], float],
 ) -> LoadedPolicy:
-    """Check a network as a policy.
-
-    Args:
-        clock: A monotonic clock in [s], to see how long it takes.
-
-    Raises:
-        PolicyError: It does not fit; the message has the table.
-    """
+    """Check a network as a policy, as :func:`load_policy` does."""
     document = document_for(network, options)
     contract = build_contract(document)
     fit = check_contract(
@@ -137,21 +111,20 @@ def validate_policy(
         robot,
         stand,
         document=document,
-        declared=read_declared(network.metadata),
         hold_missing=options.hold_missing,
         period=period,
         servo=options.servo,
     )
-    checked = _accepted(tuple(fit), f'policy {name} does not fit this robot')
+    checked = _accepted(tuple(fit), f'policy {network.name} does not fit this robot')
     network.recur(contract.recurrence, contract.action.output)
-    runner = PolicyRunner(name, network, contract, robot, options=options, period=period)
+    runner = PolicyRunner(network, contract, robot, options=options, period=period)
     standing, held = _observed(runner, stand), runner.in_its_order(stand)
     try:
-        answers = check_answers(network, standing, contract, held, period=period, clock=clock)
+        answers = check_answers(network, standing, contract, held, period)
         rows = (*checked.rows, *answers)
     except Exception as error:
-        raise PolicyError(f'policy {name} cannot be run: {error}') from error
-    report = _accepted(rows, f'policy {name} does not behave')
+        raise PolicyError(f'policy {network.name} cannot be run: {error}') from error
+    report = _accepted(rows, f'policy {network.name} does not behave')
     return LoadedPolicy(runner, contract, document, report, network.digest, dict(network.metadata))
 
 
@@ -168,3 +141,25 @@ def _observed(runner: PolicyRunner, stand: Targets) -> Floats:
     runner.reset(stand)
     still = JointSample(stand, (0.0,) * len(stand))
     return runner.observe(PolicyInputs(still, UPRIGHT, REST, (0.0, 0.0, 0.0), (True,) * len(FEET)))
+
+
+def shipped_policies() -> dict[str, Path]:
+    """Return the files of all shipped policies by their names."""
+    return {path.stem: path for path in sorted(SHIPPED.glob('*.onnx'))}
+
+
+def find_policy(text: str) -> Path:
+    """Return the file of a path, or of a shipped policy's name.
+
+    Raises:
+        PolicyError: It is neither.
+    """
+    path = Path(text).expanduser()
+    if path.is_file():
+        return path
+    shipped = shipped_policies()
+    if text in shipped:
+        return shipped[text]
+    raise PolicyError(
+        f'policy {text!r} is neither a file nor shipped ({", ".join(shipped) or "none"})'
+    )

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,30 +20,17 @@ Port = tuple[str, str, tuple[object, ...]]
 FLOAT = 'tensor(float)'  # ONNX Runtime's name of the type
 
 
-class Network(Protocol):
-    """A network that answers an observation with an action."""
-
-    metadata: Mapping[str, str]  # what the file has of it
-    inputs: tuple[Port, ...]  # name, type and shape of each input
-    outputs: tuple[Port, ...]  # the same of each output
-    digest: str  # SHA-256 of the file and of those that its weights lie in
-    warnings: tuple[str, ...]  # what a person should know of the file
-
-    def recur(self, states: tuple[RecurrentState, ...], actions: str = '') -> None:
-        """Feed outputs to inputs in the step after; `actions` names the output of the actions."""
-        ...
-
-    def reset(self) -> None:
-        """Begin anew: recurrent states are zero."""
-        ...
-
-    def run(self, observation: Floats) -> Floats:
-        """Return the action for an observation; both have one row."""
-        ...
-
-
 class OnnxNetwork:
-    """A network in an ONNX file, run by ONNX Runtime on one thread."""
+    """A network in an ONNX file, run by ONNX Runtime on one thread.
+
+    Attributes:
+        name: Of its file.
+        digest: SHA-256 of its file and of those that its weights lie in.
+        metadata: What its file has.
+        inputs: Name, type and shape of each input.
+        outputs: The same of each output.
+        warnings: What a person should know of the file.
+    """
 
     def __init__(self, path: Path, *, new_weights: bool = False) -> None:
         """Load it.
@@ -55,7 +42,7 @@ class OnnxNetwork:
             PolicyError: There is no such file, no ONNX Runtime, or it cannot be loaded.
         """
         model = onnx_file.read_model(path)
-        self.digest = model.digest
+        self.name, self.digest = path.name, model.digest
         session = _session(path, model)
         self.metadata: Mapping[str, str] = dict(session.get_modelmeta().custom_metadata_map)
         self.warnings = _check_weights(path, model, {} if new_weights else self.metadata)
@@ -95,7 +82,7 @@ class OnnxNetwork:
 
 
 def observation_ports(
-    network: Network, states: tuple[RecurrentState, ...], actions: str
+    network: OnnxNetwork, states: tuple[RecurrentState, ...], actions: str
 ) -> tuple[list[Port], list[Port]]:
     """Return the inputs and outputs that are not recurrent: one each in a network that fits.
 

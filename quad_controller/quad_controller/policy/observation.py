@@ -11,7 +11,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from quad_description import FEET, ImuSample
+from quad_description import FEET, ImuSample, JointSample
 from quad_description.rotations import Vector
 
 from ..gait.velocity import Velocity
@@ -57,6 +57,20 @@ def gravity(imu: ImuSample, source: GravitySource) -> Vector:
 
 
 @dataclass(frozen=True, slots=True)
+class PolicyInputs:
+    """What a policy may see in one step."""
+
+    joints: JointSample  # measured joints
+    imu: ImuSample  # measured attitude and turning
+    velocity: Velocity  # velocity that is requested
+    # of the body in its own frame in [m/s], estimated; None where nobody does
+    linear_velocity: Vector | None = None
+    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None where
+    # nobody estimates it
+    foot_contacts: tuple[bool, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Observed:
     """What is measured and commanded in one step, joints in the order of the policy."""
 
@@ -65,11 +79,8 @@ class Observed:
     imu: ImuSample  # attitude and turning
     velocity: Velocity  # velocity that is requested
     previous: Floats  # the last action
-    # of the body in its own frame in [m/s]; None while nobody estimates it
-    linear_velocity: Vector | None = None
-    # which feet are on the ground, in the order of :data:`quad_description.FEET`; None while
-    # nobody estimates it
-    foot_contacts: tuple[bool, ...] | None = None
+    linear_velocity: Vector | None  # as in the inputs
+    foot_contacts: tuple[bool, ...] | None  # as in the inputs
 
 
 def _in_frame(vector: Vector | None, frame: BodyFrame) -> Vector:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -13,19 +14,34 @@ from quad_description import Quadruped, Targets
 from ..exceptions import PolicyError
 from ..gait.velocity import Velocity
 from .contract.model import PolicyContract, Source
-from .interface import PolicyInputs, PolicyStep
-from .network import Floats, Network
-from .observation import ObservationBuilder, Observed
+from .network import Floats, OnnxNetwork
+from .observation import ObservationBuilder, Observed, PolicyInputs
 from .options import PolicyOptions
 
 
+@dataclass(frozen=True, slots=True)
+class PolicyStep:
+    """What a policy answers in one step."""
+
+    # positions of all joints in [rad]; None when the answer cannot be used
+    targets: Targets | None
+    reason: str = ''  # why it cannot be used
+    observation: Floats | None = None  # what the network was given; None when it was not asked
+    action: Floats | None = None  # what it answered
+
+
 class PolicyRunner:
-    """A policy for a robot; see :class:`.interface.Policy`."""
+    """A trained policy that fits the robot.
+
+    Attributes:
+        name: How it is called in messages.
+        digest: SHA-256 of its file.
+        contract: What it expects.
+    """
 
     def __init__(
         self,
-        name: str,
-        network: Network,
+        network: OnnxNetwork,
         contract: PolicyContract,
         robot: Quadruped,
         *,
@@ -41,7 +57,8 @@ class PolicyRunner:
         Raises:
             PolicyError: Targets are clipped to where a joint may not be.
         """
-        self._name, self._network, self._contract = name, network, contract
+        self.name, self.digest, self.contract = network.name, network.digest, contract
+        self._network = network
         self._low_pass = options.low_pass or contract.action.low_pass
         places = {name: place for place, name in enumerate(robot.names)}
         self._places = [
@@ -66,37 +83,17 @@ class PolicyRunner:
         self._wanted: Floats | None = None
         self._filtered: Floats | None = None
 
-    @property
-    def name(self) -> str:
-        """How it is called in messages."""
-        return self._name
-
-    @property
-    def needs_linear_velocity(self) -> bool:
-        """Whether it sees the linear velocity of the body, which has to be estimated."""
-        return self._contract.needs(Source.LINEAR_VELOCITY)
-
-    @property
-    def needs_foot_contacts(self) -> bool:
-        """Whether it sees which feet are on the ground, which has to be estimated."""
-        return self._contract.needs(Source.FOOT_CONTACTS)
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 of its file."""
-        return self._network.digest
-
     def missing(self, inputs: PolicyInputs) -> str:
-        """Return what it needs and nobody measures; nothing when all is there."""
-        needs, joints, imu = self._contract.needs, inputs.joints, inputs.imu
+        """Return which measurement it lacks; nothing when all is there."""
+        needs, joints, imu = self.contract.needs, inputs.joints, inputs.imu
         if joints.velocities is None and needs(Source.JOINT_VELOCITIES):
             return 'a policy needs the velocities of the joints, which /joint_states does not have'
         if imu.angular_velocity is None and needs(Source.ANGULAR_VELOCITY):
             return 'a policy needs the angular velocity, which /imu does not have'
         if inputs.linear_velocity is None and needs(Source.LINEAR_VELOCITY):
-            return 'the policy needs the linear velocity of the body, which nobody estimates'
+            return 'the policy needs the linear velocity of the body, which is not estimated'
         if inputs.foot_contacts is None and needs(Source.FOOT_CONTACTS):
-            return 'the policy needs the contacts of the feet, and nobody publishes /foot_contacts'
+            return 'the policy needs the contacts of the feet, and /foot_contacts is not published'
         return ''
 
     def reset(self, others: Targets) -> None:
@@ -172,9 +169,9 @@ class PolicyRunner:
 
     def _command(self, velocity: Velocity) -> Velocity:
         """Return a velocity within what the policy was trained for."""
-        if self._contract.commands is None:
+        if self.contract.commands is None:
             return velocity
-        axes = zip(velocity, self._contract.commands.axes, strict=True)
+        axes = zip(velocity, self.contract.commands.axes, strict=True)
         return Velocity(*(min(max(value, low), high) for value, (low, high) in axes))
 
     def _targets(self, wanted: Floats, dt: float) -> Targets:
@@ -199,11 +196,11 @@ class PolicyRunner:
             middle, half = (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2
             lower[policy] = min(middle - share * half, self._defaults[policy])
             upper[policy] = max(middle + share * half, self._defaults[policy])
-        if self._contract.action.target_clip is not None:
-            lowest, highest = np.array(self._contract.action.target_clip, np.float32).T
+        if self.contract.action.target_clip is not None:
+            lowest, highest = np.array(self.contract.action.target_clip, np.float32).T
             np.maximum(lower, lowest, out=lower)
             np.minimum(upper, highest, out=upper)
-            for name, low, high in zip(self._contract.joint_names, lower, upper, strict=True):
+            for name, low, high in zip(self.contract.joint_names, lower, upper, strict=True):
                 if low > high:
                     raise PolicyError(
                         f'action.target_clip of {name} lies outside of its soft limits'

@@ -22,8 +22,8 @@ from ..exceptions import CheckError, QuadControllerError
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import REST, Velocity
 from ..policy.contract.model import CommandRanges
-from ..policy.interface import Policy
 from ..policy.network import Floats
+from ..policy.runner import PolicyRunner
 from ..states.controller import Controller
 from ..states.modes import State
 from ..states.parameters import StateParameters
@@ -157,7 +157,7 @@ class WalkingRobot:
         self,
         backend: Backend,
         robot: Quadruped,
-        policy: Policy | None,
+        policy: PolicyRunner | None,
         state: RobotState,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
@@ -261,7 +261,7 @@ class CourseWalker:
         self,
         arena: PhysicsArena | SerialArena,
         robot: Quadruped,
-        policy: Policy | None,
+        policy: PolicyRunner | None,
         gait: GaitParameters = AS_TUNED,
     ) -> None:
         """Put the robot on its feet.
@@ -361,7 +361,11 @@ class Walked:
 
 
 def walk(
-    arena: PhysicsArena, robot: Quadruped, policy: Policy, velocity: Velocity, duration: float
+    arena: PhysicsArena,
+    robot: Quadruped,
+    policy: PolicyRunner,
+    velocity: Velocity,
+    duration: float,
 ) -> Walked:
     """Walk once with a policy that has been checked, from lying on the ground."""
     walker = WalkingRobot(arena.backend, robot, policy, arena.backend.reset())

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..gait.velocity import Velocity
 from ..policy.contract.model import PolicyContract, Source
-from ..policy.network import Floats, Network
+from ..policy.network import Floats, OnnxNetwork
 from ..policy.observation import observed_places
 from .course import AXES, axis_of, CourseFigures, Passage
 
@@ -50,7 +50,9 @@ def astray(went: Velocity, commanded: Velocity) -> Iterator[str]:
         yield f'{axis} went {got:+.3f} of {want:+.3f}, {hint}'
 
 
-def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -> Iterator[str]:
+def unseen_terms(
+    network: OnnxNetwork, contract: PolicyContract, observed: Floats
+) -> Iterator[str]:
     """Yield which terms count so little that a walk does not show whether they are right.
 
     Args:
@@ -78,7 +80,7 @@ def unseen_terms(network: Network, contract: PolicyContract, observed: Floats) -
             )
 
 
-def _answers(network: Network, observed: Floats) -> Floats:
+def _answers(network: OnnxNetwork, observed: Floats) -> Floats:
     return np.concatenate([network.run(row[np.newaxis]) for row in observed])
 
 

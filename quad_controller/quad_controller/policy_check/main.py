@@ -21,10 +21,9 @@ from ..exceptions import CheckError, PolicyError, QuadControllerError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.velocity import Velocity
-from ..policy.load import load_policy, LoadedPolicy
+from ..policy.load import find_policy, load_policy, LoadedPolicy
 from ..policy.network import OnnxNetwork
 from ..policy.options import GravitySource, ImuFrame, PolicyOptions
-from ..policy.shipped import find_policy
 from ..states.parameters import StateParameters
 from .course import course_for, walk
 from .findings import (

@@ -18,9 +18,8 @@ from ..exceptions import CheckError
 from ..gait.generator import GaitGenerator
 from ..gait.parameters import AS_TUNED, GaitParameters
 from ..gait.velocity import Velocity
-from ..policy.load import load_policy, LoadedPolicy
+from ..policy.load import load_policy, LoadedPolicy, shipped_policies
 from ..policy.options import PolicyOptions
-from ..policy.shipped import shipped_policies
 from ..states.parameters import StateParameters
 from .arenas import AS_MADE, Conditions, PhysicsArena, RobotChoice, serial_arena
 from .course import CourseFigures, CourseWalker, REST_TIME, SETTLE_TIME, STAND_TIME

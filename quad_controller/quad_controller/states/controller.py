@@ -21,7 +21,7 @@ from ..gait.generator import GaitGenerator
 from ..gait.parameters import GaitParameters
 from ..gait.schedule import Gait
 from ..gait.velocity import REST, Velocity
-from ..policy.interface import Policy
+from ..policy.runner import PolicyRunner
 from .commands import Commands
 from .get_up import get_up_refusal, stands
 from .health import Health
@@ -64,7 +64,7 @@ class Controller:
         gait: GaitParameters,
         states: StateParameters,
         *,
-        policy: Policy | None = None,
+        policy: PolicyRunner | None = None,
         policy_refusal: str = NO_POLICY,
         dry_run: bool = False,
         arm_pose: Sequence[float] = (),
@@ -175,7 +175,7 @@ class Controller:
         return Answer(True, f'cleared; the mode is {machine.state.value}')
 
     @property
-    def policy(self) -> Policy | None:
+    def policy(self) -> PolicyRunner | None:
         """What the mode ``policy`` follows."""
         return self._policies.policy
 
@@ -188,7 +188,7 @@ class Controller:
             return f'the robot is on its way to {machine.goal.value}; ask again there'
         return ''
 
-    def follow(self, policy: Policy | None) -> Answer:
+    def follow(self, policy: PolicyRunner | None) -> Answer:
         """Follow another policy from now on, or the gait.
 
         A robot that walks comes to stand first, as on every other way between two modes; then

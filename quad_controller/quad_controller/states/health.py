@@ -11,7 +11,8 @@ from quad_description import ImuSample, JointSample, RobotState
 from quad_description.rotations import Vector
 
 from ..gait.velocity import REST
-from ..policy.interface import Policy, PolicyInputs
+from ..policy.observation import PolicyInputs
+from ..policy.runner import PolicyRunner
 from .modes import Fault
 from .parameters import StateParameters
 
@@ -164,7 +165,7 @@ class Health:
         if self.battery is not None and (self._low_for or 0.0) > parameters.battery_time:
             yield Fault.BATTERY, f'{self.battery:.0%} left; charge it'
 
-    def unmeasured(self, policy: Policy | None) -> str:
+    def unmeasured(self, policy: PolicyRunner | None) -> str:
         """Return what a policy would need and nobody measures; nothing for none."""
         if policy is None:
             return ''

@@ -22,7 +22,7 @@ from quad_description import Quadruped, Targets
 
 from ..exceptions import ParameterError
 from ..gait.generator import GaitGenerator
-from ..policy.interface import Policy
+from ..policy.runner import PolicyRunner
 from .get_up import FinalPoses, GetUp
 from .modes import GAIT_STATES, MOVING_STATES, Reaction, State
 from .motion import Blend, Hold, Motion, Walk
@@ -81,7 +81,7 @@ class StateMachine:
         poses: Poses,
         generator: GaitGenerator,
         parameters: StateParameters,
-        policy: Policy | None,
+        policy: PolicyRunner | None,
     ) -> None:
         """Start relaxed, without targets.
 
@@ -176,7 +176,7 @@ class StateMachine:
         self.request(State.STAND)
         self._after_standing = goal
 
-    def set_policy(self, policy: Policy | None) -> None:
+    def set_policy(self, policy: PolicyRunner | None) -> None:
         """Follow another policy when POLICY is entered next."""
         self._policy = policy
 

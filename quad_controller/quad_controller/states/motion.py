@@ -15,7 +15,7 @@ from quad_description.rotations import Vector
 from ..gait.body import BodyPose
 from ..gait.generator import GaitGenerator
 from ..gait.velocity import Velocity
-from ..policy.interface import PolicyInputs
+from ..policy.observation import PolicyInputs
 
 MAX_PERIODS = 1.5  # periods; a step that comes late may not be a leap
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from quad_description import Targets
 
-from ..policy.interface import Policy, PolicyStep
+from ..policy.runner import PolicyRunner, PolicyStep
 from .motion import Motion, Situation
 from .status import Asked
 
@@ -19,7 +19,7 @@ WIND_DOWN = 0.5  # [s] without velocity before the gait takes over
 class PolicyMotion(Motion):
     """Follows a policy."""
 
-    def __init__(self, policy: Policy, start: Targets, ease_time: float) -> None:
+    def __init__(self, policy: PolicyRunner, start: Targets, ease_time: float) -> None:
         """Begin where the joints are.
 
         Args:
@@ -79,7 +79,7 @@ class PolicyChoice:
         dry_run: Whether it is only asked, and never followed.
     """
 
-    def __init__(self, policy: Policy | None, refusal: str, *, dry_run: bool) -> None:
+    def __init__(self, policy: PolicyRunner | None, refusal: str, *, dry_run: bool) -> None:
         """Begin with a policy, or with why there is none."""
         self.policy, self._refusal, self.dry_run = policy, refusal, dry_run
         self._watched_steps = 0
@@ -94,7 +94,7 @@ class PolicyChoice:
             return 'the policy is only watched in a dry run (parameter policy_dry_run)'
         return ''
 
-    def choose(self, policy: Policy | None) -> str:
+    def choose(self, policy: PolicyRunner | None) -> str:
         """Take another policy; return what becomes of it as long as nothing moves."""
         self.policy, self._watched_steps, self._asked = policy, 0, None
         if policy is None:

@@ -12,7 +12,7 @@ from quad_description import Targets
 
 from ..gait.schedule import Gait
 from ..gait.velocity import Velocity
-from ..policy.interface import Policy, PolicyStep
+from ..policy.runner import PolicyRunner, PolicyStep
 from .modes import State
 from .motion import Situation
 
@@ -58,7 +58,7 @@ class Event:
 class Asked:
     """A policy that was asked in a step."""
 
-    policy: Policy  # which one
+    policy: PolicyRunner  # which one
     answer: PolicyStep  # what it answered
     step: int  # how often it was stepped since its reset; 1 for the first time
 

@@ -29,15 +29,18 @@ class ContractDocument:
     # why a path is open that the reader could not fill
     hints: Mapping[str, str] = field(default_factory=dict)
     refusals: tuple[str, ...] = ()  # what stands in the file and cannot be run here
-    # keys of the file that change nothing here, or that nobody understood
-    ignored: tuple[str, ...] = ()
 
     def over(self, base: ContractDocument) -> ContractDocument:
         """Return this one laid over another: its values count, the other's order stays."""
         terms = self.values.get('observation', {}).get('terms', {})
         if terms and all(isinstance(t, dict) and 'source' in t for t in terms.values()):
             base = base.without_terms()  # these are all of them, in their order
-        return self._joined(base, _merged(base.values, self.values, top_counts=True))
+        return ContractDocument(
+            _merged(base.values, self.values),
+            {**base.origins, **self.origins},
+            {**base.hints, **self.hints},
+            (*base.refusals, *self.refusals),
+        )
 
     def without_terms(self) -> ContractDocument:
         """Return this one without the terms of the observation."""
@@ -49,19 +52,6 @@ class ContractDocument:
             if not path.startswith('observation.terms')
         }
         return replace(self, values={**self.values, 'observation': kept}, origins=origins)
-
-    def completed_by(self, other: ContractDocument) -> ContractDocument:
-        """Return this one with the values of another where it has none; its order stays."""
-        return self._joined(other, _merged(self.values, other.values, top_counts=False))
-
-    def _joined(self, below: ContractDocument, values: Values) -> ContractDocument:
-        return ContractDocument(
-            values,
-            {**below.origins, **self.origins},
-            {**below.hints, **self.hints},
-            (*below.refusals, *self.refusals),
-            (*below.ignored, *self.ignored),
-        )
 
     def rows(self) -> Iterator[tuple[str, str, str]]:
         """Yield path, value and origin of each value."""
@@ -124,14 +114,12 @@ def setting(text: str) -> ContractDocument:
     return document_of(values, f'set as {path}')
 
 
-def _merged(base: Values, top: Values, *, top_counts: bool) -> Values:
+def _merged(base: Values, top: Values) -> Values:
     merged = dict(base)
     for key, value in top.items():
         below = merged.get(key)
-        if isinstance(value, dict) and isinstance(below, dict):
-            merged[key] = _merged(below, value, top_counts=top_counts)
-        elif top_counts or below is None:
-            merged[key] = value
+        both = isinstance(value, dict) and isinstance(below, dict)
+        merged[key] = _merged(merged[key], value) if both else value
     return merged
 
 

@@ -7,16 +7,20 @@ rl/exporter_utils.py). From 1.5.1 on it writes scales, clips and histories of th
 numbers of one term are joined by semicolons, and ``-inf;inf`` is no clip. A joint may have a
 prefix like ``robot/``. No exporter writes the frame of the IMU, the period of the phase, or the
 rate; :data:`OWN_KEYS` are ours.
+
+Sizes and rate have keys of several tools (unitree_rl_lab's deploy.yaml, rl_sar, IsaacLab); they
+are compared with the contract. What looks like one of them and is not known is reported, and what
+would change observations or actions is refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 import math
+import re
 from typing import Any
 
 from ...exceptions import PolicyError
-from . import declared
 from .document import ContractDocument, document_of, read_yaml, Values
 from .model import Source
 from .terms import MJLAB
@@ -40,6 +44,33 @@ VENDOR_PHASE_THRESHOLD = 0.1  # luwu_mjlab, norm of (vx, vy, yaw rate)
 VENDOR = "the vendor's training (luwu_mjlab)"
 FILE = 'metadata'
 
+STEP_KEYS = ('step_dt', 'control_dt', 'policy_dt')
+"""Time between two steps in [s]."""
+
+OBSERVATION_SIZE_KEYS = ('obs_dim', 'observation_dim', 'input_dim', 'num_obs', 'num_observations')
+ACTION_SIZE_KEYS = ('action_dim', 'act_dim', 'output_dim', 'num_actions', 'num_joints', 'num_dofs')
+SIZES_KEY = 'dims'
+"""Both sizes: the first number is the observation's, the last one the action's."""
+
+KNOWN_KEYS = frozenset(
+    {
+        'action_scale',
+        'observation_terms_scale',
+        'observation_terms_clip',
+        'observation_terms_history_length',
+        'observation_terms_flatten_history_dim',
+        SIZES_KEY,
+        *STEP_KEYS,
+        *OBSERVATION_SIZE_KEYS,
+        *ACTION_SIZE_KEYS,
+    }
+)
+"""Keys that are read."""
+CHANGING = re.compile(r'scale|clip|history')  # keys of what changes observations or actions
+SUSPICIOUS = re.compile(r'dim|(^|_)dt($|_)|decimation|rate$|frequency|(^|_)hz($|_)')
+NUMBER = re.compile(r'[-+]?(?:\d+\.?\d*(?:e[-+]?\d+)?|\.\d+|inf)', re.IGNORECASE)
+NO_CLIP = 100.0  # where observations are clipped anyway, and no action is ever
+
 
 def read_metadata(values: Mapping[str, str]) -> ContractDocument:
     """Read the metadata of a file.
@@ -48,10 +79,10 @@ def read_metadata(values: Mapping[str, str]) -> ContractDocument:
         PolicyError: A text is not a number, a list, or YAML.
     """
     document = document_of(_mjlab(values), FILE)
-    document = document.completed_by(document_of(_assumed(document.values), VENDOR))
+    document = document_of(_assumed(document.values), VENDOR).over(document)
     refusals = [
         f'metadata {key} = {text} is not understood, and would change observations or actions'
-        for key, text in declared.changing(values).items()
+        for key, text in changing(values).items()
     ]
     document = ContractDocument(
         document.values, document.origins, HINTS, tuple(refusals + _layouts(values))
@@ -86,7 +117,7 @@ def _mjlab(values: Mapping[str, str]) -> Values:
     }
     if gains:
         contract['gains'] = gains
-    steps = declared.step_periods(values)
+    steps = step_periods(values)
     if steps:
         contract['period'] = next(iter(steps.values()))
     if 'kind' in values:
@@ -141,23 +172,16 @@ def _own_keys(values: Mapping[str, str], source: object) -> Values:
 
 
 def _assumed(known: Values) -> Values:
-    """Return what is known of the vendor's task, where a file has its terms."""
+    """Return what is known of the vendor's task and not said, where a file has its terms."""
     terms = known.get('observation', {}).get('terms', {})
     sources = [term.get('source') for term in terms.values()]
     if sources != [MJLAB[name]['source'] for name in VENDOR_TERMS]:
         return {}
     phase = next(name for name, term in terms.items() if term['source'] == Source.PHASE.value)
-    return {
-        'period': VENDOR_STEP_PERIOD,
-        'observation': {
-            'terms': {
-                phase: {
-                    'phase_period': VENDOR_PHASE_PERIOD,
-                    'phase_threshold': VENDOR_PHASE_THRESHOLD,
-                }
-            }
-        },
-    }
+    of_phase = {'phase_period': VENDOR_PHASE_PERIOD, 'phase_threshold': VENDOR_PHASE_THRESHOLD}
+    unsaid = {key: value for key, value in of_phase.items() if key not in terms[phase]}
+    assumed: Values = {} if 'period' in known else {'period': VENDOR_STEP_PERIOD}
+    return assumed | ({'observation': {'terms': {phase: unsaid}}} if unsaid else {})
 
 
 def _layouts(values: Mapping[str, str]) -> list[str]:
@@ -208,3 +232,56 @@ def _numbers(values: Mapping[str, str], key: str) -> list[float]:
 
 def _base_name(name: str) -> str:
     return name.rpartition('/')[2]
+
+
+def step_periods(values: Mapping[str, str]) -> dict[str, float]:
+    """Return the time between two steps in [s], by key; NaN for no number."""
+    return {key: (_numbers_in(values[key]) or [math.nan])[0] for key in STEP_KEYS if key in values}
+
+
+def observation_sizes(values: Mapping[str, str]) -> dict[str, float]:
+    """Return the width of the observation, by key; NaN for no number."""
+    return _ends(values, (*OBSERVATION_SIZE_KEYS, SIZES_KEY), 0)
+
+
+def action_sizes(values: Mapping[str, str]) -> dict[str, float]:
+    """Return the number of actions, by key; NaN for no number."""
+    return _ends(values, (*ACTION_SIZE_KEYS, SIZES_KEY), -1)
+
+
+def changing(values: Mapping[str, str]) -> dict[str, str]:
+    """Return the keys that would change observations or actions, with their texts."""
+    return {
+        key: text
+        for key, text in values.items()
+        if key not in KNOWN_KEYS and CHANGING.search(key) and not _neutral(key, text)
+    }
+
+
+def not_understood(values: Mapping[str, str]) -> dict[str, str]:
+    """Return the keys that look as if they mattered and are not known, with their texts."""
+    return {
+        key: text
+        for key, text in values.items()
+        if key not in KNOWN_KEYS and SUSPICIOUS.search(key) and not CHANGING.search(key)
+    }
+
+
+def _ends(values: Mapping[str, str], keys: Iterable[str], end: int) -> dict[str, float]:
+    return {key: (_numbers_in(values[key]) or [math.nan])[end] for key in keys if key in values}
+
+
+def _numbers_in(text: str) -> list[float]:
+    return [float(word) for word in NUMBER.findall(text)]
+
+
+def _neutral(key: str, text: str) -> bool:
+    """Return whether a scale, clip or history changes nothing."""
+    numbers = _numbers_in(text)
+    if re.sub(r'none|[\s,\[\]()]', '', NUMBER.sub('', text), flags=re.IGNORECASE):
+        return False  # words that are no list of numbers
+    if 'scale' in key:
+        return all(number == 1.0 for number in numbers)
+    if 'clip' in key:
+        return all(abs(number) >= NO_CLIP for number in numbers)
+    return all(number in {0.0, 1.0} for number in numbers)

@@ -51,7 +51,8 @@ def read_config(values: Mapping[str, Any], origin: str) -> ContractDocument:
     if values.get('history_len', 1) != 1:
         length = values['history_len']
         refusals = (f'{origin}: history_len {length} is of another task; write its contract',)
-    document = document_of(contract, origin).completed_by(
-        document_of({'observation': {'terms': {k: dict(v) for k, v in TERMS.items()}}}, JOYSTICK)
+    terms = document_of(
+        {'observation': {'terms': {k: dict(v) for k, v in TERMS.items()}}}, JOYSTICK
     )
+    document = terms.over(document_of(contract, origin))
     return ContractDocument(document.values, document.origins, HINTS, refusals)

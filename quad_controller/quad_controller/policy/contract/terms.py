@@ -15,37 +15,24 @@ from .model import Source
 RELATIVE = {'source': Source.JOINT_POSITIONS.value, 'relative': True}
 ABSOLUTE = {'source': Source.JOINT_POSITIONS.value, 'relative': False}
 
+NAMES = {
+    Source.LINEAR_VELOCITY: ('base_lin_vel', 'lin_vel'),
+    Source.ANGULAR_VELOCITY: ('base_ang_vel', 'ang_vel', 'gyro', 'imu_ang_vel'),
+    Source.GRAVITY: ('gravity', 'gravity_vec', 'projected_gravity'),
+    Source.COMMAND: (
+        *('cmd', 'command', 'commands', 'generated_commands'),
+        *('velocity_command', 'velocity_commands'),
+    ),
+    Source.PHASE: ('phase', 'gait_phase'),
+    Source.JOINT_VELOCITIES: ('joint_vel', 'joint_vel_rel', 'dof_vel'),
+    Source.LAST_ACTION: ('prev_action', 'last_action', 'last_actions', 'action', 'actions'),
+    Source.FOOT_CONTACTS: ('foot_contact', 'feet_contact'),
+    Source.HEIGHT_SCAN: ('height_scan',),
+}
 COMMON: dict[str, dict[str, Any]] = {
-    'base_lin_vel': {'source': Source.LINEAR_VELOCITY.value},
-    'lin_vel': {'source': Source.LINEAR_VELOCITY.value},
-    'base_ang_vel': {'source': Source.ANGULAR_VELOCITY.value},
-    'ang_vel': {'source': Source.ANGULAR_VELOCITY.value},
-    'gyro': {'source': Source.ANGULAR_VELOCITY.value},
-    'imu_ang_vel': {'source': Source.ANGULAR_VELOCITY.value},
-    'gravity': {'source': Source.GRAVITY.value},
-    'gravity_vec': {'source': Source.GRAVITY.value},
-    'projected_gravity': {'source': Source.GRAVITY.value},
+    **{name: {'source': source.value} for source, names in NAMES.items() for name in names},
     'root_quat_w': {'source': Source.ORIENTATION.value, 'order': 'wxyz'},
-    'cmd': {'source': Source.COMMAND.value},
-    'command': {'source': Source.COMMAND.value},
-    'commands': {'source': Source.COMMAND.value},
-    'generated_commands': {'source': Source.COMMAND.value},
-    'velocity_command': {'source': Source.COMMAND.value},
-    'velocity_commands': {'source': Source.COMMAND.value},
-    'phase': {'source': Source.PHASE.value},
-    'gait_phase': {'source': Source.PHASE.value},
     'joint_pos_rel': RELATIVE,
-    'joint_vel': {'source': Source.JOINT_VELOCITIES.value},
-    'joint_vel_rel': {'source': Source.JOINT_VELOCITIES.value},
-    'dof_vel': {'source': Source.JOINT_VELOCITIES.value},
-    'prev_action': {'source': Source.LAST_ACTION.value},
-    'last_action': {'source': Source.LAST_ACTION.value},
-    'last_actions': {'source': Source.LAST_ACTION.value},
-    'action': {'source': Source.LAST_ACTION.value},
-    'actions': {'source': Source.LAST_ACTION.value},
-    'foot_contact': {'source': Source.FOOT_CONTACTS.value},
-    'feet_contact': {'source': Source.FOOT_CONTACTS.value},
-    'height_scan': {'source': Source.HEIGHT_SCAN.value},
 }
 """Names that mean the same in all of them."""
 
