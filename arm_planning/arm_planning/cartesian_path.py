@@ -26,15 +26,12 @@ from arm_model import (
     Pose,
     RobotModel,
 )
-from arm_trajectory import Path, quintics
 
 from .curves import Line
 from .exceptions import PlanningCode, PlanningError
 from .ik.link_kinematics import LinkKinematics
 from .ik.numeric import descend
 from .ik.solver import check_pose
-from .industrial.ptp import standstill
-from .industrial.timing import FullSpeedPath, timed
 
 MIN_STEPS_FOR_JUMPS = 10
 """Steps of a path at least for which a jump is judged by the mean step, as in MoveIt."""
@@ -97,21 +94,28 @@ def cartesian_path(
         CommandError: A number is not finite, or there are too few or too many.
     """
     here = checked(start, len(model), 'start')
-    follower = _Follower(model, link, scene, is_valid)
-    lines = _lines(follower.link, here, waypoints)
+    moved = LinkKinematics(model, link)
+    clearances = None if scene is None else Clearances(scene)
+    lines = _lines(moved, here, waypoints)
     counts = _counts(lines, max_step)
+    poses = (
+        line.at(number / count)
+        for line, count in zip(lines, counts, strict=True)
+        for number in range(1, count + 1)
+    )
     rows, reason = [here], ''
-    for line, count in zip(lines, counts, strict=True):
-        for number in range(1, count + 1):
-            row, reason = follower.step(line.at(number / count), rows[-1])
-            if reason:
-                break
-            rows.append(row)
+    for pose in poses:
+        row, reason = _step(moved, model.limits, pose, rows[-1])
+        if not reason and clearances is not None:
+            reason = _contact(clearances, row)
+        if not reason and is_valid is not None and not is_valid(row):
+            reason = 'a constraint is violated next to it'
         if reason:
             break
+        rows.append(row)
     positions = np.array(rows)
     if jumps is not None:
-        turning = model.kinematics.projected(follower.link.axes(here))[3:]
+        turning = model.kinematics.projected(moved.axes(here))[3:]
         slides = np.abs(turning).max(axis=0) == 0.0
         kept = _first_jump(positions, jumps, slides)
         if kept < len(positions):
@@ -123,67 +127,26 @@ def cartesian_path(
     return CartesianPath(frozen(positions), fraction, reason)
 
 
-def timed_rows(rows: Array, limits: JointLimits) -> Path:
-    """Return a jerk-limited path from rest to rest through joint positions.
-
-    It is smooth, so that it leaves the lines at their corners, by a quarter of a step at most.
-
-    Args:
-        rows: Joint positions in [rad] (k, n), as dense as the path is to be close to the lines.
-    """
-    steps = np.diff(rows, axis=0)
-    lasts = (np.abs(steps) / limits.velocity).max(axis=1)
-    moves = lasts > 0.0
-    if not moves.any():
-        return standstill(rows[0]).path
-    rows, steps, lasts = np.concatenate((rows[:1], rows[1:][moves])), steps[moves], lasts[moves]
-    slopes = steps / lasts[:, None]
-    around = (lasts[1:] + lasts[:-1])[:, None]
-    velocity = np.concatenate(
-        (slopes[:1], (slopes[:-1] * lasts[1:, None] + slopes[1:] * lasts[:-1, None]) / around)
-    )
-    velocity = np.concatenate((velocity, slopes[-1:]))
-    acceleration = np.zeros_like(velocity)
-    acceleration[1:-1] = 2.0 * np.diff(slopes, axis=0) / around
-    path = Path.of(lasts, quintics(lasts, rows, velocity, acceleration))
-    most = float((limits.acceleration / limits.velocity).min())
-    jerk = float((limits.jerk / limits.velocity).min())
-    return timed(FullSpeedPath(path, most, jerk), limits)[0]
-
-
-class _Follower:
-    """Finds the joint positions of the next place."""
-
-    def __init__(
-        self,
-        model: RobotModel,
-        link: str,
-        scene: PlanningScene | None,
-        is_valid: Callable[[Array], bool] | None,
-    ) -> None:
-        self.link = LinkKinematics(model, link)
-        self._limits = model.limits
-        self._clearances = None if scene is None else Clearances(scene)
-        self._is_valid = is_valid
-
-    def step(self, pose: Pose, before: Array) -> tuple[Array, str]:
-        """Return positions for a pose next to others, or why there are none."""
-        end = descend(self.link, pose, before, self._limits.lower, self._limits.upper)
-        if not end.converged:
-            way, turn = np.linalg.norm(end.error[:3]), np.linalg.norm(end.error[3:])
-            return before, (
-                f'no joint positions within the limits next to it; {1e3 * way:.1f} mm and'
-                f' {turn:.3f} rad are left'
-            )
-        if self._clearances is not None:
-            contacts = self._clearances.contacts(end.positions)
-            if contacts:
-                first, second = contacts[0].bodies
-                depth = 1e3 * contacts[0].depth
-                return before, f'{first} and {second} overlap by {depth:.1f} mm next to it'
-        if self._is_valid is not None and not self._is_valid(end.positions):
-            return before, 'a constraint is violated next to it'
+def _step(
+    link: LinkKinematics, limits: JointLimits, pose: Pose, before: Array
+) -> tuple[Array, str]:
+    """Return positions for a pose next to others, or why there are none."""
+    end = descend(link, pose, before, limits.lower, limits.upper)
+    if end.converged:
         return end.positions, ''
+    way, turn = np.linalg.norm(end.error[:3]), np.linalg.norm(end.error[3:])
+    return before, (
+        f'no joint positions within the limits next to it; {1e3 * way:.1f} mm and'
+        f' {turn:.3f} rad are left'
+    )
+
+
+def _contact(clearances: Clearances, positions: Array) -> str:
+    contacts = clearances.contacts(positions)
+    if not contacts:
+        return ''
+    first, second = contacts[0].bodies
+    return f'{first} and {second} overlap by {1e3 * contacts[0].depth:.1f} mm next to it'
 
 
 def _lines(link: LinkKinematics, start: Array, waypoints: Sequence[Pose]) -> list[Line]:

@@ -172,8 +172,7 @@ class ConstraintCheck:
         """
         for begin, end in pairwise(places):
             count = int(np.ceil(np.abs(end - begin).sum() / STEP)) + 1
-            for share in np.linspace(0.0, 1.0, count + 1).tolist():
-                positions = begin + share * (end - begin)
+            for positions in np.linspace(begin, end, count + 1):
                 if not self.heeds(positions):
                     return Violation(self.reason(positions), positions)
         return None

@@ -25,16 +25,12 @@ class _Turning:
 
     def __init__(self, start: Array, end: Array) -> None:
         self._start = start
-        self._vector: Array = pin.log3(end @ start.T)
-        self.angle = float(np.linalg.norm(self._vector))
+        self.vector: Array = pin.log3(end @ start.T)
+        self.angle = float(np.linalg.norm(self.vector))
 
     def at(self, share: float) -> Array:
-        turned: Array = pin.exp3(share * self._vector) @ self._start
+        turned: Array = pin.exp3(share * self.vector) @ self._start
         return turned
-
-    @property
-    def rate(self) -> Array:
-        return self._vector
 
 
 class Line:
@@ -48,7 +44,7 @@ class Line:
         """
         self._turning = _Turning(start.rotation, end.rotation)
         self._start, self._way = start.position, end.position - start.position
-        self._twist = np.concatenate((self._way, self._turning.rate))
+        self._twist = np.concatenate((self._way, self._turning.vector))
         self.length = float(np.linalg.norm(self._way))
         self.angle = self._turning.angle
 
@@ -69,19 +65,21 @@ class Line:
 class Arc:
     """A part of a circle between two poses."""
 
-    def __init__(self, start: Pose, end: Pose, center: Array, normal: Array, sweep: float) -> None:
+    def __init__(self, start: Pose, end: Pose, center: Array, axis: Array) -> None:
         """Draw; :func:`arc_through` and :func:`arc_around` find the circle.
 
         Args:
             start: Where it begins, in the root link.
-            normal: Unit vector about which it turns.
-            sweep: Angle of the arc in [rad].
+            axis: Vector about which it turns, of any length.
         """
         self._turning = _Turning(start.rotation, end.rotation)
-        self._center, self._sweep = center, sweep
-        self._first = start.position - center
+        normal = axis / np.linalg.norm(axis)
+        self._center = center
+        self._first, last = start.position - center, end.position - center
         self._second = np.cross(normal, self._first)
-        self.length = float(np.linalg.norm(self._first)) * sweep
+        turn = math.atan2(float(np.cross(self._first, last) @ normal), float(self._first @ last))
+        self._sweep = turn % (2.0 * math.pi)
+        self.length = float(np.linalg.norm(self._first)) * self._sweep
         self.angle = self._turning.angle
 
     def at(self, share: float) -> Pose:
@@ -94,7 +92,7 @@ class Arc:
         """Return the derivative by the share."""
         turn = share * self._sweep
         along = math.cos(turn) * self._second - math.sin(turn) * self._first
-        return np.concatenate((self._sweep * along, self._turning.rate))
+        return np.concatenate((self._sweep * along, self._turning.vector))
 
     def nearest(self, position: Array) -> float:
         """Return the share of the way that is nearest to a position."""
@@ -129,8 +127,7 @@ def arc_through(start: Pose, interim: Array, end: Pose) -> Arc:
     center = start.position + np.cross(
         (first @ first) * second - (second @ second) * first, across
     ) / (2.0 * size**2)
-    normal = across / size
-    return Arc(start, end, center, normal, _sweep(start.position, end.position, center, normal))
+    return Arc(start, end, center, across)
 
 
 def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
@@ -150,8 +147,7 @@ def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
             f' differ by {MAX_RADIUS_DIFFERENCE:g} m'
         )
     across = np.cross(first, last)
-    size = float(np.linalg.norm(across))
-    if size < COLLINEAR_TOLERANCE:
+    if np.linalg.norm(across) < COLLINEAR_TOLERANCE:
         raise _no_circle(
             'start, center and goal are on a line, which makes no plane (half a circle, or none);'
             ' give an interim point'
@@ -161,15 +157,7 @@ def arc_around(start: Pose, center: Array, end: Pose) -> Arc:
     middle = 0.5 * (start.position + end.position)
     chord /= np.linalg.norm(chord)
     center = center - ((center - middle) @ chord) * chord
-    normal = across / size
-    return Arc(start, end, center, normal, _sweep(start.position, end.position, center, normal))
-
-
-def _sweep(start: Array, end: Array, center: Array, normal: Array) -> float:
-    """Return the angle from start to end about a normal in [rad], from 0 to a whole turn."""
-    first, last = start - center, end - center
-    turn = math.atan2(float(np.cross(first, last) @ normal), float(first @ last))
-    return turn % (2.0 * math.pi)
+    return Arc(start, end, center, across)
 
 
 def _no_circle(reason: str) -> PlanningError:

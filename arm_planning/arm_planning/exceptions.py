@@ -11,6 +11,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import IntEnum
 
 from arm_model import ArmError
@@ -61,6 +63,22 @@ class PlanningError(ArmError):
     def __init__(self, code: PlanningCode, reason: str) -> None:
         super().__init__(reason)
         self.code = code
+
+
+@contextmanager
+def coded(code: PlanningCode | None = None, place: str = '') -> Iterator[None]:
+    """Raise refusals as a PlanningError.
+
+    Args:
+        code: Its code; None keeps that of a PlanningError.
+        place: What the message begins with; empty for nothing.
+    """
+    try:
+        yield
+    except ArmError as error:
+        known = error.code if isinstance(error, PlanningError) else PlanningCode.FAILURE
+        reason = f'{place}: {error}' if place else str(error)
+        raise PlanningError(known if code is None else code, reason) from error
 
 
 class ConfigError(ArmError):

@@ -17,6 +17,8 @@ import numpy as np
 from arm_model import Array, frozen, PlacedShape, Pose
 from arm_trajectory import Path
 
+from .exceptions import PlanningCode, PlanningError
+
 DEFAULT_TIMEOUT = 5.0  # time for planning in [s], as MoveGroupInterface has it
 
 
@@ -122,3 +124,19 @@ class MotionPlan:
     planner_id: str  # the planner that found it
     notes: Sequence[str] = ()  # what a person should know, such as where it is slower than asked
     planning_time: float = 0.0  # how long it took in [s]; 0 where nobody measured
+
+
+def check_scaling(request: MotionRequest, least: float = 0.0) -> None:
+    """Refuse factors of velocity and acceleration that are out of range.
+
+    Args:
+        least: Least factor; 0 for any above it.
+
+    Raises:
+        PlanningError: One is.
+    """
+    for name in ('velocity_scaling', 'acceleration_scaling'):
+        value = getattr(request, name)
+        if not (0.0 < value <= 1.0 and value >= least):
+            bounds = f'from {least:g} to 1' if least else 'above 0 and up to 1'
+            raise PlanningError(PlanningCode.FAILURE, f'{name} is {value}; it must be {bounds}')

@@ -22,10 +22,10 @@ import math
 
 import numpy as np
 
-from arm_model import Array, Clearances, Contact, JointLimits, PlanningScene
-from arm_trajectory import Path
+from arm_model import Array, checked, Clearances, Contact, JointLimits, PlanningScene
+from arm_trajectory import farthest_beyond, Path
 
-from .exceptions import PlanningCode, PlanningError
+from .exceptions import coded, PlanningCode, PlanningError
 
 MARGIN = 1e-3  # distance that every pair keeps in [m] where a path is measured
 MIN_MARGIN = 1e-4  # the same where start or goal are nearer to contact in [m]
@@ -60,7 +60,7 @@ class ValidityCheck:
 
     def state(self, positions: Array) -> Violation | None:
         """Return why the arm may not be somewhere; None where it may."""
-        return self._beyond(positions, positions, 0.0) or self._touching(positions, 0.0)
+        return self.beyond(positions) or self._touching(positions, 0.0)
 
     def required(self, *ends: Array) -> Array:
         """Return the distance that each pair keeps on motions between some states in [m] (k)."""
@@ -98,7 +98,7 @@ class ValidityCheck:
             places: Joint positions in [rad] (m, n).
         """
         lower, upper = places.min(axis=0), places.max(axis=0)
-        if (beyond := self._beyond(lower, upper, 0.0)) is not None:
+        if (beyond := self._beyond(lower, upper)) is not None:
             return beyond
         required = self.required(places[0], places[-1]).tolist()
         for begin, end in pairwise(places):
@@ -109,14 +109,10 @@ class ValidityCheck:
 
     def path(self, path: Path) -> Violation | None:
         """Return what is wrong with a path, of its positions; None for nothing."""
-        control = path.control_values
-        lower, upper = control.min(axis=1), control.max(axis=1)
-        outside = (lower < self._limits.lower - LIMIT_TOLERANCE) | (
-            upper > self._limits.upper + LIMIT_TOLERANCE
-        )
-        for segment in np.flatnonzero(outside.any(axis=1)).tolist():
-            time = float(path.starts[segment])
-            return self._beyond(lower[segment], upper[segment], time)
+        beyond = farthest_beyond(path, self._limits.lower, self._limits.upper)
+        if beyond is not None:
+            positions = path.at(beyond.time).position
+            return self._outside(beyond.joint, beyond.position, positions, beyond.time)
         return self.contact(path)
 
     def contact(self, path: Path) -> Violation | None:
@@ -124,15 +120,18 @@ class ValidityCheck:
         found = self._near_time(path, path.control_values)
         return None if found is None else self._near(path.at(found).position, found)
 
-    def refuse_start(self, start: Array) -> None:
-        """Refuse to begin where the arm may not be.
+    def start(self, positions: Sequence[float] | Array) -> Array:
+        """Return where a motion may begin.
 
         Raises:
-            PlanningError: A joint is beyond its limits, or something is in contact.
+            PlanningError: They are not finite numbers, a joint is beyond its limits, or something
+                is in contact.
         """
+        with coded(PlanningCode.INVALID_ROBOT_STATE):
+            start = checked(positions, len(self._limits), 'start')
         violation = self.state(start)
         if violation is None:
-            return
+            return start
         if violation.contact is None:
             raise PlanningError(PlanningCode.START_STATE_INVALID, f'start: {violation.reason}')
         raise PlanningError(
@@ -140,6 +139,10 @@ class ValidityCheck:
             f'start: {violation.reason}; jog the arm clear of it, or change the scene: remove,'
             ' attach or allow it',
         )
+
+    def beyond(self, positions: Array) -> Violation | None:
+        """Return which joint is beyond its limits, if one is."""
+        return self._beyond(positions, positions)
 
     def _near_time(self, path: Path, control: Array) -> float | None:
         """Return a time at which a pair is nearer than it may be; None where none is."""
@@ -194,20 +197,27 @@ class ValidityCheck:
                 left[pair] = distance
         return left
 
-    def _beyond(self, lower: Array, upper: Array, time: float) -> Violation | None:
+    def _beyond(self, lower: Array, upper: Array) -> Violation | None:
+        """Return which joint is beyond its limits between two bounds, if one is."""
         limits = self._limits
         if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-            return Violation('joint positions must be finite numbers', lower, time=time)
+            return Violation('joint positions must be finite numbers', lower)
         beyond = np.maximum(limits.lower - lower, upper - limits.upper)
         joint = int(beyond.argmax())
         if beyond[joint] <= LIMIT_TOLERANCE:
             return None
         place = lower if lower[joint] < limits.lower[joint] else upper
+        return self._outside(joint, float(place[joint]), place)
+
+    def _outside(
+        self, joint: int, position: float, positions: Array, time: float = 0.0
+    ) -> Violation:
+        limits = self._limits
         reason = (
-            f'{limits.names[joint]} at {place[joint]:.4f} is beyond its range'
+            f'{limits.names[joint]} at {position:.4f} is beyond its range'
             f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}'
         )
-        return Violation(reason, place, time=time)
+        return Violation(reason, positions, time=time)
 
     def _touching(self, positions: Array, time: float) -> Violation | None:
         contacts = self._clearances.contacts(positions)

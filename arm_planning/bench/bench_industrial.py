@@ -18,8 +18,14 @@ from bench_ik import robot
 import numpy as np
 
 from arm_model import Pose, start_pose
-from arm_planning import CircPoint, CircPointKind, MotionRequest, PlanningError, PoseGoal
-from arm_planning.industrial.planner import IndustrialPlanner, PLANNER_IDS
+from arm_planning import (
+    CircPoint,
+    CircPointKind,
+    MotionRequest,
+    Planner,
+    PlanningError,
+    PoseGoal,
+)
 
 GOALS = 60
 
@@ -30,9 +36,9 @@ def main() -> None:
     """Print the figures."""
     for name in ('prbt', 'gp110', 'panda'):
         model = robot(name)
-        planner, start = IndustrialPlanner(model), start_pose(model)
+        planner, start = Planner(model), start_pose(model)
         pose = model.kinematics.link_pose(model.tip, start)
-        for kind in PLANNER_IDS:
+        for kind in ('PTP', 'LIN', 'CIRC'):
             draw, took, slowed = np.random.default_rng(0), [], 0
             for way in draw.uniform(-REACH, REACH, (GOALS, 3)):
                 goal = PoseGoal(Pose(pose.rotation, pose.position + way))

@@ -23,8 +23,7 @@ from planning_problems import KINDS, panda, Problem, problem, PROBLEMS
 from arm_model import Array, RobotModel
 from arm_planning import ValidityCheck
 from arm_planning.free.motion_check import MotionCheck
-from arm_planning.free.rrt_connect import rrt_connect
-from arm_planning.free.shortcut import shortened
+from arm_planning.free.search import rrt_connect, shortened
 
 FILE = Path(__file__).with_name('best_lengths.json')
 

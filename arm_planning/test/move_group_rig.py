@@ -16,14 +16,25 @@ from control_msgs.action import FollowJointTrajectory, GripperCommand
 from geometry_msgs.msg import Pose as PoseMessage
 from moveit_msgs.action import MoveGroup
 from moveit_msgs.msg import (
+    CollisionObject,
     Constraints,
     JointConstraint,
     MotionPlanRequest,
     OrientationConstraint,
+    PlanningScene,
     PlanningSceneComponents,
+    PlanningSceneWorld,
     PositionConstraint,
+    PositionIKRequest,
 )
-from moveit_msgs.srv import GetMotionPlan, GetPlanningScene
+from moveit_msgs.srv import (
+    ApplyPlanningScene,
+    GetCartesianPath,
+    GetMotionPlan,
+    GetPlanningScene,
+    GetPositionFK,
+    GetPositionIK,
+)
 from processes import executable, RunningProcess
 from rclpy.action.server import ActionServer, CancelResponse
 from ros_client import RosClient
@@ -40,6 +51,7 @@ if TYPE_CHECKING:
 TIMEOUT = 60.0  # longest time for an answer in [s]
 
 JOINTS = [f'panda_joint{number}' for number in range(1, 8)]
+HAND = 'panda_link8'
 READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
 PACKAGES = Path(__file__).parent / 'moveit_packages'
 SEMANTICS = {'panda': ('panda_hand/panda_hand.srdf', 'panda_link0')}
@@ -67,10 +79,14 @@ def moveit_package(name: str, folder: Path) -> Path:
 
 
 def panda_parameters(folder: Path, **others: object) -> Path:
-    """Write what describes the Panda as a parameter file."""
+    """Write what describes the Panda, with soft limits of its last joint, as a parameter file."""
     panda = robots() / 'panda'
+    last = '<child link="panda_link7"/>'
+    soft = '<safety_controller k_velocity="20" soft_lower_limit="-2.5" soft_upper_limit="2.5"/>'
+    urdf = expand_xacro(panda / 'panda.urdf.xacro')
+    assert urdf.count(last) == 1
     values = {
-        'robot_description': expand_xacro(panda / 'panda.urdf.xacro'),
+        'robot_description': urdf.replace(last, last + soft),
         'robot_description_semantic': (panda / 'panda.srdf').read_text(encoding='utf-8'),
         'joint_limits': str(panda / 'limits.yaml'),
         **others,
@@ -99,7 +115,8 @@ class MoveGroupRig:
         Args:
             positions: Of the joints in [rad]; by default the Panda's ready.
         """
-        self.positions = dict(positions or zip(JOINTS, READY, strict=True))
+        self._begin = dict(positions or zip(JOINTS, READY, strict=True))
+        self.positions = dict(self._begin)
         self.followed: list[Any] = []
         self.held: list[Any] = []
         self._published = 0.0
@@ -126,12 +143,9 @@ class MoveGroupRig:
 
     def settle(self) -> None:
         """Wait until move_group has received where the robot is."""
-        asked = GetPlanningScene.Request()
-        asked.components.components = PlanningSceneComponents.ROBOT_STATE
         deadline = time.monotonic() + TIMEOUT
         while time.monotonic() < deadline:
-            answer = self.client.call(GetPlanningScene, '/get_planning_scene', asked, TIMEOUT)
-            state = answer.scene.robot_state.joint_state
+            state = self.scene(PlanningSceneComponents.ROBOT_STATE).robot_state.joint_state
             places = dict(zip(state.name, state.position, strict=True))
             if all(abs(places[name] - at) < 1e-9 for name, at in self.positions.items()):
                 return
@@ -189,6 +203,62 @@ class MoveGroupRig:
         if time.monotonic() - self._published > 0.3:
             self.client.spin_for(0.2)
 
+    def reset(self) -> None:
+        """Bring the robot to where it began, and empty the scene."""
+        self.positions.clear()
+        self.positions.update(self._begin)
+        self.followed.clear()
+        self.held.clear()
+        assert self.apply(PlanningScene())
+        self.settle()
+
+    def apply(self, scene: PlanningScene | None = None, **parts: Any) -> bool:
+        """Apply a scene, or a change of its parts; return whether it was accepted."""
+        asked = ApplyPlanningScene.Request(scene=change(**parts) if scene is None else scene)
+        return bool(self.client.call(ApplyPlanningScene, '/apply_planning_scene', asked).success)
+
+    def add(self, *things: CollisionObject) -> None:
+        """Add objects to the world, or change what they name."""
+        assert self.apply(world=PlanningSceneWorld(collision_objects=list(things)))
+
+    def scene(self, components: int = 0) -> PlanningScene:
+        """Return the scene, whole or the parts of moveit_msgs/PlanningSceneComponents."""
+        asked = GetPlanningScene.Request()
+        asked.components.components = components
+        return self.client.call(GetPlanningScene, '/get_planning_scene', asked).scene
+
+    def objects(self) -> list[str]:
+        """Return the names of the objects of the world."""
+        return [each.id for each in self.scene().world.collision_objects]
+
+    def publisher(self, kind: Any, topic: str) -> Any:
+        """Return a publisher to which move_group listens."""
+        publisher = self.client.node.create_publisher(kind, topic, 1)
+        self.client.spin_until(lambda: publisher.get_subscription_count() > 0, TIMEOUT, topic)
+        return publisher
+
+    def fk(self, frame: str = HAND, state: Any = None) -> PoseMessage:
+        """Return where a link or body is in the root link, by compute_fk."""
+        asked = GetPositionFK.Request(fk_link_names=[frame])
+        if state is not None:
+            asked.robot_state = state
+        return self.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+
+    def ik(self, pose: PoseMessage, frame: str = '', **fields: Any) -> Any:
+        """Return the response of compute_ik for a pose of the Panda's hand."""
+        asked = GetPositionIK.Request()
+        asked.ik_request = PositionIKRequest(**{'group_name': 'panda_arm'} | fields)
+        asked.ik_request.pose_stamped.pose = pose
+        asked.ik_request.pose_stamped.header.frame_id = frame
+        return self.client.call(GetPositionIK, '/compute_ik', asked)
+
+    def cartesian_path(self, *waypoints: PoseMessage, **fields: Any) -> Any:
+        """Return the response of compute_cartesian_path for poses of the Panda's hand."""
+        given = {'group_name': 'panda_arm', 'link_name': HAND, 'max_step': 0.01} | fields
+        asked = GetCartesianPath.Request(waypoints=list(waypoints), **given)
+        asked.start_state.is_diff = True
+        return self.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+
     def plan(self, request: MotionPlanRequest) -> Any:
         """Return the moveit_msgs/MotionPlanResponse of plan_kinematic_path."""
         self._refresh()
@@ -229,6 +299,13 @@ class MoveGroupRig:
         """End it."""
         self.process.__exit__(exc_type, exc, traceback)
         self.client.__exit__(exc_type, exc, traceback)
+
+
+def change(**parts: Any) -> PlanningScene:
+    """Return a change of parts of the scene."""
+    scene = PlanningScene(is_diff=True, **parts)
+    scene.robot_state.is_diff = True
+    return scene
 
 
 def joint_goal(positions: Sequence[float], joints: Sequence[str] = JOINTS) -> Constraints:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import deepcopy
 import math
 import re
@@ -13,43 +13,41 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose as PoseMessage
 from geometry_msgs.msg import Quaternion
-from isolation import reserve
 from move_group_rig import (
     action_goal,
+    change,
+    HAND,
     joint_goal,
-    JOINTS,
     motion_request,
     MoveGroupRig,
-    panda_parameters,
     pose_goal,
     READY,
-    robots,
 )
 from moveit_msgs.msg import (
+    AllowedCollisionMatrix,
+    AttachedCollisionObject,
     CollisionObject,
     Constraints,
     JointConstraint,
+    LinkPadding,
+    LinkScale,
     MotionPlanRequest,
     MotionSequenceItem,
     OrientationConstraint,
     PlanningScene,
+    PlanningSceneWorld,
 )
-from moveit_msgs.srv import (
-    ApplyPlanningScene,
-    GetCartesianPath,
-    GetMotionSequence,
-    GetPositionFK,
-    GetPositionIK,
-)
+from moveit_msgs.srv import GetMotionSequence, GetPositionFK
 from planning_messages import box, pose_at, tetrahedron
 import pytest
-from urdf_reader import expand_xacro
+from shape_msgs.msg import Mesh as MeshMessage
+from shape_msgs.msg import SolidPrimitive
+from std_msgs.msg import Header
 
 from arm_planning import PlanningCode
 
 NAN = math.nan
 MOVED = [0.4, *READY[1:]]
-HAND = 'panda_link8'
 
 
 def down(x: float, y: float, z: float) -> PoseMessage:
@@ -64,10 +62,15 @@ def in_front() -> Constraints:
     return pose_goal(down(0.4, 0.1, 0.5), HAND, 'panda_link0')
 
 
-def changed(goal: Constraints, change: Callable[[Any], None]) -> MotionPlanRequest:
-    """Return a request for a goal after a change."""
+def changed(goal: Constraints, *changes: tuple[str, Any]) -> MotionPlanRequest:
+    """Return a request for a goal after changes of fields, which are named by their paths."""
     goal = deepcopy(goal)
-    change(goal)
+    for path, value in changes:
+        *parts, last = path.split('.')
+        part: Any = goal
+        for each in parts:
+            part = part[int(each)] if each.isdigit() else getattr(part, each)
+        setattr(part, last, value)
     return motion_request(goal)
 
 
@@ -84,63 +87,6 @@ def within(request: MotionPlanRequest, **path: Any) -> MotionPlanRequest:
     """Return a request under path constraints."""
     request.path_constraints = Constraints(**path)
     return request
-
-
-def set_nan_position(goal: Any) -> None:
-    """Ask for no place."""
-    goal.position_constraints[0].constraint_region.primitive_poses[0].position.y = NAN
-
-
-def set_nan_turn(goal: Any) -> None:
-    """Ask for no orientation."""
-    goal.orientation_constraints[0].orientation.x = NAN
-
-
-def set_zero_turn(goal: Any) -> None:
-    """Leave the orientation at zeros, as a message of C does."""
-    goal.orientation_constraints[0].orientation = Quaternion(w=0.0)
-
-
-def set_link(goal: Any) -> None:
-    """Ask for a link that there is not."""
-    goal.position_constraints[0].link_name = goal.orientation_constraints[0].link_name = 'moon'
-
-
-def set_two_links(goal: Any) -> None:
-    """Ask for two links at once."""
-    goal.orientation_constraints[0].link_name = 'panda_link7'
-
-
-def set_frame(goal: Any) -> None:
-    """Ask in a frame that there is not."""
-    goal.position_constraints[0].header.frame_id = 'moon'
-
-
-def contradict(goal: Any) -> None:
-    """Ask for two places of a joint."""
-    again = deepcopy(goal.joint_constraints[0])
-    again.position += 0.5
-    goal.joint_constraints.append(again)
-
-
-def both(goal: Any) -> None:
-    """Ask for joints and a pose."""
-    goal.joint_constraints = joint_goal(MOVED).joint_constraints
-
-
-def set_nan_joint(goal: Any) -> None:
-    """Ask for no position of a joint."""
-    goal.joint_constraints[2].position = NAN
-
-
-def set_joint(goal: Any) -> None:
-    """Ask for a joint that there is not."""
-    goal.joint_constraints[2].joint_name = 'knee'
-
-
-def set_flat_region(goal: Any) -> None:
-    """Ask for a region of negative size."""
-    goal.position_constraints[0].constraint_region.primitives[0].dimensions = [-0.1]
 
 
 def level(tolerance: float = 0.1) -> OrientationConstraint:
@@ -161,6 +107,9 @@ def near(joint: str, position: float) -> JointConstraint:
 
 
 JOINT, POSE, CODE = joint_goal(MOVED), in_front(), PlanningCode
+PLACE, TURN = 'position_constraints.0', 'orientation_constraints.0'
+REGION = f'{PLACE}.constraint_region'
+TWICE = [*JOINT.joint_constraints, near('panda_joint1', MOVED[0] + 0.5)]
 FOLDED = [0.0, 1.7, 0.0, -2.9, 0.0, 1.57, 0.785]  # where the hand touches the base in [rad]
 
 
@@ -175,17 +124,22 @@ def bad_goals() -> Iterator[Refusal]:
     yield 'unknown group', motion_request(JOINT, 'legs'), CODE.INVALID_GROUP_NAME, "'legs'.*panda"
     yield 'no goal', MotionPlanRequest(group_name='panda_arm'), bad_goal, 'no goal'
     yield 'empty goal', motion_request(Constraints()), bad_goal, '0 position'
-    yield 'unknown link', changed(POSE, set_link), CODE.INVALID_LINK_NAME, 'moon'
-    yield 'two links', changed(POSE, set_two_links), bad_goal, 'panda_link7'
-    yield 'unknown frame', changed(POSE, set_frame), CODE.FRAME_TRANSFORM_FAILURE, "'moon'"
-    yield 'nan position', changed(POSE, set_nan_position), bad_goal, 'nan.*finite'
-    yield 'nan orientation', changed(POSE, set_nan_turn), bad_goal, 'orientation.*nan'
-    yield 'zero orientation', changed(POSE, set_zero_turn), bad_goal, 'all zeros; give'
-    yield 'negative region', changed(POSE, set_flat_region), bad_goal, '-0.1'
-    yield 'nan joint', changed(JOINT, set_nan_joint), bad_goal, 'panda_joint3.*nan'
-    yield 'unknown joint', changed(JOINT, set_joint), bad_goal, "'knee'"
-    yield 'contradictory joints', changed(JOINT, contradict), bad_goal, 'panda_joint1 contradict'
-    yield 'joints and a pose', changed(POSE, both), bad_goal, 'not both'
+    moon = (f'{PLACE}.link_name', 'moon'), (f'{TURN}.link_name', 'moon')
+    yield 'unknown link', changed(POSE, *moon), CODE.INVALID_LINK_NAME, 'moon'
+    for name, goal, path, value, words in (
+        ('two links', POSE, f'{TURN}.link_name', 'panda_link7', 'panda_link7'),
+        ('nan position', POSE, f'{REGION}.primitive_poses.0.position.y', NAN, 'nan.*finite'),
+        ('nan orientation', POSE, f'{TURN}.orientation.x', NAN, 'orientation.*nan'),
+        ('zero orientation', POSE, f'{TURN}.orientation', Quaternion(w=0.0), 'all zeros; give'),
+        ('negative region', POSE, f'{REGION}.primitives.0.dimensions', [-0.1], '-0.1'),
+        ('nan joint', JOINT, 'joint_constraints.2.position', NAN, 'panda_joint3.*nan'),
+        ('unknown joint', JOINT, 'joint_constraints.2.joint_name', 'knee', "'knee'"),
+        ('contradictory joints', JOINT, 'joint_constraints', TWICE, 'panda_joint1 contradict'),
+        ('joints and a pose', POSE, 'joint_constraints', JOINT.joint_constraints, 'not both'),
+    ):
+        yield name, changed(goal, (path, value)), bad_goal, words
+    lost = changed(POSE, (f'{PLACE}.header.frame_id', 'moon'))
+    yield 'unknown frame', lost, CODE.FRAME_TRANSFORM_FAILURE, "'moon'"
     far = pose_goal(down(3.0, 0.0, 0.5), HAND, 'panda_link0')
     yield 'out of reach', motion_request(far), CODE.NO_IK_SOLUTION, 'reach'
     beyond = joint_goal([3.5, *READY[1:]])
@@ -238,23 +192,6 @@ def bad_rest() -> Iterator[Refusal]:
 BAD = {name: rest for name, *rest in (*bad_goals(), *bad_rest())}
 
 
-@pytest.fixture(name='rig', scope='module')
-def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
-    """Start move_group."""
-    urdf = expand_xacro(robots() / 'panda' / 'panda.urdf.xacro')
-    lifted = f'<child link="{JOINTS[6].replace("joint", "link")}"/>'
-    assert urdf.count(lifted) == 1
-    soft = '<safety_controller k_velocity="20" soft_lower_limit="-2.5" soft_upper_limit="2.5"/>'
-    path = panda_parameters(
-        tmp_path_factory.mktemp('robot'), robot_description=urdf.replace(lifted, lifted + soft)
-    )
-    with (
-        reserve() as isolation,
-        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
-    ):
-        yield rig
-
-
 def check(code: Any, wanted: PlanningCode, words: str) -> None:
     """Make sure that a refusal has its code and words."""
     assert PlanningCode(code.val) is wanted, code
@@ -296,117 +233,121 @@ def test_pilz_pipeline_has_the_same_codes(rig: MoveGroupRig, name: str) -> None:
     check(answer.error_code, code, words)
 
 
-def scene(*things: CollisionObject) -> PlanningScene:
-    """Return a change of the scene."""
-    change = PlanningScene(is_diff=True)
-    change.robot_state.is_diff = True
-    change.world.collision_objects = list(things)
-    return change
+def mesh(z: float, corner: int = 3) -> MeshMessage:
+    """Return a tetrahedron of another height, whose last triangle names another corner."""
+    message = tetrahedron(0.1)
+    message.vertices[3].z = z
+    message.triangles[3].vertex_indices = [1, 2, corner]
+    return message
 
 
-def flat_mesh() -> CollisionObject:
-    """Return a mesh without volume."""
-    thing = CollisionObject(id='sheet', operation=CollisionObject.ADD)
-    mesh = tetrahedron(0.1)
-    for each in mesh.vertices:
-        each.z = 0.0
-    thing.meshes, thing.mesh_poses = [mesh], [PoseMessage()]
-    return thing
+def crate(**fields: Any) -> PlanningScene:
+    """Return a change that adds a box with other fields."""
+    thing = box('crate', 0.5, 0.0, 0.5)
+    for name, value in fields.items():
+        setattr(thing, name, value)
+    return change(world=PlanningSceneWorld(collision_objects=[thing]))
 
 
-def unknown(operation: bytes) -> CollisionObject:
+def ghost(operation: bytes) -> PlanningScene:
     """Return a change of an object that there is not."""
-    return CollisionObject(id='ghost', operation=operation)
+    thing = CollisionObject(id='ghost', operation=operation)
+    return change(world=PlanningSceneWorld(collision_objects=[thing]))
 
 
-def nan_box() -> CollisionObject:
-    """Return a box nowhere."""
-    thing = box('nowhere', 0.5, 0.0, 0.5)
-    thing.pose.position.x = NAN
-    return thing
+def attached(link: str, *touched: str, bare: bool = False) -> PlanningScene:
+    """Return a change that attaches a box, or what is in the world."""
+    thing = CollisionObject(id='held') if bare else box('held', 0.5, 0.0, 0.5)
+    scene = change()
+    scene.robot_state.attached_collision_objects = [
+        AttachedCollisionObject(link_name=link, object=thing, touch_links=touched)
+    ]
+    return scene
 
 
-def negative_box() -> CollisionObject:
-    """Return a box of no size."""
-    return box('inside out', 0.5, 0.0, 0.5, edge=-0.1)
+def twice() -> PlanningScene:
+    """Return a change that attaches a box and adds it to the world."""
+    scene = attached(HAND)
+    scene.world.collision_objects = [box('held', 0.0, 0.5, 0.5)]
+    return scene
 
 
+NO_OBJECT, NO_LINK, OTHER = CODE.INVALID_OBJECT_NAME, CODE.INVALID_LINK_NAME, CODE.FAILURE
 SCENES: dict[str, tuple[PlanningScene, PlanningCode, str]] = {
-    'mesh without volume': (scene(flat_mesh()), CODE.FAILURE, "'sheet': .*no volume"),
-    'removal of an unknown object': (
-        scene(unknown(CollisionObject.REMOVE)), CODE.INVALID_OBJECT_NAME, "'ghost'"
+    'empty mesh': (crate(meshes=[MeshMessage()]), OTHER, "'crate': .*no volume"),
+    'flat mesh': (crate(meshes=[mesh(0.0)]), OTHER, "'crate': .*flat"),
+    'unknown corner': (crate(meshes=[mesh(0.1, 9)]), OTHER, 'vertex 9'),
+    'prism': (crate(primitives=[SolidPrimitive(type=5)]), OTHER, 'prism'),
+    'nan pose': (crate(pose=pose_at(NAN)), OTHER, "'crate'.*nan"),
+    'negative box': (crate(primitives=box('', edge=-0.1).primitives), OTHER, '-0.1'),
+    'half a subframe': (crate(subframe_names=['tip']), OTHER, 'subframes'),
+    'unknown operation': (crate(operation=b'\x07'), OTHER, 'operation 7'),
+    'unknown frame': (crate(header=Header(frame_id='x')), CODE.FRAME_TRANSFORM_FAILURE, "'x'"),
+    'no name': (crate(id=''), NO_OBJECT, 'name'),
+    'name of a link': (crate(id='panda_link3'), NO_OBJECT, 'link'),
+    'no shape': (ghost(CollisionObject.ADD), OTHER, "'ghost'.*shape"),
+    'removal of an unknown object': (ghost(CollisionObject.REMOVE), NO_OBJECT, "'ghost'"),
+    'move of an unknown object': (ghost(CollisionObject.MOVE), NO_OBJECT, "'ghost'"),
+    'attached unknown object': (attached(HAND, bare=True), NO_OBJECT, 'no object'),
+    'attached to an unknown link': (attached('claw'), NO_LINK, "'claw'"),
+    'touching an unknown link': (attached(HAND, 'claw'), NO_LINK, "'claw'"),
+    'attached and in the world': (twice(), NO_OBJECT, 'attached to panda_link8'),
+    'padding of an unknown link': (
+        change(link_padding=[LinkPadding(link_name='claw')]), NO_LINK, "'claw'"
     ),
-    'move of an unknown object': (
-        scene(unknown(CollisionObject.MOVE)), CODE.INVALID_OBJECT_NAME, "'ghost'"
+    'negative padding': (
+        change(link_padding=[LinkPadding(link_name=HAND, padding=-0.1)]), OTHER, '-0.1'
     ),
-    'object without shapes': (scene(unknown(CollisionObject.ADD)), CODE.FAILURE, "'ghost'.*shape"),
-    'object at nan': (scene(nan_box()), CODE.FAILURE, "'nowhere'"),
-    'negative box': (scene(negative_box()), CODE.FAILURE, '-0.1'),
+    'scale of zero': (change(link_scale=[LinkScale(link_name=HAND, scale=0.0)]), OTHER, 'scale'),
+    'matrix without rows': (
+        change(allowed_collision_matrix=AllowedCollisionMatrix(entry_names=['a', 'b'])),
+        OTHER,
+        'entry_values',
+    ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize('name', SCENES)
 def test_a_bad_scene_is_refused_as_a_whole(rig: MoveGroupRig, name: str) -> None:
     """By apply_planning_scene with words in the log, and as the diff of a goal with its code."""
-    change, code, words = SCENES[name]
-    change = deepcopy(change)
-    change.world.collision_objects.insert(0, box('good', 2.0, 0.0, 0.5))
-    apply = ApplyPlanningScene.Request(scene=change)
-    assert not rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    wrong, code, words = SCENES[name]
+    good = box('good', 2.0, 0.0, 0.5)
+    wrong.world.collision_objects = [good, *wrong.world.collision_objects]
+    assert not rig.apply(wrong)
+    assert not rig.objects()
     rig.process.wait_for(f'apply_planning_scene refused: {code.name}: .*{words}', 30.0)
     goal = action_goal(motion_request(JOINT), plan_only=True)
-    goal.planning_options.planning_scene_diff = change
+    goal.planning_options.planning_scene_diff = wrong
     _status, result = rig.move(goal)
     check(result.error_code, code, words)
 
 
 def test_services_of_kinematics_refuse_alike(rig: MoveGroupRig) -> None:
     """compute_ik, compute_fk and compute_cartesian_path."""
-
-    def ik(**fields: Any) -> Any:
-        request = GetPositionIK.Request()
-        asked = request.ik_request
-        asked.group_name = 'panda_arm'
-        asked.pose_stamped.pose = down(0.4, 0.1, 0.5)
-        for name, value in fields.items():
-            setattr(asked, name, value)
-        return request
-
-    nowhere = ik()
-    nowhere.ik_request.pose_stamped.pose.position.x = NAN
-    far = ik()
-    far.ik_request.pose_stamped.pose.position.x = 3.0
-    lost = ik()
-    lost.ik_request.pose_stamped.header.frame_id = 'moon'
-    for request, code, words in (
-        (ik(group_name=''), CODE.INVALID_GROUP_NAME, 'group'),
-        (ik(ik_link_name='moon'), CODE.INVALID_LINK_NAME, 'moon'),
-        (ik(ik_link_names=['a', 'b']), CODE.INVALID_LINK_NAME, '2 ik_link_names'),
-        (nowhere, CODE.INVALID_GOAL_CONSTRAINTS, 'finite|nan'),
-        (far, CODE.NO_IK_SOLUTION, 'reach'),
-        (lost, CODE.FRAME_TRANSFORM_FAILURE, 'moon'),
-    ):
-        answer = rig.client.call(GetPositionIK, '/compute_ik', request)
-        check(answer.error_code, code, words)
+    good, bad_goal = down(0.4, 0.1, 0.5), CODE.INVALID_GOAL_CONSTRAINTS
+    poses: list[tuple[PoseMessage, dict[str, Any], PlanningCode, str]] = [
+        (good, {'group_name': ''}, CODE.INVALID_GROUP_NAME, 'group'),
+        (good, {'ik_link_name': 'moon'}, CODE.INVALID_LINK_NAME, 'moon'),
+        (good, {'ik_link_names': ['a', 'b']}, CODE.INVALID_LINK_NAME, '2 ik_link_names'),
+        (down(NAN, 0.1, 0.5), {}, bad_goal, 'finite|nan'),
+        (down(3.0, 0.1, 0.5), {}, CODE.NO_IK_SOLUTION, 'reach'),
+        (good, {'frame': 'moon'}, CODE.FRAME_TRANSFORM_FAILURE, 'moon'),
+    ]
+    for pose, fields, code, words in poses:
+        check(rig.ik(pose, **fields).error_code, code, words)
     fk = GetPositionFK.Request(fk_link_names=['moon'])
-    check(
-        rig.client.call(GetPositionFK, '/compute_fk', fk).error_code,
-        CODE.INVALID_LINK_NAME,
-        'moon',
-    )
-    for fields, code, words in (
-        ({'group_name': ''}, CODE.INVALID_GROUP_NAME, 'group'),
-        ({'link_name': 'moon'}, CODE.INVALID_LINK_NAME, 'moon'),
-        ({'max_step': 0.0}, CODE.INVALID_GOAL_CONSTRAINTS, 'max_step'),
-        ({'waypoints': []}, CODE.INVALID_GOAL_CONSTRAINTS, 'no way-points'),
-        ({'waypoints': [pose_at(NAN)]}, CODE.INVALID_GOAL_CONSTRAINTS, 'finite|nan'),
-        ({'max_velocity_scaling_factor': 2.0}, CODE.FAILURE, 'is 2'),
-    ):
-        given: dict[str, Any] = {
-            'group_name': 'panda_arm', 'max_step': 0.01, 'waypoints': [down(0.4, 0.1, 0.5)]
-        } | fields  # fmt: skip
-        path = GetCartesianPath.Request(**given)
-        answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', path)
+    found = rig.client.call(GetPositionFK, '/compute_fk', fk)
+    check(found.error_code, CODE.INVALID_LINK_NAME, 'moon')
+    paths: list[tuple[list[PoseMessage], dict[str, Any], PlanningCode, str]] = [
+        ([good], {'group_name': ''}, CODE.INVALID_GROUP_NAME, 'group'),
+        ([good], {'link_name': 'moon'}, CODE.INVALID_LINK_NAME, 'moon'),
+        ([good], {'max_step': 0.0}, bad_goal, 'max_step'),
+        ([], {}, bad_goal, 'no way-points'),
+        ([pose_at(NAN)], {}, bad_goal, 'finite|nan'),
+        ([good], {'max_velocity_scaling_factor': 2.0}, CODE.FAILURE, 'is 2'),
+    ]
+    for way, fields, code, words in paths:
+        answer = rig.cartesian_path(*way, **fields)
         check(answer.error_code, code, words)
         assert answer.fraction == -1.0
 

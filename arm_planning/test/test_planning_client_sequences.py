@@ -9,7 +9,6 @@ pymoveit2, which have a node of their own and no robot model.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from copy import deepcopy
 import math
 from typing import Any
@@ -17,14 +16,14 @@ from typing import Any
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
-from isolation import reserve
 from move_group_rig import (
     action_goal,
+    change,
+    HAND,
     joint_goal,
     JOINTS,
     motion_request,
     MoveGroupRig,
-    panda_parameters,
     pose_goal,
     READY,
 )
@@ -40,15 +39,11 @@ from moveit_msgs.msg import (
     PlanningScene,
     PlanningSceneComponents,
     PlanningSceneWorld,
+    RobotState,
 )
 from moveit_msgs.srv import (
-    ApplyPlanningScene,
-    GetCartesianPath,
     GetMotionPlan,
     GetMotionSequence,
-    GetPlanningScene,
-    GetPositionFK,
-    GetPositionIK,
     QueryPlannerInterfaces,
 )
 import numpy as np
@@ -64,28 +59,9 @@ from arm_planning import Planner
 from arm_planning.ros.geometry import pose_message, pose_of
 from node_runner import LATCHED
 
-HAND, BASE = 'panda_link8', 'panda_link0'
+BASE = 'panda_link0'
 MOVED = [0.4, *READY[1:]]
 SUCCESS = MoveItErrorCodes.SUCCESS
-
-
-@pytest.fixture(name='rig', scope='module')
-def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
-    """Start move_group and a trajectory controller."""
-    path = panda_parameters(tmp_path_factory.mktemp('robot'))
-    with (
-        reserve() as isolation,
-        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
-    ):
-        rig.serve_arm('panda_arm_controller')
-        yield rig
-
-
-@pytest.fixture(autouse=True)
-def at_ready(rig: MoveGroupRig) -> None:
-    """Begin each test at the same place."""
-    rig.positions.update(zip(JOINTS, READY, strict=True))
-    rig.settle()
 
 
 def interface_request(goal: Any) -> MotionPlanRequest:
@@ -98,13 +74,6 @@ def interface_request(goal: Any) -> MotionPlanRequest:
     corners.min_corner.x = corners.min_corner.y = corners.min_corner.z = -1.0
     corners.max_corner.x = corners.max_corner.y = corners.max_corner.z = 1.0
     return request
-
-
-def tip(rig: MoveGroupRig) -> PoseMessage:
-    """Return where the hand is."""
-    asked = GetPositionFK.Request(fk_link_names=[HAND])
-    asked.header.frame_id = BASE
-    return rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
 
 
 def turned_pose(x: float, y: float, z: float, axis: tuple[float, float, float]) -> PoseMessage:
@@ -155,22 +124,17 @@ def test_move_group_interface(rig: MoveGroupRig) -> None:
     assert at(rig) == pytest.approx(MOVED, abs=1e-3)
     # setPoseTarget() and move(): the frame of the model
     rig.settle()
-    pose = tip(rig)
+    pose = rig.fk()
     pose.position.z += 0.1
     _status, moved = rig.move(action_goal(interface_request(pose_goal(pose, HAND, BASE))))
     assert moved.error_code.val == SUCCESS, moved.error_code
     assert moved.executed_trajectory.joint_trajectory.points
     rig.settle()
-    assert tip(rig).position.z == pytest.approx(pose.position.z, abs=2e-3)
+    assert rig.fk().position.z == pytest.approx(pose.position.z, abs=2e-3)
     # computeCartesianPath()
-    down = tip(rig)
+    down = rig.fk()
     down.position.z -= 0.1
-    asked = GetCartesianPath.Request(
-        group_name='panda_arm', link_name=HAND, waypoints=[down], max_step=0.01
-    )
-    asked.header.frame_id, asked.avoid_collisions = BASE, True
-    asked.start_state.is_diff = True
-    answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+    answer = rig.cartesian_path(down, avoid_collisions=True)
     assert (answer.error_code.val, answer.fraction) == (SUCCESS, 1.0), answer.error_code
     assert list(answer.start_state.joint_state.position)[:7] == pytest.approx(at(rig))
 
@@ -179,21 +143,13 @@ def test_a_cartesian_path_ends_in_front_of_what_stands_between_its_places(
     rig: MoveGroupRig,
 ) -> None:
     """A post between two steps of the hand."""
-    ahead = tip(rig)
-    post = box('post', ahead.position.x + 0.15, 0.0, ahead.position.z, edge=0.06)
-    change = PlanningScene(is_diff=True)
-    change.robot_state.is_diff, change.world.collision_objects = True, [post]
-    apply = ApplyPlanningScene.Request(scene=change)
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    ahead = rig.fk()
+    rig.add(box('post', ahead.position.x + 0.15, 0.0, ahead.position.z, edge=0.06))
     ahead.position.x += 0.3
-    asked = GetCartesianPath.Request(group_name='panda_arm', link_name=HAND, waypoints=[ahead])
-    asked.header.frame_id, asked.avoid_collisions, asked.max_step = BASE, True, 0.5
-    answer = rig.client.call(GetCartesianPath, '/compute_cartesian_path', asked)
+    answer = rig.cartesian_path(ahead, avoid_collisions=True, max_step=0.5)
     assert answer.error_code.val == SUCCESS, answer.error_code
     assert answer.fraction == 0.0  # of one step
     assert 'post' in answer.error_code.message
-    post.operation = CollisionObject.REMOVE
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
 
 
 def test_a_start_just_beyond_a_limit_is_on_it(rig: MoveGroupRig) -> None:
@@ -236,52 +192,64 @@ def test_goals_of_a_position_or_an_orientation_alone(rig: MoveGroupRig) -> None:
     region.primitive_poses[0].orientation = Quaternion(z=math.sin(0.4), w=math.cos(0.4))
     response = rig.plan(motion_request(goal))
     assert response.error_code.val == SUCCESS, response.error_code
+    end = response.trajectory.joint_trajectory.points[-1].positions
+    offset = Pose(np.eye(3), frozen([0.0, 0.0, 0.1]))
+    place = pose_of(region.primitive_poses[0], 'region')
+    inside = combined(inverse(place), combined(planner.fk(frozen(end), HAND), offset)).position
+    assert (np.abs(inside) <= [0.05 + 1e-6, 0.005 + 1e-6, 0.005 + 1e-6]).all()
+
+
+def test_a_circle_leads_through_its_point(rig: MoveGroupRig) -> None:
+    """As Pilz' planner has it in the path constraints."""
+    begin = rig.fk()
+    goal, middle = deepcopy(begin), deepcopy(begin)
+    goal.position.y += 0.2
+    middle.position.y, middle.position.z = begin.position.y + 0.1, begin.position.z - 0.05
+    circle = pose_goal(middle, HAND, BASE)
+    circle.name, circle.orientation_constraints = 'interim', []
+    request = motion_request(
+        pose_goal(goal, HAND, BASE),
+        pipeline_id='pilz_industrial_motion_planner',
+        planner_id='CIRC',
+        path_constraints=circle,
+    )
+    response = rig.plan(request)
+    assert response.error_code.val == SUCCESS, response.error_code
+    fk = Planner(panda().model('panda_arm')).fk
+    rows = [frozen(each.positions) for each in response.trajectory.joint_trajectory.points]
+    way = np.array([fk(row, HAND).position for row in rows])
+    through = [middle.position.x, middle.position.y, middle.position.z]
+    assert np.linalg.norm(way - through, axis=1).min() < 0.02
 
 
 def test_planning_scene_interface(rig: MoveGroupRig) -> None:
     """applyCollisionObjects, getKnownObjectNames, getObjects, attach by topic, detach, remove."""
 
-    def scene(components: int) -> PlanningScene:
-        request = GetPlanningScene.Request()
-        request.components.components = components
-        return rig.client.call(GetPlanningScene, '/get_planning_scene', request).scene
-
     def names() -> set[str]:
-        found = scene(PlanningSceneComponents.WORLD_OBJECT_NAMES)
+        found = rig.scene(PlanningSceneComponents.WORLD_OBJECT_NAMES)
         return {each.id for each in found.world.collision_objects}
 
-    change = PlanningScene(is_diff=True)
-    change.robot_state.is_diff = True
-    change.world.collision_objects = [box('cup', 0.5, 0.3, 0.3, edge=0.05)]
-    apply = ApplyPlanningScene.Request(scene=change)
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    rig.add(box('cup', 0.5, 0.3, 0.3, edge=0.05))
     assert names() == {'cup'}
-    geometry = scene(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
+    geometry = rig.scene(PlanningSceneComponents.WORLD_OBJECT_GEOMETRY)
     assert geometry.world.collision_objects[0].primitives[0].dimensions[0] == 0.05
     # MoveGroupInterface::attachObject publishes with depth 1, the id only
-    publisher = rig.client.node.create_publisher(
-        AttachedCollisionObject, '/attached_collision_object', 1
-    )
-    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    publisher = rig.publisher(AttachedCollisionObject, '/attached_collision_object')
     attach = AttachedCollisionObject(link_name=HAND, touch_links=['panda_hand'])
     attach.object.id, attach.object.operation = 'cup', CollisionObject.ADD
     publisher.publish(attach)
 
     def attached() -> set[str]:
-        found = scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
+        found = rig.scene(PlanningSceneComponents.ROBOT_STATE_ATTACHED_OBJECTS)
         return {each.object.id for each in found.robot_state.attached_collision_objects}
 
     rig.client.spin_until(lambda: attached() == {'cup'} and not names(), 30.0, 'the attached cup')
-    asked = GetPositionFK.Request(fk_link_names=['cup'])
-    asked.header.frame_id = BASE
-    place = rig.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose.position
+    place = rig.fk('cup').position
     assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.3, 0.3))
     attach.object.operation = CollisionObject.REMOVE
     publisher.publish(attach)
     rig.client.spin_until(lambda: names() == {'cup'} and not attached(), 30.0, 'the cup laid down')
-    change.world.collision_objects = [CollisionObject(id='cup', operation=CollisionObject.REMOVE)]
-    apply = ApplyPlanningScene.Request(scene=change)
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    rig.add(CollisionObject(id='cup', operation=CollisionObject.REMOVE))
     assert names() == set()
 
 
@@ -293,9 +261,7 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     # its monitor listens with the system's default, which is volatile, and asks for the rest
     monitored = rig.client.listen(PlanningScene, '/monitored_planning_scene', 100)
     displayed = rig.client.listen(DisplayTrajectory, '/display_planned_path', 2)
-    request = GetPlanningScene.Request()
-    request.components.components = (1 << 10) - 1
-    whole = rig.client.call(GetPlanningScene, '/get_planning_scene', request).scene
+    whole = rig.scene((1 << 10) - 1)
     assert not whole.is_diff
     assert (whole.robot_model_name, whole.robot_state.joint_state.header.frame_id) == (
         'panda',
@@ -308,8 +274,7 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     assert {each.pipeline_id for each in described} >= {'ompl', 'pilz_industrial_motion_planner'}
     assert all(each.name and each.planner_ids for each in described)
     # Publish Scene; another node's monitor sees it
-    publisher = rig.client.node.create_publisher(PlanningScene, '/planning_scene', 1)
-    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    publisher = rig.publisher(PlanningScene, '/planning_scene')
     whole.world.collision_objects = [box('crate', 0.0, 0.8, 0.2, edge=0.2)]
     publisher.publish(whole)
 
@@ -329,12 +294,9 @@ def test_rviz_motion_planning_panel(rig: MoveGroupRig) -> None:
     assert displayed[-1].model_id == 'panda'
     assert displayed[-1].trajectory[0] == plan.planned_trajectory
     # Stop, with nothing on its way, and Clear octomap
-    stop = rig.client.node.create_publisher(String, '/trajectory_execution_event', 1)
-    rig.client.spin_until(lambda: stop.get_subscription_count() > 0, 20.0, 'a listener')
-    stop.publish(String(data='stop'))
+    rig.publisher(String, '/trajectory_execution_event').publish(String(data='stop'))
     rig.client.call(Empty, '/clear_octomap', Empty.Request())
-    empty = PlanningScene()
-    publisher.publish(empty)
+    publisher.publish(PlanningScene())
     rig.client.spin_until(
         lambda: not monitored[-1].world.collision_objects, 30.0, 'the scene without it'
     )
@@ -362,44 +324,31 @@ def test_python_clients_without_a_robot_model(rig: MoveGroupRig) -> None:
     assert (status, done.error_code.val) == (GoalStatus.STATUS_SUCCEEDED, SUCCESS)
     rig.settle()
     # compute_fk and compute_ik there and back, with a state for the start
-    pose = tip(rig)
-    asked = GetPositionIK.Request()
-    asked.ik_request.group_name, asked.ik_request.avoid_collisions = 'panda_arm', True
-    asked.ik_request.robot_state.joint_state.name = JOINTS
-    asked.ik_request.robot_state.joint_state.position = READY
-    asked.ik_request.pose_stamped.header.frame_id = BASE
-    asked.ik_request.pose_stamped.pose = pose
-    solved = rig.client.call(GetPositionIK, '/compute_ik', asked)
+    pose = rig.fk()
+    start = RobotState(joint_state=JointState(name=JOINTS, position=READY))
+    solved = rig.ik(pose, BASE, avoid_collisions=True, robot_state=start)
     assert solved.error_code.val == SUCCESS, solved.error_code
-    again = GetPositionFK.Request(fk_link_names=[HAND], robot_state=solved.solution)
-    found = rig.client.call(GetPositionFK, '/compute_fk', again).pose_stamped[0].pose.position
+    found = rig.fk(HAND, solved.solution).position
     assert (found.x, found.y, found.z) == pytest.approx(
         (pose.position.x, pose.position.y, pose.position.z), abs=1e-4
     )
     # allow_collisions(): the scene is read, its matrix widened, and sent back as a whole
-    publisher = rig.client.node.create_publisher(CollisionObject, '/collision_object', 10)
-    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
-    place = tip(rig).position
+    publisher = rig.publisher(CollisionObject, '/collision_object')
+    place = rig.fk().position
     publisher.publish(box('tool', place.x, place.y, place.z, edge=0.05))
-    reading = GetPlanningScene.Request()
-
-    def scene() -> PlanningScene:
-        return rig.client.call(GetPlanningScene, '/get_planning_scene', reading).scene
-
-    rig.client.spin_until(lambda: bool(scene().world.collision_objects), 30.0, 'the tool')
+    rig.client.spin_until(lambda: rig.objects() == ['tool'], 30.0, 'the tool')
     blocked = rig.plan(motion_request(joint_goal(READY)))
     assert blocked.error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
-    whole = scene()
+    whole = rig.scene()
     matrix = whole.allowed_collision_matrix
     matrix.default_entry_names = [*matrix.default_entry_names, 'tool']
     matrix.default_entry_values = [*matrix.default_entry_values, True]
-    apply = ApplyPlanningScene.Request(scene=whole)
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
+    assert rig.apply(whole)
     allowed = rig.plan(motion_request(joint_goal(READY)))
     assert allowed.error_code.val == SUCCESS, allowed.error_code
     # clear_all_collision_objects(): one message without an id
     publisher.publish(CollisionObject(operation=CollisionObject.REMOVE))
-    rig.client.spin_until(lambda: not scene().world.collision_objects, 30.0, 'an empty scene')
+    rig.client.spin_until(lambda: not rig.objects(), 30.0, 'an empty scene')
 
 
 @pytest.mark.parametrize('name', ['tool', 'tool/tip'])
@@ -412,94 +361,68 @@ def test_goals_and_path_constraints_of_what_is_held(
     held.header.frame_id, held.pose = HAND, turned_pose(0.1, 0.02, 0.1, axis=(0.0, 1.0, 0.0))
     held.subframe_names = ['tip']
     held.subframe_poses = [turned_pose(0.05, 0.0, 0.03, axis=(0.0, 0.0, 1.0))]
-    change = PlanningScene(is_diff=True)
-    change.robot_state.is_diff = True
-    change.robot_state.attached_collision_objects = [
+    scene = change()
+    scene.robot_state.attached_collision_objects = [
         AttachedCollisionObject(link_name=HAND, object=held, touch_links=['panda_link7'])
     ]
-    assert rig.client.call(
-        ApplyPlanningScene, '/apply_planning_scene', ApplyPlanningScene.Request(scene=change)
-    ).success
-    try:
-        in_hand = pose_of(held.pose, 'tool')
-        if name == 'tool/tip':
-            in_hand = combined(in_hand, pose_of(held.subframe_poses[0], 'tip'))
+    assert rig.apply(scene)
+    in_hand = pose_of(held.pose, 'tool')
+    if name == 'tool/tip':
+        in_hand = combined(in_hand, pose_of(held.subframe_poses[0], 'tip'))
 
-        def place_of(joints: list[float]) -> Pose:
-            where = panda().positions(dict(zip(JOINTS, joints, strict=True)))
-            return combined(panda().kinematics.link_pose(HAND, where), in_hand)
+    def place_of(joints: list[float]) -> Pose:
+        where = panda().positions(dict(zip(JOINTS, joints, strict=True)))
+        return combined(panda().kinematics.link_pose(HAND, where), in_hand)
 
-        begin = place_of(READY)
-        wanted = pose_message(Pose(begin.rotation, np.add(begin.position, [0.0, 0.06, 0.08])))
-        goal = pose_goal(wanted, name, BASE)
-        request = interface_request(goal)
-        kept = deepcopy(goal.position_constraints[0])
-        kept.constraint_region.primitives = [
-            SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.04, 0.2, 0.3])
-        ]
-        kept.constraint_region.primitive_poses = [pose_message(begin)]
-        kept.constraint_region.primitive_poses[0].orientation = Quaternion(w=1.0)
-        request.path_constraints.position_constraints = [kept]
-        if not turned:
-            goal.orientation_constraints = []
-        _status, moved = rig.move(action_goal(request))
-        assert moved.error_code.val == SUCCESS, moved.error_code
-        assert (place_of(at(rig)).position - begin.position).tolist() == pytest.approx(
-            [0.0, 0.06, 0.08], abs=1e-3
-        )
-        if turned:
-            assert place_of(at(rig)).rotation == pytest.approx(begin.rotation, abs=2e-3)
-        kept.constraint_region.primitive_poses[0].position.x += 0.1
-        refused = rig.plan(request).error_code
-        assert refused.val == MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, refused
-    finally:
-        held.operation = CollisionObject.REMOVE
-        release = ApplyPlanningScene.Request(scene=change)
-        assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
-        change.robot_state.attached_collision_objects = []
-        change.world.collision_objects = [remove_all()]
-        assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', release).success
-
-
-def apply(rig: MoveGroupRig, **changes: Any) -> None:
-    """Apply a change of the scene."""
-    scene = PlanningScene(is_diff=True, **changes)
-    scene.robot_state.is_diff = True
-    asked = ApplyPlanningScene.Request(scene=scene)
-    assert rig.client.call(ApplyPlanningScene, '/apply_planning_scene', asked).success
-
-
-def whole_scene(rig: MoveGroupRig) -> PlanningScene:
-    """Return the scene."""
-    asked = GetPlanningScene.Request()
-    return rig.client.call(GetPlanningScene, '/get_planning_scene', asked).scene
+    begin = place_of(READY)
+    wanted = pose_message(Pose(begin.rotation, np.add(begin.position, [0.0, 0.06, 0.08])))
+    goal = pose_goal(wanted, name, BASE)
+    request = interface_request(goal)
+    kept = deepcopy(goal.position_constraints[0])
+    kept.constraint_region.primitives = [
+        SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.04, 0.2, 0.3])
+    ]
+    kept.constraint_region.primitive_poses = [pose_message(begin)]
+    kept.constraint_region.primitive_poses[0].orientation = Quaternion(w=1.0)
+    request.path_constraints.position_constraints = [kept]
+    if not turned:
+        goal.orientation_constraints = []
+    _status, moved = rig.move(action_goal(request))
+    assert moved.error_code.val == SUCCESS, moved.error_code
+    assert (place_of(at(rig)).position - begin.position).tolist() == pytest.approx(
+        [0.0, 0.06, 0.08], abs=1e-3
+    )
+    if turned:
+        assert place_of(at(rig)).rotation == pytest.approx(begin.rotation, abs=2e-3)
+    kept.constraint_region.primitive_poses[0].position.x += 0.1
+    refused = rig.plan(request).error_code
+    assert refused.val == MoveItErrorCodes.START_STATE_VIOLATES_PATH_CONSTRAINTS, refused
 
 
 def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroupRig) -> None:
     """Defaults stay defaults, the upper triangle counts, REMOVE forgets what a name may touch."""
-    place = tip(rig).position
+    place = rig.fk().position
 
-    def cup(operation: bytes) -> PlanningSceneWorld:
-        thing = box('cup', place.x, place.y, place.z, edge=0.05, operation=operation)
-        return PlanningSceneWorld(collision_objects=[thing])
+    def cup(operation: bytes) -> CollisionObject:
+        return box('cup', place.x, place.y, place.z, edge=0.05, operation=operation)
 
     def outcome() -> int:
         return int(rig.plan(motion_request(joint_goal(READY))).error_code.val)
 
     touching = MoveItErrorCodes.START_STATE_IN_COLLISION
-    apply(rig, world=cup(CollisionObject.ADD))
+    rig.add(cup(CollisionObject.ADD))
     assert outcome() == touching
-    matrix = whole_scene(rig).allowed_collision_matrix
+    matrix = rig.scene().allowed_collision_matrix
     entries = len(matrix.entry_names)
     matrix.default_entry_names, matrix.default_entry_values = ['cup'], [True]
-    apply(rig, allowed_collision_matrix=matrix)
+    assert rig.apply(allowed_collision_matrix=matrix)
     assert outcome() == SUCCESS
-    matrix = whole_scene(rig).allowed_collision_matrix
+    matrix = rig.scene().allowed_collision_matrix
     assert (list(matrix.default_entry_names), list(matrix.default_entry_values)) == (
         ['cup'],
         [True],
     )
-    apply(rig, allowed_collision_matrix=matrix)  # what was read
+    assert rig.apply(allowed_collision_matrix=matrix)  # what was read
     matrix.default_entry_values = [False]
     kept = [number for number, name in enumerate(matrix.entry_names) if name != 'cup']
     matrix.entry_names = [matrix.entry_names[number] for number in kept]
@@ -508,7 +431,7 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
         for row in kept
     ]
     assert len(kept) == entries
-    apply(rig, allowed_collision_matrix=matrix)
+    assert rig.apply(allowed_collision_matrix=matrix)
     assert outcome() == touching
     matrix.default_entry_names, matrix.default_entry_values = [], []
     for is_upper in (True, False):
@@ -520,13 +443,12 @@ def test_a_matrix_that_is_read_and_sent_back_changes_nothing_more(rig: MoveGroup
             AllowedCollisionEntry(enabled=[*([not is_upper] * entries), False])
         )
         for _ in range(2):  # the second one says nothing new
-            apply(rig, allowed_collision_matrix=filled)
+            assert rig.apply(allowed_collision_matrix=filled)
             assert outcome() == (SUCCESS if is_upper else touching)
-        apply(rig, world=cup(CollisionObject.REMOVE))
-        apply(rig, world=cup(CollisionObject.ADD))
+        rig.add(cup(CollisionObject.REMOVE))
+        rig.add(cup(CollisionObject.ADD))
         assert outcome() == touching
-        assert whole_scene(rig).allowed_collision_matrix == matrix
-    apply(rig, world=cup(CollisionObject.REMOVE))
+        assert rig.scene().allowed_collision_matrix == matrix
 
 
 def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
@@ -544,7 +466,7 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
             triangles=[MeshTriangle(vertex_indices=face) for face in faces],
         )
     ]
-    apply(rig, world=PlanningSceneWorld(collision_objects=[rock]))
+    rig.add(rock)
 
     def rocks(scenes: list[PlanningScene]) -> list[Mesh]:
         return [each.meshes[0] for each in scenes[-1].world.collision_objects] if scenes else []
@@ -558,7 +480,7 @@ def test_controllers_get_hulls_once_for_each_change(rig: MoveGroupRig) -> None:
     before, shown = len(collisions), len(monitored)
     rig.positions[JOINTS[0]] += 0.2
     rig.client.spin_until(lambda: len(monitored) > shown, 30.0, 'the robot at rest elsewhere')
-    apply(rig, world=PlanningSceneWorld(collision_objects=[remove_all()]))
+    rig.add(CollisionObject(operation=CollisionObject.REMOVE))
     rig.client.spin_until(lambda: not rocks(collisions), 30.0, 'the scene without the rock')
     assert len(collisions) == before + 1
 
@@ -569,24 +491,23 @@ def test_a_concave_object_is_named_in_the_answers(rig: MoveGroupRig) -> None:
     corner.header.frame_id = BASE
     solid = corner_mesh()
     corner.meshes = [solid]
-    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    rig.add(corner)
     note = "object 'corner' counts as the convex hull of its mesh, of which it fills 71 %"
     rig.process.wait_for(note, 30.0)
     goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
     assert note in rig.move(goal)[1].error_code.message
     # the tip is in the corner, which is empty
-    place = tip(rig).position
+    place = rig.fk().position
     corner.pose.position = Point(x=place.x - 0.35, y=place.y - 0.35, z=place.z - 0.1)
-    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    rig.add(corner)
     refused = rig.move(goal)[1].error_code
     assert refused.val == MoveItErrorCodes.START_STATE_IN_COLLISION
     assert note in refused.message
     corner.meshes = [tetrahedron(0.2)]
     corner.pose.position = Point(x=-0.5, y=0.9)
-    apply(rig, world=PlanningSceneWorld(collision_objects=[corner]))
+    rig.add(corner)
     answer = rig.move(goal)[1].error_code
     assert (answer.val, answer.message) == (SUCCESS, '')
-    apply(rig, world=PlanningSceneWorld(collision_objects=[remove_all()]))
 
 
 def corner_mesh() -> Mesh:
@@ -603,33 +524,23 @@ def corner_mesh() -> Mesh:
     return Mesh(vertices=corners, triangles=triangles)
 
 
-def remove_all() -> CollisionObject:
-    """Return what removes all objects."""
-    return CollisionObject(operation=CollisionObject.REMOVE)
-
-
 def test_a_world_replaces_and_a_scene_of_a_goal_changes(rig: MoveGroupRig) -> None:
     """Whatever the scene of a goal says in is_diff; an empty one changes nothing."""
-    apply(rig, world=PlanningSceneWorld(collision_objects=[box('old', 0.0, 0.9, 0.2)]))
-    publisher = rig.client.node.create_publisher(PlanningSceneWorld, '/planning_scene_world', 1)
-    rig.client.spin_until(lambda: publisher.get_subscription_count() > 0, 20.0, 'a listener')
+    rig.add(box('old', 0.0, 0.9, 0.2))
+    publisher = rig.publisher(PlanningSceneWorld, '/planning_scene_world')
     world = PlanningSceneWorld(collision_objects=[box('new', 0.0, -0.9, 0.2)])
-
-    def names() -> list[str]:
-        return [each.id for each in whole_scene(rig).world.collision_objects]
-
     publisher.publish(world)
-    rig.client.spin_until(lambda: names() == ['new'], 30.0, 'the world that was published')
+    rig.client.spin_until(lambda: rig.objects() == ['new'], 30.0, 'the world that was published')
     goal = action_goal(interface_request(joint_goal(MOVED)), plan_only=True)
     goal.planning_options.planning_scene_diff = PlanningScene()
     assert rig.move(goal)[1].error_code.val == SUCCESS
-    place = tip(rig).position
+    place = rig.fk().position
     at_tip = box('part', place.x, place.y, place.z, edge=0.05)
     goal.planning_options.planning_scene_diff.world.collision_objects = [at_tip]
     assert rig.move(goal)[1].error_code.val == MoveItErrorCodes.START_STATE_IN_COLLISION
-    assert names() == ['new']
+    assert rig.objects() == ['new']
     publisher.publish(PlanningSceneWorld())
-    rig.client.spin_until(lambda: not names(), 30.0, 'an empty world')
+    rig.client.spin_until(lambda: not rig.objects(), 30.0, 'an empty world')
 
 
 NAMES: dict[str, str] = {

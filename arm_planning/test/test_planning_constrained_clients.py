@@ -8,19 +8,18 @@ between the points of a trajectory are computed here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 import math
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from isolation import reserve
 from move_group_rig import (
     action_goal,
+    HAND,
     joint_goal,
     JOINTS,
     motion_request,
     MoveGroupRig,
-    panda_parameters,
     READY,
     robots,
 )
@@ -43,7 +42,6 @@ from urdf_reader import expand_xacro
 from arm_model.ros import seconds
 
 Array = NDArray[np.float64]
-HAND = 'panda_link8'
 START = READY
 GOAL = [0.303, 0.397, 1.997, -1.993, -0.37, 1.805, 1.306]
 """Another state in which the hand looks down in [rad]; it does not on the straight way there."""
@@ -169,17 +167,6 @@ CASES = {
     'region': stays_above(0.4),
     'joint': keeps_a_joint(),
 }
-
-
-@pytest.fixture(name='rig', scope='module')
-def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MoveGroupRig]:
-    """Start move_group."""
-    path = panda_parameters(tmp_path_factory.mktemp('robot'))
-    with (
-        reserve() as isolation,
-        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
-    ):
-        yield rig
 
 
 def request(constraints: Constraints, goal: list[float]) -> MotionPlanRequest:

@@ -216,19 +216,25 @@ def test_what_is_enclosed_is_given_up_in_time() -> None:
     assert caught.value.code is PlanningCode.TIMED_OUT
 
 
-def test_requests_that_make_no_sense_are_refused() -> None:
-    """Each with what is wrong and what would be right."""
+@pytest.mark.parametrize('planner_id', ['', 'PTP', 'LIN'])
+def test_requests_that_make_no_sense_are_refused(planner_id: str) -> None:
+    """Each with what is wrong and what would be right, whichever planner is asked."""
     planner, here = Planner(robot('panda')), ready('panda')
-    asked = request(here, here + 0.1)
+    asked = replace(request(here, here + 0.1), planner_id=planner_id)
     nan, beyond = frozen([np.nan, *here[1:]]), here.copy()
     beyond[1] = 3.0
+    turn = Pose(2.0 * ORIGIN.rotation, frozen([0.5, 0.0, 0.5]))
     cases = {
         "unknown planner_id 'STOMP'; choose one of": replace(asked, planner_id='STOMP'),
         'the request has no goal': replace(asked, goals=[]),
-        'velocity_scaling is 1.5; it must be above 0': replace(asked, velocity_scaling=1.5),
+        'velocity_scaling is 1.5; it must be': replace(asked, velocity_scaling=1.5),
+        'acceleration_scaling is 0.0; it must be': replace(asked, acceleration_scaling=0.0),
         'start: 6 numbers, 7 are needed': replace(asked, start=here[:6]),
+        'start: number 0 is nan': replace(asked, start=nan),
+        'start: panda_joint2 at': replace(asked, start=beyond),
         'goal: number 0 is nan': replace(asked, goals=[JointGoal(nan)]),
         'goal: panda_joint2 at': replace(asked, goals=[JointGoal(beyond)]),
+        'rotation of the pose': replace(asked, goals=[PoseGoal(turn)]),
     }
     for words, case in cases.items():
         assert words in str(refusal(planner, case))

@@ -7,6 +7,8 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 from model_robots import two_arms_texts
 from moveit_msgs.msg import PositionIKRequest
@@ -17,7 +19,7 @@ import pytest
 from arm_model import Array, AttachedBody, Box, Clearances, CollisionObject, PlacedShape, Pose
 from arm_planning import JointGoal, MotionRequest
 from arm_planning.ros.geometry import pose_message
-from arm_planning.ros.kinematic_services import GroupKinematics
+from arm_planning.ros.kinematic_services import KinematicServices
 from arm_planning.ros.planning import GroupPlanners
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_changes import scene_for
@@ -135,13 +137,16 @@ def test_a_planner_is_kept_while_nothing_beside_its_group_moves() -> None:
 
 def test_inverse_kinematics_has_the_torso_where_it_is() -> None:
     """A pose in the root link is reached by the whole robot, before and after the torso turned."""
-    kinematics, link = GroupKinematics(robot()), 'left_3_link'
+    monitor: Any = SimpleNamespace(robot=robot())
+    background: Any = SimpleNamespace(serve=lambda *_: None)
+    node: Any = None
+    kinematics, link = KinematicServices(node, monitor, background), 'left_3_link'
     for torso in (0.4, -0.7):
         here = robot().positions({'torso': torso})
         wanted = robot().kinematics.link_pose(link, moved(here, np.array([0.3, -0.5, 0.2])))
         request = PositionIKRequest(group_name='left', ik_link_name=link)
         request.pose_stamped.pose = pose_message(wanted)
-        _response, state = kinematics.ik(request, snapshot(), here)
+        _response, state = kinematics._ik(request, snapshot(), here)
         by_joint = dict(zip(state.joint_state.name, state.joint_state.position, strict=True))
         found = robot().kinematics.link_pose(link, robot().positions(by_joint))
         assert found.position == pytest.approx(wanted.position, abs=1e-5)

@@ -17,7 +17,6 @@ import pytest
 from arm_model import (
     Array,
     CollisionObject,
-    CommandError,
     frozen,
     JointLimits,
     Plane,
@@ -244,11 +243,11 @@ def test_time_out_is_that_of_the_clock() -> None:
 def test_what_is_no_pose_is_refused() -> None:
     """A NaN, a mirrored rotation, too few joints, an unknown link."""
     pose = solver('prbt').link.pose(ready('prbt'))
-    with pytest.raises(CommandError, match='finite'):
+    with pytest.raises(PlanningError, match='finite'):
         solver('prbt').solve(Pose(pose.rotation, frozen([0.0, np.nan, 0.0])), ready('prbt'))
     with pytest.raises(PlanningError, match='mirror'):
         solver('prbt').solve(Pose(-np.eye(3), pose.position), ready('prbt'))
-    with pytest.raises(CommandError, match='seed'):
+    with pytest.raises(PlanningError, match='seed'):
         solver('prbt').solve(pose, [0.0])
     with pytest.raises(PlanningError, match='choose one of') as refused:
         IkSolver(robot('prbt'), 'hand')

@@ -1,39 +1,32 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""compute_ik and compute_cartesian_path: what is answered, and what is refused."""
+"""compute_ik and compute_cartesian_path as clients see them; refusals: test_planning_bad_input."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
+from move_group_rig import HAND, JOINTS, MoveGroupRig, READY
 from moveit_msgs.msg import (
     Constraints,
     JointConstraint,
     MoveItErrorCodes,
     OrientationConstraint,
     PositionConstraint,
-    PositionIKRequest,
 )
-from moveit_msgs.srv import GetCartesianPath
 import numpy as np
 from planning_messages import box, panda, pose_at
 import pytest
 from shape_msgs.msg import SolidPrimitive
 
 from arm_model import Array, frozen, ORIGIN, Pose
-from arm_planning import PlanningCode, PlanningError
+from arm_planning import PlanningCode
 from arm_planning.ros.geometry import pose_message
-from arm_planning.ros.kinematic_services import GroupKinematics
-from arm_planning.ros.scene_changes import apply_object
-from arm_planning.ros.scene_snapshot import SceneSnapshot
 
+BASE = 'panda_link0'
 MODEL = panda().model('panda_arm')
-READY = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]
-PLACES = panda().positions(dict(zip(MODEL.joints, READY, strict=True)))
-SCENE = SceneSnapshot(panda().scene)
-KINEMATICS = GroupKinematics(panda())
-TIP = MODEL.kinematics.link_pose('panda_link8', frozen(READY))
+TIP = MODEL.kinematics.link_pose(HAND, frozen(READY))
 
 
 def moved(*way: float) -> Pose:
@@ -41,59 +34,39 @@ def moved(*way: float) -> Pose:
     return Pose(TIP.rotation, frozen(TIP.position + np.array(way)))
 
 
-def ik_request(pose: Pose, **fields: Any) -> PositionIKRequest:
-    """Return a request for the tip."""
-    request = PositionIKRequest(group_name='panda_arm', **fields)
-    request.pose_stamped = PoseStamped(pose=pose_message(pose))
-    request.pose_stamped.header.frame_id = 'panda_link0'
-    request.timeout.nanosec = 500_000_000
-    return request
-
-
-def solved(request: PositionIKRequest, scene: SceneSnapshot = SCENE) -> Array:
-    """Return the joints of the arm that answer a request."""
-    response, _ = KINEMATICS.ik(request, scene, PLACES)
-    assert response.error_code.val == MoveItErrorCodes.SUCCESS
+def solved(response: Any) -> Pose:
+    """Return where the tip is in a solution."""
+    assert response.error_code.val == MoveItErrorCodes.SUCCESS, response.error_code
     state = response.solution.joint_state
     assert set(state.name) == set(panda().joints)
     place = dict(zip(state.name, state.position, strict=True))
-    return frozen([place[name] for name in MODEL.joints])
+    return MODEL.kinematics.link_pose(HAND, frozen([place[name] for name in JOINTS]))
 
 
-def refused(work: Any, *arguments: Any) -> PlanningError:
-    """Return why something is refused."""
-    with pytest.raises(PlanningError) as caught:
-        work(*arguments, SCENE, PLACES)
-    return caught.value
-
-
-def test_a_solution_has_the_pose() -> None:
-    """Of the tip, and of a link that is named alone or in the lists."""
+def test_a_solution_has_the_pose(rig: MoveGroupRig) -> None:
+    """Of the tip, and of a link that is named alone or in the lists; in the frame of a link."""
     wanted = moved(0.05, 0.1, -0.05)
-    single, listed = ik_request(wanted), ik_request(wanted, ik_link_names=['panda_link8'])
-    listed.pose_stamped_vector = [listed.pose_stamped]
-    for request in (single, ik_request(wanted, ik_link_name='panda_link8'), listed):
-        found = MODEL.kinematics.link_pose('panda_link8', solved(request))
+    pose = pose_message(wanted)
+    stamped = PoseStamped(pose=pose)
+    stamped.header.frame_id = BASE
+    listed: dict[str, Any] = {'ik_link_names': [HAND], 'pose_stamped_vector': [stamped]}
+    for fields in ({}, {'ik_link_name': HAND}, listed):
+        found = solved(rig.ik(pose, BASE, **fields))
         assert found.position == pytest.approx(wanted.position, abs=1e-6)
         assert found.rotation == pytest.approx(wanted.rotation, abs=1e-6)
-
-
-def test_a_pose_counts_in_its_frame() -> None:
-    """The hand of the robot is a frame as the root is."""
-    request = ik_request(Pose(ORIGIN.rotation, frozen([0.0, 0.0, -0.05])))
-    request.pose_stamped.header.frame_id = 'panda_link8'
-    found = MODEL.kinematics.link_pose('panda_link8', solved(request))
+    above = pose_message(Pose(ORIGIN.rotation, frozen([0.0, 0.0, -0.05])))
+    found = solved(rig.ik(above, HAND))
     assert found.position == pytest.approx(TIP.position - 0.05 * TIP.rotation[:, 2], abs=1e-6)
 
 
-def test_collisions_are_avoided_where_that_is_asked() -> None:
+def test_collisions_are_avoided_where_that_is_asked(rig: MoveGroupRig) -> None:
     """A box about the goal: no solution, with the name of the box."""
     at = moved(0.1, 0.0, 0.0)
-    scene = apply_object(SCENE, box('crate', *at.position.tolist(), edge=0.1), PLACES)
-    solved(ik_request(at), scene)
-    with pytest.raises(PlanningError, match='crate') as caught:
-        KINEMATICS.ik(ik_request(at, avoid_collisions=True), scene, PLACES)
-    assert caught.value.code is PlanningCode.NO_IK_SOLUTION
+    rig.add(box('crate', *at.position.tolist(), edge=0.1))
+    solved(rig.ik(pose_message(at), BASE))
+    refused = rig.ik(pose_message(at), BASE, avoid_collisions=True).error_code
+    assert refused.val == PlanningCode.NO_IK_SOLUTION
+    assert 'crate' in refused.message
 
 
 def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -> Constraints:
@@ -105,8 +78,8 @@ def joint_constraint(position: float, tolerance: float = 0.2, number: int = 1) -
 
 def region(y: float) -> Constraints:
     """Return a constraint of the tip to a ball beside where it is."""
-    message = PositionConstraint(link_name='panda_link8')
-    message.header.frame_id = 'panda_link0'
+    message = PositionConstraint(link_name=HAND)
+    message.header.frame_id = BASE
     x, middle, z = TIP.position.tolist()
     message.constraint_region.primitives = [
         SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.02])
@@ -117,8 +90,8 @@ def region(y: float) -> Constraints:
 
 def turned(tolerance: float, x: float) -> Constraints:
     """Return a constraint of the tip's orientation."""
-    message = OrientationConstraint(link_name='panda_link8')
-    message.header.frame_id = 'panda_link8'
+    message = OrientationConstraint(link_name=HAND)
+    message.header.frame_id = HAND
     message.orientation.x, message.orientation.w = np.sin(0.5 * x), np.cos(0.5 * x)
     message.absolute_x_axis_tolerance = tolerance
     message.absolute_y_axis_tolerance = message.absolute_z_axis_tolerance = 0.01
@@ -133,23 +106,16 @@ def turned(tolerance: float, x: float) -> Constraints:
         (region(0.0), region(0.3), 'outside of its region'),
         (turned(0.11, 0.1), turned(0.09, 0.1), 'is turned by'),
     ],
+    ids=['joint', 'place', 'orientation'],
 )
 def test_solutions_heed_constraints(
-    heeded: Constraints, violated: Constraints, words: str
+    rig: MoveGroupRig, heeded: Constraints, violated: Constraints, words: str
 ) -> None:
     """Of joints, places and orientations."""
-    solved(ik_request(TIP, constraints=heeded))
-    reason = refused(KINEMATICS.ik, ik_request(TIP, constraints=violated))
-    assert reason.code is PlanningCode.NO_IK_SOLUTION
-    assert words in str(reason)
-
-
-def path_request(*poses: Pose, **fields: Any) -> GetCartesianPath.Request:
-    """Return a request through poses of the tip."""
-    request = GetCartesianPath.Request(group_name='panda_arm', max_step=0.01, **fields)
-    request.header.frame_id = 'panda_link0'
-    request.waypoints = [pose_message(each) for each in poses]
-    return request
+    solved(rig.ik(pose_message(TIP), BASE, constraints=heeded))
+    refused = rig.ik(pose_message(TIP), BASE, constraints=violated).error_code
+    assert refused.val == PlanningCode.NO_IK_SOLUTION
+    assert words in refused.message
 
 
 def places_of(response: Any) -> tuple[Array, Array]:
@@ -157,14 +123,19 @@ def places_of(response: Any) -> tuple[Array, Array]:
     points = response.solution.joint_trajectory.points
     times = [each.time_from_start.sec + 1e-9 * each.time_from_start.nanosec for each in points]
     rows = [frozen(each.positions) for each in points]
-    tip = [MODEL.kinematics.link_pose('panda_link8', row).position for row in rows]
+    tip = [MODEL.kinematics.link_pose(HAND, row).position for row in rows]
     return np.array(times), np.array(tip)
 
 
-def test_a_path_goes_around_a_corner() -> None:
+def path(rig: MoveGroupRig, *poses: Pose, **fields: Any) -> Any:
+    """Return the response for a path through poses of the tip."""
+    return rig.cartesian_path(*map(pose_message, poses), **fields)
+
+
+def test_a_path_goes_around_a_corner(rig: MoveGroupRig) -> None:
     """Along both lines, from rest to rest within the limits of the joints."""
     corner, end = moved(0.0, 0.1, 0.0), moved(0.0, 0.1, -0.1)
-    response, _ = KINEMATICS.cartesian_path(path_request(corner, end), SCENE, PLACES)
+    response = path(rig, corner, end)
     assert response.fraction == 1.0
     assert (response.error_code.val, response.error_code.message) == (1, '')
     assert set(response.start_state.joint_state.name) == set(panda().joints)
@@ -188,40 +159,35 @@ def test_a_path_goes_around_a_corner() -> None:
     assert (np.abs(bends) <= MODEL.limits.acceleration * (1 + 1e-6)).all()
 
 
-def test_a_path_is_slower_by_its_factors_and_its_speed() -> None:
+def test_a_path_is_slower_by_its_factors_and_its_speed(rig: MoveGroupRig) -> None:
     """Scaling factors of the joints, and max_cartesian_speed of the tip."""
     end = moved(0.0, 0.2, 0.0)
 
     def lasts(**fields: Any) -> float:
-        response, _ = KINEMATICS.cartesian_path(path_request(end, **fields), SCENE, PLACES)
-        return float(places_of(response)[0][-1])
+        return float(places_of(path(rig, end, **fields))[0][-1])
 
     assert lasts(max_velocity_scaling_factor=0.1) > 1.5 * lasts()
     assert lasts(max_cartesian_speed=0.05) > 4.0  # [s] 0.2 m at 0.05 m/s
 
 
-def test_a_path_ends_in_front_of_what_it_must_not_touch() -> None:
+def test_a_path_ends_in_front_of_what_it_must_not_touch(rig: MoveGroupRig) -> None:
     """The fraction says how far, the message why; without avoid_collisions it goes on."""
-    x, y, z = moved(0.0, 0.25, 0.0).position.tolist()
-    scene = apply_object(SCENE, box('crate', x, y, z, edge=0.1), PLACES)
     end = moved(0.0, 0.2, 0.0)
-    free, _ = KINEMATICS.cartesian_path(path_request(end), scene, PLACES)
-    assert free.fraction == 1.0
-    blocked, _ = KINEMATICS.cartesian_path(path_request(end, avoid_collisions=True), scene, PLACES)
+    held = path(rig, end, path_constraints=joint_constraint(0.0, 0.02))
+    assert 0.0 < held.fraction < 1.0
+    rig.add(box('crate', *moved(0.0, 0.25, 0.0).position.tolist(), edge=0.1))
+    assert path(rig, end).fraction == 1.0
+    blocked = path(rig, end, avoid_collisions=True)
     assert blocked.error_code.val == MoveItErrorCodes.SUCCESS
     assert 0.0 < blocked.fraction < 1.0
     assert 'crate' in blocked.error_code.message
     _, tip = places_of(blocked)
     assert tip[-1][1] == pytest.approx(0.2 * blocked.fraction + TIP.position[1], abs=1e-6)
-    held, _ = KINEMATICS.cartesian_path(
-        path_request(end, path_constraints=joint_constraint(0.0, 0.02)), SCENE, PLACES
-    )
-    assert 0.0 < held.fraction < 1.0
 
 
-def test_a_path_to_where_the_arm_is_stands_still() -> None:
+def test_a_path_to_where_the_arm_is_stands_still(rig: MoveGroupRig) -> None:
     """It is complete, and has one place."""
-    response, _ = KINEMATICS.cartesian_path(path_request(TIP), SCENE, PLACES)
+    response = path(rig, TIP)
     assert response.fraction == 1.0
     _, tip = places_of(response)
     assert tip == pytest.approx(np.array([TIP.position] * len(tip)), abs=1e-6)

@@ -12,7 +12,6 @@ from typing import Any
 
 from action_msgs.msg import GoalStatus
 from control_msgs.msg import JointTrajectoryControllerState
-from geometry_msgs.msg import Pose as PoseMessage
 from isolation import Isolation, reserve
 from move_group_rig import (
     action_goal,
@@ -26,12 +25,10 @@ from move_group_rig import (
     READY,
 )
 from moveit_msgs.action import ExecuteTrajectory, MoveGroup
-from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene
+from moveit_msgs.msg import MoveItErrorCodes
 from moveit_msgs.srv import (
-    ApplyPlanningScene,
     GetMotionPlan,
     GetPlannerParams,
-    GetPositionFK,
     QueryPlannerInterfaces,
 )
 from planning_messages import box, pose_at
@@ -235,8 +232,7 @@ def test_the_packages_factors_count_where_a_request_has_none(panda: MoveGroupRig
 
 def test_cartesian_limits_of_the_package_bound_a_line(panda: MoveGroupRig) -> None:
     """0.5 m/s; the world of the SRDF is the frame of the goal."""
-    asked = GetPositionFK.Request(fk_link_names=['panda_link8'])
-    pose: PoseMessage = panda.client.call(GetPositionFK, '/compute_fk', asked).pose_stamped[0].pose
+    pose = panda.fk()
     pose.position.z -= 0.2
     request = motion_request(
         pose_goal(pose, 'panda_link8', 'world'),
@@ -348,13 +344,9 @@ def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGrou
         pose_at(-0.7, 0.0, 0.5),
         pose_at(0.0, 0.0, 0.8),
     ]
-    change = ApplyPlanningScene.Request(scene=PlanningScene(is_diff=True))
-    change.scene.robot_state.is_diff = True
-    change.scene.world.collision_objects = [wall]
-    call = panda.client.call
     panda.positions |= dict(zip(JOINTS, [1.2, *READY[1:]], strict=True))
     panda.settle()
-    assert call(ApplyPlanningScene, '/apply_planning_scene', change).success
+    panda.add(wall)
     request = motion_request(joint_goal([-1.2, *READY[1:]]))
     request.allowed_planning_time = 60.0
     goal = action_goal(request, plan_only=True)
@@ -370,10 +362,7 @@ def test_a_search_ends_with_its_goal_and_holds_up_no_other_group(panda: MoveGrou
     panda.client.spin_until(result.done, 20.0, 'result')
     assert result.result().status == GoalStatus.STATUS_CANCELED
     assert result.result().result.error_code.val == MoveItErrorCodes.PREEMPTED
-    wall.operation = CollisionObject.REMOVE
-    assert call(ApplyPlanningScene, '/apply_planning_scene', change).success
-    panda.positions |= dict(zip(JOINTS, READY, strict=True))
-    panda.settle()
+    panda.reset()
 
 
 def test_the_log_has_what_is_without_effect_once(panda: MoveGroupRig) -> None:
@@ -459,7 +448,7 @@ def test_the_prbts_package_starts(isolation: Isolation, tmp_path: Path) -> None:
 def test_parameters_of_moveits_launch_files_do_the_same(
     isolation: Isolation, tmp_path: Path
 ) -> None:
-    """The same names, flattened, without --moveit-config."""
+    """The same names, flattened, without --moveit-config; execution can be forbidden."""
     package = read_package(moveit_package('panda', tmp_path))
     values = {
         name: value
@@ -467,6 +456,7 @@ def test_parameters_of_moveits_launch_files_do_the_same(
         if not name.startswith('kinect') and name != 'sensors'
     }
     values |= {'publish_planning_scene': True, 'capabilities': '', 'monitor_dynamics': False}
+    values['allow_trajectory_execution'] = False
     path = tmp_path / 'launch_params.json'
     path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
     with MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
@@ -474,6 +464,11 @@ def test_parameters_of_moveits_launch_files_do_the_same(
         slow = duration(rig.plan(request))
         request.max_velocity_scaling_factor = request.max_acceleration_scaling_factor = 1.0
         assert slow > 2.0 * duration(rig.plan(request))
+        rig.serve_arm('panda_arm_controller')
+        _status, result = rig.move(action_goal(request))
+        assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED
+        assert 'allow_trajectory_execution' in result.error_code.message
+        assert not rig.followed
 
 
 def refused(isolation: Isolation, *arguments: str) -> str:
@@ -484,15 +479,23 @@ def refused(isolation: Isolation, *arguments: str) -> str:
         return process.output
 
 
-def test_limits_that_are_wider_than_the_description_are_refused(
-    isolation: Isolation, tmp_path: Path
+@pytest.mark.parametrize(
+    'case',
+    [
+        (LIMITS, 'max_velocity: 2.175', 'max_velocity: 21.75', 'panda_joint1.*21.75 is wider'),
+        (CONTROLLERS, '- panda_joint7', '- panda_joint8', "names 'panda_joint8'"),
+    ],
+)
+def test_what_does_not_fit_the_robot_is_refused(
+    isolation: Isolation, tmp_path: Path, case: tuple[str, str, str, str]
 ) -> None:
     """With file and line, by the program itself."""
+    file, before, after, words = case
     folder = moveit_package('panda', tmp_path)
-    path = folder / 'config' / 'joint_limits.yaml'
-    path.write_text(path.read_text().replace('max_velocity: 2.175', 'max_velocity: 21.75', 1))
+    path = folder / 'config' / file
+    path.write_text(path.read_text().replace(before, after, 1))
     output = refused(isolation, '--moveit-config', str(folder))
-    assert re.search(r'joint_limits\.yaml:\d+: .*panda_joint1.*21\.75 is wider', output), output
+    assert re.search(rf'{file}:\d+: .*{words}', output), output
 
 
 def test_a_limits_file_that_lacks_a_joint_is_refused(isolation: Isolation, tmp_path: Path) -> None:
@@ -503,26 +506,3 @@ def test_a_limits_file_that_lacks_a_joint_is_refused(isolation: Isolation, tmp_p
     output = refused(isolation, '--ros-args', '--params-file', str(path))
     words = rf'joint panda_joint1 is missing .*\(joint_limits: {re.escape(str(limits))}\)'
     assert re.search(words, output), output
-
-
-def test_a_controller_of_a_joint_that_there_is_not_is_refused(
-    isolation: Isolation, tmp_path: Path
-) -> None:
-    """With file and line."""
-    folder = moveit_package('panda', tmp_path)
-    path = folder / 'config' / 'moveit_controllers.yaml'
-    path.write_text(path.read_text().replace('- panda_joint7', '- panda_joint8', 1))
-    output = refused(isolation, '--moveit-config', str(folder))
-    assert re.search(r"moveit_controllers\.yaml:\d+: .*names 'panda_joint8'", output), output
-
-
-def test_execution_can_be_forbidden(isolation: Isolation, tmp_path: Path) -> None:
-    """By MoveIt's parameter and with its words."""
-    path = panda_parameters(tmp_path, allow_trajectory_execution=False)
-    with MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig:
-        server = rig.serve_arm('panda_arm_controller')
-        _status, result = rig.move(action_goal(motion_request(joint_goal(MOVED))))
-        assert result.error_code.val == MoveItErrorCodes.CONTROL_FAILED
-        assert 'allow_trajectory_execution' in result.error_code.message
-        assert not rig.followed
-        server.destroy()

@@ -1,44 +1,42 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""States and paths as messages: nothing is lost, and what is wrong is refused."""
+"""States and paths as messages: nothing is lost."""
 
 from __future__ import annotations
 
-import math
-
 from hypothesis import given
 from hypothesis import strategies as st
-from moveit_msgs.msg import RobotState
+from moveit_msgs.msg import Constraints, JointConstraint
 import numpy as np
 from planning_messages import panda
 import pytest
-from sensor_msgs.msg import JointState
 
 from arm_model import ModelError
 from arm_model.ros import seconds
-from arm_planning import PlanningCode, PlanningError
+from arm_planning import JointGoal
 from arm_planning.ros.joint_trajectory import check_trajectory
+from arm_planning.ros.motion_request import RequestReader
 from arm_planning.ros.path_watch import path_of
 from arm_planning.ros.robot_groups import RobotGroups
-from arm_planning.ros.robot_state import joints_of, trajectory_message
+from arm_planning.ros.robot_state import trajectory_message
+from arm_planning.ros.scene_snapshot import SceneSnapshot
 from arm_trajectory import Path, Segment
 
 JOINTS = panda().joints
 
 
-@pytest.mark.parametrize(
-    ('state', 'words'),
-    [
-        (JointState(name=['elbow'], position=[0.0]), "no joint 'elbow'"),
-        (JointState(name=[JOINTS[0]], position=[math.nan]), 'nan'),
-        (JointState(name=[JOINTS[0]]), '1 names and 0 positions'),
-    ],
-)
-def test_states_that_are_wrong_are_refused(state: JointState, words: str) -> None:
-    """An unknown joint, a position that is no number, or none at all."""
-    with pytest.raises(PlanningError, match=words) as refusal:
-        joints_of(RobotState(joint_state=state), panda().all_joints)
-    assert refusal.value.code is PlanningCode.INVALID_ROBOT_STATE
+def test_a_goal_has_the_tolerance_of_the_nearer_side() -> None:
+    """The joints that it leaves out stay."""
+    model = panda().model('panda_arm')
+    ready = np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785])
+    places = panda().positions(dict(zip(model.joints, ready.tolist(), strict=True)))
+    message = JointConstraint(joint_name=model.joints[0], position=0.5)
+    message.tolerance_above, message.tolerance_below = 0.3, 0.01
+    reader = RequestReader(model, SceneSnapshot(panda().scene), places)
+    goal = reader.goal(Constraints(joint_constraints=[message]))
+    assert isinstance(goal, JointGoal)
+    assert list(goal.positions) == pytest.approx([0.5, *ready[1:]])
+    assert goal.tolerance[0] == pytest.approx(0.01)
 
 
 def test_joints_that_are_not_given_stand_in_their_range() -> None:
@@ -80,13 +78,6 @@ def test_points_of_a_path_are_near_to_each_other_and_make_it() -> None:
         again = path_of(trajectory)
         looks = np.linspace(0.0, path.duration, 500)
         assert again.positions(looks) == pytest.approx(path.positions(looks), abs=1e-6)
-
-
-def test_an_unknown_group_is_refused_with_the_known_ones() -> None:
-    """MoveIt's code for it."""
-    with pytest.raises(PlanningError, match='panda_arm') as refusal:
-        panda().model('legs')
-    assert refusal.value.code is PlanningCode.INVALID_GROUP_NAME
 
 
 def test_a_robot_without_groups_is_refused() -> None:

@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import count, pairwise
+from itertools import count
 from typing import Any
 
-from hypothesis import given
-from hypothesis import strategies as st
 from model_robots import two_arms_texts
 from moveit_msgs.msg import (
     AttachedCollisionObject,
@@ -26,7 +24,6 @@ from arm_planning import PlanningCode, PlanningError
 from arm_planning.ros.planning import PlannedMotion, PlanningThreads
 from arm_planning.ros.robot_groups import RobotGroups
 from arm_planning.ros.scene_monitor import SceneMonitor
-from arm_planning.ros.sequence_request import group_runs
 
 ARMS = {'left_1': 0.0, 'left_2': 0.2, 'left_3': 0.0, 'right_1': 0.0, 'right_2': 1.0}
 STANDING = {'torso': 0.1, **ARMS}
@@ -78,17 +75,6 @@ def planned(thread: PlanningThreads, *items: Any) -> PlannedMotion:
     return thread.prepare_sequence(items)()
 
 
-@given(st.lists(st.sampled_from(['left', 'right', 'both']), min_size=1))
-def test_runs_are_the_items_in_order(groups: list[str]) -> None:
-    """Neighbours of one group are one run."""
-    items = [item(group) for group in groups]
-    runs = group_runs(items)
-    assert [each for run in runs for each in run.items] == items
-    assert all(run.items[0] is items[run.first] for run in runs)
-    names = [run.group for run in runs]
-    assert all(a != b for a, b in pairwise(names))
-
-
 def test_one_trajectory_for_each_change_of_the_group(thread: PlanningThreads) -> None:
     """Each begins where its group ended, and only the joints of its group are in it."""
     plan = planned(thread, left(0.3), left(0.5), right(0.4), left(0.1))
@@ -125,19 +111,6 @@ def test_a_cancel_ends_a_sequence_at_the_next_item(thread: PlanningThreads) -> N
 def test_no_items_are_no_motion(thread: PlanningThreads) -> None:
     """As in MoveIt, which has no objection."""
     assert planned(thread).trajectories == []
-
-
-def test_a_sequence_heeds_path_constraints(thread: PlanningThreads) -> None:
-    """Of its messages, of which each is looked at for its own motion."""
-    limited = left(0.5)
-    bounds = JointConstraint(
-        joint_name='left_1', position=0.4, tolerance_above=0.15, tolerance_below=0.15, weight=1.0
-    )
-    limited.req.path_constraints = Constraints(joint_constraints=[bounds])
-    assert len(planned(thread, left(0.3), limited).trajectories) == 1
-    with pytest.raises(PlanningError, match=r'path constraint .* left_1 is at') as caught:
-        planned(thread, left(0.1), limited)
-    assert caught.value.code is PlanningCode.INVALID_MOTION_PLAN
 
 
 def test_what_is_refused(thread: PlanningThreads) -> None:

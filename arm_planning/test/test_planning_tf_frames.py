@@ -4,21 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import Pose as PoseMessage
-from geometry_msgs.msg import PoseStamped, TransformStamped
+from geometry_msgs.msg import TransformStamped
 from isolation import reserve
-from move_group_rig import motion_request, MoveGroupRig, panda_parameters, pose_goal
-from moveit_msgs.msg import CollisionObject, MoveItErrorCodes, PlanningScene
-from moveit_msgs.srv import ApplyPlanningScene, GetPlanningScene, GetPositionFK, GetPositionIK
+from move_group_rig import HAND, motion_request, MoveGroupRig, panda_parameters, pose_goal
+from moveit_msgs.msg import MoveItErrorCodes
 from planning_messages import box
 import pytest
 from tf2_msgs.msg import TFMessage
 
 from node_runner import LATCHED
+
+pytestmark = pytest.mark.usefixtures('rig')  # an empty scene
 
 
 def transform(parent: str, child: str, x: float, z: float = 0.0, *, turned: bool = False) -> Any:
@@ -53,7 +53,7 @@ class Camera:
                 transforms=[
                     transform('map', f'{prefix}panda_link0', -1.0),
                     transform('map', 'table', 1.0, 0.5),
-                    transform(f'{prefix}panda_link8', 'camera_on_hand', 0.0, 0.1),
+                    transform(f'{prefix}{HAND}', 'camera_on_hand', 0.0, 0.1),
                 ]
             )
         )
@@ -67,12 +67,7 @@ class Camera:
 
     def ik(self, frame: str, x: float, z: float) -> Any:
         """Return the response to compute_ik for a pose in a frame."""
-        request = GetPositionIK.Request()
-        asked = request.ik_request
-        asked.group_name, asked.ik_link_name = 'panda_arm', 'panda_link8'
-        asked.pose_stamped = PoseStamped(pose=down(x, z))
-        asked.pose_stamped.header.frame_id = frame
-        return self.rig.client.call(GetPositionIK, '/compute_ik', request)
+        return self.rig.ik(down(x, z), frame, ik_link_name=HAND)
 
 
 def down(x: float, z: float) -> PoseMessage:
@@ -84,21 +79,9 @@ def down(x: float, z: float) -> PoseMessage:
 
 
 @pytest.fixture(name='camera', scope='module')
-def make_camera(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
-    """Start move_group."""
-    path = panda_parameters(tmp_path_factory.mktemp('robot'))
-    with (
-        reserve() as isolation,
-        MoveGroupRig(isolation, '--ros-args', '--params-file', str(path)) as rig,
-    ):
-        yield Camera(rig)
-
-
-def fk(camera: Camera, state: Any) -> Any:
-    """Return where the flange is in a state."""
-    asked = GetPositionFK.Request(fk_link_names=['panda_link8'], robot_state=state)
-    answer = camera.rig.client.call(GetPositionFK, '/compute_fk', asked)
-    return answer.pose_stamped[0].pose.position
+def make_camera(running_rig: MoveGroupRig) -> Camera:
+    """Return the camera."""
+    return Camera(running_rig)
 
 
 def test_poses_are_taken_in_frames_of_tf(camera: Camera) -> None:
@@ -110,7 +93,7 @@ def test_poses_are_taken_in_frames_of_tf(camera: Camera) -> None:
         if answer.error_code.val != MoveItErrorCodes.SUCCESS:
             assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
             return False
-        place = fk(camera, answer.solution)
+        place = camera.rig.fk(HAND, answer.solution).position
         assert (place.x, place.y, place.z) == pytest.approx((0.5, 0.0, 0.5), abs=1e-4)
         return True
 
@@ -121,7 +104,7 @@ def test_goals_are_taken_in_frames_of_tf(camera: Camera) -> None:
     """A plan to a pose that the camera sees; a frame on the hand is where the hand is."""
     camera.see()
     for frame, pose in (('camera_link', down(1.5, 0.0)), ('camera_on_hand', PoseMessage())):
-        request = motion_request(pose_goal(pose, 'panda_link8', frame))
+        request = motion_request(pose_goal(pose, HAND, frame))
         answer = camera.rig.plan(request)
         assert answer.error_code.val == MoveItErrorCodes.SUCCESS, answer.error_code
 
@@ -130,17 +113,9 @@ def test_objects_are_taken_in_frames_of_tf(camera: Camera) -> None:
     """They come back in the root link."""
     thing = box('cup', 1.4, 0.3, 0.0)
     thing.header.frame_id = 'camera_link'
-    scene = PlanningScene(is_diff=True)
-    scene.robot_state.is_diff = True
-    scene.world.collision_objects = [thing]
     camera.see()
-    apply = ApplyPlanningScene.Request(scene=scene)
-    assert camera.rig.client.call(ApplyPlanningScene, '/apply_planning_scene', apply).success
-    found: CollisionObject
-    answer = camera.rig.client.call(
-        GetPlanningScene, '/get_planning_scene', GetPlanningScene.Request()
-    )
-    (found,) = answer.scene.world.collision_objects
+    camera.rig.add(thing)
+    (found,) = camera.rig.scene().world.collision_objects
     place = found.pose.position
     assert found.header.frame_id == 'panda_link0'
     assert (place.x, place.y, place.z) == pytest.approx((0.6, -0.3, 0.5), abs=1e-9)
@@ -161,9 +136,7 @@ def test_old_and_unknown_frames_are_refused(camera: Camera) -> None:
         )
 
     camera.rig.client.spin_until(is_old, 60.0, 'refusal of an old frame')
-    answer = camera.rig.plan(
-        motion_request(pose_goal(down(1.5, 0.0), 'panda_link8', 'camera_link'))
-    )
+    answer = camera.rig.plan(motion_request(pose_goal(down(1.5, 0.0), HAND, 'camera_link')))
     assert answer.error_code.val == MoveItErrorCodes.FRAME_TRANSFORM_FAILURE
 
 
@@ -179,7 +152,7 @@ def test_links_have_a_prefix_in_tf(tmp_path: Path) -> None:
             answer = camera.ik(frame, x, z)
             if answer.error_code.val != MoveItErrorCodes.SUCCESS:
                 return ()
-            found = fk(camera, answer.solution)
+            found = camera.rig.fk(HAND, answer.solution).position
             return found.x, found.y, found.z
 
         seen = pytest.approx((0.5, 0.0, 0.5), abs=1e-4)

@@ -14,10 +14,8 @@ from arm_trajectory import Path
 from ..constraints import ConstraintCheck
 from ..exceptions import PlanningCode, PlanningError
 from ..validity import ValidityCheck
-from .constrained_check import ConstrainedCheck
 from .motion_check import MotionCheck
-from .rrt_connect import rrt_connect
-from .shortcut import lengths_along, shortened
+from .search import lengths_along, rrt_connect, shortened
 from .timing import timed_path
 
 MAX_TURN = 3.0 * np.pi
@@ -69,7 +67,6 @@ class FreeMotion:
             PlanningError: No path was found in time.
         """
         motions = MotionCheck(self._check, (start, *goals), self._constraints)
-        check = ConstrainedCheck(self._check, self._constraints)
         goals = sorted(goals, key=lambda goal: float(np.linalg.norm(goal - start)))
         direct = float(np.linalg.norm(goals[0] - start))
         searches = MAX_SEARCHES if self._constraints is None else 1
@@ -84,9 +81,9 @@ class FreeMotion:
             places = shortened(places, self._draw, motions, expired)
             length = float(lengths_along(places)[-1])
             if length < shortest:
-                path = timed_path(places, self._limits, check)
+                path = timed_path(places, self._limits, motions)
                 if path is None:
-                    near = check.waypoints(places)
+                    near = motions.waypoints(places)
                     continue
                 found, shortest = path, length
             if len(places) == 2 or length <= MAX_DETOUR_RATIO * direct:

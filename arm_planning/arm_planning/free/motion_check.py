@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Whether straight motions are free, quickly: the search asks it hundreds of times.
+"""Whether motions of a search are free: straight ones quickly, paths with the last word.
 
 Most that are not free are found by a few looks far apart, which pinocchio's broad phase answers
 with yes or no. What passes them is measured by :class:`arm_planning.validity.ValidityCheck`.
@@ -16,9 +16,10 @@ import numpy as np
 import pinocchio as pin
 
 from arm_model import Array
+from arm_trajectory import Path
 
 from ..constraints import ConstraintCheck
-from ..validity import ValidityCheck
+from ..validity import ValidityCheck, Violation
 
 PROBE = 0.25
 """Greatest motion of a shape against another between two looks of the broad phase in [m]."""
@@ -29,7 +30,7 @@ LOOK = 0.03  # turn of all joints together between two looks at constraints in [
 
 
 class MotionCheck:
-    """Collision checks of one search; belongs to one thread."""
+    """Checks of one search: contact, and path constraints; belongs to one thread."""
 
     def __init__(
         self,
@@ -89,6 +90,24 @@ class MotionCheck:
         if self.constraints is not None and not _heeded(self.constraints, begin, way):
             return False
         return self._check.near(begin, end, self._required) is None
+
+    def waypoints(self, places: Array) -> Violation | None:
+        """Return what is wrong with the straight lines between places; None for nothing.
+
+        Args:
+            places: Joint positions in [rad] (m, n).
+        """
+        violation = self._check.waypoints(places)
+        if violation is None and self.constraints is not None:
+            return self.constraints.lines(places)
+        return violation
+
+    def path(self, path: Path) -> Violation | None:
+        """Return what is wrong with a path; None for nothing."""
+        violation = self._check.path(path)
+        if violation is None and self.constraints is not None:
+            return self.constraints.path(path)
+        return violation
 
     def towards(self, begin: Array, target: Array) -> Array | None:
         """Return the next state on a motion that heeds the constraints; None where it ends.

@@ -16,7 +16,7 @@ import numpy as np
 from arm_model import Array, JointLimits, RobotState
 from arm_trajectory import build_path, GoalError, GoalPoint, GoalRules, Path, TrajectoryGoal
 
-from .constrained_check import ConstrainedCheck
+from .motion_check import MotionCheck
 
 ROUNDING_ROOM = 1.02  # factor of the least times, so that rounding errors break no limit
 RULES = GoalRules()  # of the trajectories that are made here
@@ -26,7 +26,7 @@ MIN_SEGMENT = 1e-3  # least time of a part of a path in [s]
 MIN_DURATION = 0.01  # time for a motion between two places at least in [s]
 
 
-def timed_path(places: Array, limits: JointLimits, check: ConstrainedCheck) -> Path | None:
+def timed_path(places: Array, limits: JointLimits, check: MotionCheck) -> Path | None:
     """Return a valid path along places; None where none is found.
 
     Args:

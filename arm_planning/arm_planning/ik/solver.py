@@ -22,7 +22,7 @@ from arm_model import (
     RobotModel,
 )
 
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from .closed_form import ClosedForm, WristMiss
 from .link_kinematics import LinkKinematics, pose_error
 from .numeric import descend, Descent, random_start
@@ -103,10 +103,10 @@ class IkSolver:
 
         Raises:
             PlanningError: There is no solution: the pose is out of reach, joints would be beyond
-                their limits, or the arm would be in contact.
-            CommandError: A number is not finite, or there are too few or too many.
+                their limits, or the arm would be in contact; or a number is not finite.
         """
-        seed = checked(seed, len(self._limits), 'seed')
+        with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
+            seed = checked(seed, len(self._limits), 'seed')
         check_pose(pose)
         if self.closed_form is not None:
             found = self._exact(self.closed_form, pose, seed)
@@ -237,11 +237,11 @@ def check_pose(pose: Pose) -> None:
     """Refuse a pose that is none.
 
     Raises:
-        PlanningError: The rotation is none.
-        CommandError: A number is not finite, or there are too few or too many.
+        PlanningError: The rotation is none, or a number is not finite.
     """
-    checked(pose.position, 3, 'position of the pose')
-    checked(np.ravel(pose.rotation), 9, 'rotation of the pose')
+    with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
+        checked(pose.position, 3, 'position of the pose')
+        checked(np.ravel(pose.rotation), 9, 'rotation of the pose')
     rotation = np.asarray(pose.rotation)
     off = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if off > ORTHOGONAL_TOLERANCE or np.linalg.det(rotation) < 0.0:

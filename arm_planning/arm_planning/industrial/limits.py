@@ -69,17 +69,3 @@ class CartesianLimits:
     def radius(self) -> float:
         """Way in [m] that takes as long as a rotation of 1 rad."""
         return self.max_trans_vel / self.max_rot_vel
-
-
-def check_scaling(velocity: float, acceleration: float) -> None:
-    """Refuse factors that are not in Pilz' range.
-
-    Raises:
-        PlanningError: One is not.
-    """
-    for name, value in (('velocity', velocity), ('acceleration', acceleration)):
-        if not MIN_SCALING <= value <= 1.0:
-            raise PlanningError(
-                PlanningCode.INVALID_MOTION_PLAN,
-                f'{name} scaling is {value}; choose one from {MIN_SCALING} to 1',
-            )

@@ -5,20 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-import time
+from dataclasses import replace
 
 import numpy as np
 
-from arm_model import Array, checked, frozen, JointLimits, Pose, RobotModel
-from arm_trajectory import farthest_beyond, Path
+from arm_model import Array, checked, frozen, Pose, RobotModel
+from arm_trajectory import Path
 
 from ..constraints import ConstraintCheck
 from ..curves import arc_around, arc_through, Curve, Line
-from ..exceptions import PlanningCode, PlanningError
+from ..exceptions import coded, PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
 from ..ik.solver import check_pose, IkSolver
-from ..link_speed import speed_limited
 from ..requests import (
+    check_scaling,
     CircPoint,
     CircPointKind,
     Goal,
@@ -27,17 +27,15 @@ from ..requests import (
     MotionRequest,
     PoseGoal,
 )
+from ..retime import FullSpeedPath, speed_limited, timed
 from ..validity import ValidityCheck
-from .following import curve_path
-from .limits import CartesianLimits, check_scaling
-from .ptp import ptp_path
+from .limits import CartesianLimits, MIN_SCALING
+from .motions import curve_path, ptp_path
 from .sequence import check_overlap, check_radii, joined, SequenceItem
-from .timing import FullSpeedPath, timed
 
 PTP, LIN, CIRC = 'PTP', 'LIN', 'CIRC'
 
 PLANNER_IDS = (PTP, LIN, CIRC)  # names of the planners, as Pilz' planner has them
-RANGE_TOLERANCE = 1e-6  # how far a start or a goal may be beyond a limit for rounding in [rad]
 
 GOAL_TOLERANCE = 1e-3
 """How far from the goal's joint positions a line may end in [rad], as in Pilz' planner."""
@@ -51,46 +49,38 @@ class IndustrialPlanner:
     def __init__(
         self,
         model: RobotModel,
-        limits: CartesianLimits | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        limits: CartesianLimits | None,
+        solver: Callable[[str], IkSolver],
     ) -> None:
         """Prepare.
 
         Args:
             limits: Limits of a link's motion; None has the defaults.
-            clock: Steady time in [s], for time-outs of inverse kinematics.
+            solver: Returns the inverse kinematics of a link; of the tip for an empty name.
         """
-        self._model, self._clock = model, clock
+        self._model, self._solver = model, solver
         self._limits = CartesianLimits() if limits is None else limits
-        self._solvers: dict[str, IkSolver] = {}
 
-    def plan(self, request: MotionRequest, check: ValidityCheck | None = None) -> MotionPlan:
-        """Return the motion of a request.
-
-        Args:
-            check: Finds contact in a scene; None does not look.
+    def plan(self, request: MotionRequest, check: ValidityCheck) -> MotionPlan:
+        """Return the motion of a request to the first of its goals that can be reached.
 
         Raises:
             PlanningError: There is none; the message says why and where.
         """
-        start = self._start(request, check)
+        start = check.start(request.start)
         problems: list[PlanningError] = []
         for goal in request.goals:
-            plan = self._tried(request, start, goal, check)
-            if isinstance(plan, MotionPlan):
-                return plan
-            problems.append(plan)
-        if not problems:
-            raise PlanningError(
-                PlanningCode.INVALID_GOAL_CONSTRAINTS, f'{request.planner_id}: no goal; give one'
-            )
+            found = self._tried(request, start, goal, check)
+            if isinstance(found, MotionPlan):
+                return found
+            problems.append(found)
         if len(problems) == 1:
             raise problems[0]
         reasons = '; '.join(f'goal {n}: {error}' for n, error in enumerate(problems))
         raise PlanningError(problems[0].code, reasons) from problems[0]
 
     def _tried(
-        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck | None
+        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck
     ) -> MotionPlan | PlanningError:
         """Return the motion to a goal, or why there is none."""
         try:
@@ -100,7 +90,7 @@ class IndustrialPlanner:
             return error
 
     def plan_sequence(
-        self, items: Sequence[SequenceItem], check: ValidityCheck | None = None, first: int = 0
+        self, items: Sequence[SequenceItem], check: ValidityCheck, first: int = 0
     ) -> MotionPlan:
         """Return one motion through a sequence, with stops where a blend radius is 0.
 
@@ -109,7 +99,6 @@ class IndustrialPlanner:
 
         Args:
             items: The motions; each has one goal, and begins where the one before ends.
-            check: Finds contact in a scene; None does not look.
             first: Number of the first item, for messages.
 
         Raises:
@@ -122,8 +111,14 @@ class IndustrialPlanner:
         for number, item in enumerate(items, first):
             request = item.at(start)
             if start is None:
-                start = self._start(request, check)
-            full, link = self._item(number, request, start, check)
+                start = check.start(request.start)
+            with coded(place=f'sequence: item {number}'):
+                if len(request.goals) != 1:
+                    raise PlanningError(
+                        PlanningCode.INVALID_GOAL_CONSTRAINTS,
+                        f'has {len(request.goals)} goals; give one',
+                    )
+                full, link = self._full(request, start, request.goals[0], check)
             group.append((request, full, link, item.blend_radius))
             start = full.path.end.position
             if item.blend_radius == 0.0:
@@ -135,25 +130,11 @@ class IndustrialPlanner:
         notes = tuple(note for plan in plans for note in plan.notes)
         return MotionPlan(path, request.planner_id, notes)
 
-    def _item(
-        self, number: int, request: MotionRequest, start: Array, check: ValidityCheck | None
-    ) -> tuple[FullSpeedPath, LinkKinematics]:
-        """Return the path of an item at full speed, and the link that it moves."""
-        if len(request.goals) != 1:
-            raise PlanningError(
-                PlanningCode.INVALID_GOAL_CONSTRAINTS,
-                f'sequence: item {number} has {len(request.goals)} goals; give one',
-            )
-        try:
-            return self._full(request, start, request.goals[0], check)
-        except PlanningError as error:
-            raise PlanningError(error.code, f'sequence: item {number}: {error}') from error
-
     def _group(
         self,
         group: Sequence[tuple[MotionRequest, FullSpeedPath, LinkKinematics, float]],
         first: int,
-        check: ValidityCheck | None,
+        check: ValidityCheck,
     ) -> MotionPlan:
         """Return the motion of items without a stop between them."""
         requests, parts, links, radii = zip(*group, strict=True)
@@ -171,67 +152,54 @@ class IndustrialPlanner:
         return self._finished(joined(parts, radii, link, first), requests, link, check)
 
     def _full(
-        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck | None
+        self, request: MotionRequest, start: Array, goal: Goal, check: ValidityCheck
     ) -> tuple[FullSpeedPath, LinkKinematics]:
         """Return the path at full speed to a goal, and the link that it moves.
 
         Raises:
             PlanningError: The goal is out of reach, or the way there cannot be followed.
         """
-        factors = request.velocity_scaling, request.acceleration_scaling
-        check_scaling(*factors)
-        limits = self._model.limits
-        joints = limits.scaled(*factors)
-        if isinstance(goal, JointGoal):
-            there = limits.in_nearest_turn(self._checked(goal.positions, 'goal'), start)
-            goal = JointGoal(frozen(there), goal.tolerance)
-        solver = self._solver(goal.link if isinstance(goal, PoseGoal) else '')
-        if request.planner_id == PTP:
-            end = self._joints(goal, start, solver, check)
-            return ptp_path(start, end, joints), solver.link
-        if request.planner_id not in PLANNER_IDS:
+        name = request.planner_id
+        if name not in PLANNER_IDS:
             raise PlanningError(
                 PlanningCode.PLANNING_FAILED,
-                f'no planner {request.planner_id!r}; choose one of {", ".join(PLANNER_IDS)}',
+                f'no planner {name!r}; choose one of {", ".join(PLANNER_IDS)}',
             )
-        curve = self._curve(request, start, goal, solver.link)
+        check_scaling(request, MIN_SCALING)
+        factors = request.velocity_scaling, request.acceleration_scaling
+        joints = self._model.limits.scaled(*factors)
+        if isinstance(goal, JointGoal):
+            goal = JointGoal(self._checked(goal.positions, start, check), goal.tolerance)
+        else:
+            check_pose(goal.pose)
+        solver = self._solver(goal.link if isinstance(goal, PoseGoal) else '')
+        link = solver.link
+        if name == PTP:
+            if isinstance(goal, JointGoal):
+                end = goal.positions
+            else:
+                end = solver.solve(goal.pose, start, check.scene)[0]
+            return ptp_path(start, end, joints), link
+        begin = link.pose(start)
+        pose = link.pose(goal.positions) if isinstance(goal, JointGoal) else goal.pose
+        curve = Line(begin, pose) if name == LIN else _arc(begin, request.via, pose)
         try:
-            full = curve_path(
-                solver.link,
-                curve,
-                start,
-                joints,
-                self._limits,
-                factors=factors,
-                name=request.planner_id,
-            )
+            full = curve_path(link, curve, start, joints, self._limits, factors=factors, name=name)
         except PlanningError:
             if isinstance(goal, PoseGoal):  # on the way out of reach an arm looks singular
                 solver.solve(goal.pose, start)
             raise
         if isinstance(goal, JointGoal):
-            full = self._ends_at(full, goal, request.planner_id)
-        return full, solver.link
+            full = self._ends_at(full, goal, name)
+        return full, link
 
-    def _curve(
-        self, request: MotionRequest, start: Array, goal: Goal, link: LinkKinematics
-    ) -> Curve:
-        begin = link.pose(start)
-        if isinstance(goal, JointGoal):
-            end = link.pose(goal.positions)
-        else:
-            check_pose(goal.pose)
-            end = goal.pose
-        if request.planner_id == LIN:
-            return Line(begin, end)
-        return _arc(begin, request.via, end)
-
-    def _joints(
-        self, goal: Goal, start: Array, solver: IkSolver, check: ValidityCheck | None
-    ) -> Array:
-        if isinstance(goal, JointGoal):
-            return goal.positions
-        return solver.solve(goal.pose, start, None if check is None else check.scene)[0]
+    def _checked(self, positions: Array, start: Array, check: ValidityCheck) -> Array:
+        """Return the positions of a goal in the turns that are nearest to the start."""
+        with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
+            found = checked(positions, len(self._model), 'goal')
+        if (beyond := check.beyond(found)) is not None:
+            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, f'goal: {beyond.reason}')
+        return frozen(self._model.limits.in_nearest_turn(found, start))
 
     def _ends_at(self, full: FullSpeedPath, goal: JointGoal, name: str) -> FullSpeedPath:
         """Compare the end of a line with the joints of its goal: only the pose leads there."""
@@ -249,14 +217,14 @@ class IndustrialPlanner:
                 PlanningCode.GOAL_CONSTRAINTS_VIOLATED,
                 f'{words}: the goal is another configuration; use PTP',
             )
-        return FullSpeedPath(full.path, full.acceleration, full.jerk, notes=(*full.notes, words))
+        return replace(full, notes=(*full.notes, words))
 
     def _finished(
         self,
         full: FullSpeedPath,
         requests: Sequence[MotionRequest],
         link: LinkKinematics,
-        check: ValidityCheck | None,
+        check: ValidityCheck,
     ) -> MotionPlan:
         """Return the motion with its times, checked."""
         limits = self._model.limits.scaled(
@@ -264,29 +232,20 @@ class IndustrialPlanner:
             min(each.acceleration_scaling for each in requests),
         )
         path, notes = timed(full, limits)
-        for request in requests:
-            limited = self._solver(request.cartesian_speed_link).link
-            path, slowed = speed_limited(path, limited, request.max_cartesian_speed)
+        for each in requests:
+            speed, moved = each.max_cartesian_speed, each.cartesian_speed_link
+            path, slowed = speed_limited(path, speed, moved, self._solver)
             notes = (*notes, *slowed)
-        self._check_range(path, limits, requests[-1].planner_id)
-        if check is not None:
-            _check_contact(path, check, link, requests[-1].planner_id)
-        self._check_constraints(path, requests)
-        return MotionPlan(path, requests[-1].planner_id, notes)
-
-    def _check_range(self, path: Path, limits: JointLimits, name: str) -> None:
-        begin = path.at(0.0).position
-        beyond = farthest_beyond(
-            path, np.minimum(limits.lower, begin), np.maximum(limits.upper, begin)
-        )
-        if beyond is not None:
-            joint = beyond.joint
+        name = requests[-1].planner_id
+        if (violation := check.path(path)) is not None:
+            x, y, z = link.pose(violation.positions).position
             raise PlanningError(
-                PlanningCode.PLANNING_FAILED,
-                f'{name}: {limits.names[joint]} would be at {beyond.position:.4f} at'
-                f' {beyond.time:.2f} s, beyond its limits {limits.lower[joint]:.4f}..'
-                f'{limits.upper[joint]:.4f}',
+                PlanningCode.INVALID_MOTION_PLAN,
+                f'{name}: {violation.reason}, {violation.time / path.duration:.0%} of the time'
+                f' into it, with {link.link} at ({x:.3f}, {y:.3f}, {z:.3f})',
             )
+        self._check_constraints(path, requests)
+        return MotionPlan(path, name, notes)
 
     def _check_constraints(self, path: Path, requests: Sequence[MotionRequest]) -> None:
         remedy = 'plan it as a free motion, or widen the constraint'
@@ -306,46 +265,6 @@ class IndustrialPlanner:
                     f' way: {broken.reason}; {remedy}',
                 )
 
-    def _start(self, request: MotionRequest, check: ValidityCheck | None) -> Array:
-        start = checked(request.start, len(self._model), 'start')
-        self._refuse_beyond(start, 'start', PlanningCode.START_STATE_INVALID)
-        if check is not None:
-            check.refuse_start(start)
-        return start
-
-    def _checked(self, positions: Array, what: str) -> Array:
-        found = checked(positions, len(self._model), what)
-        self._refuse_beyond(found, what, PlanningCode.INVALID_GOAL_CONSTRAINTS)
-        return found
-
-    def _refuse_beyond(self, positions: Array, what: str, code: PlanningCode) -> None:
-        limits = self._model.limits
-        beyond = np.maximum(limits.lower - positions, positions - limits.upper)
-        joint = int(beyond.argmax())
-        if beyond[joint] > RANGE_TOLERANCE:
-            raise PlanningError(
-                code,
-                f'{what}: {limits.names[joint]} at {positions[joint]:.4f} is beyond its limits'
-                f' {limits.lower[joint]:.4f}..{limits.upper[joint]:.4f}',
-            )
-
-    def _solver(self, link: str) -> IkSolver:
-        name = link or self._model.tip
-        if name not in self._solvers:
-            self._solvers[name] = IkSolver(self._model, name, self._clock)
-        return self._solvers[name]
-
-
-def _check_contact(path: Path, check: ValidityCheck, link: LinkKinematics, name: str) -> None:
-    near = check.contact(path)
-    if near is not None:
-        x, y, z = link.pose(near.positions).position
-        raise PlanningError(
-            PlanningCode.INVALID_MOTION_PLAN,
-            f'{name}: {near.reason}, {near.time / path.duration:.0%} of the time into it, with'
-            f' {link.link} at ({x:.3f}, {y:.3f}, {z:.3f})',
-        )
-
 
 def _arc(begin: Pose, via: CircPoint | None, end: Pose) -> Curve:
     if via is None:
@@ -353,7 +272,8 @@ def _arc(begin: Pose, via: CircPoint | None, end: Pose) -> Curve:
             PlanningCode.INVALID_MOTION_PLAN,
             'CIRC: no interim or center point; give one as path constraint',
         )
-    point = checked(via.position, 3, 'CIRC: point of the circle')
+    with coded(PlanningCode.INVALID_GOAL_CONSTRAINTS):
+        point = checked(via.position, 3, 'CIRC: point of the circle')
     if via.kind is CircPointKind.INTERIM:
         return arc_through(begin, point, end)
     return arc_around(begin, point, end)

@@ -22,7 +22,7 @@ from arm_trajectory import Path, quintics, Segment
 from ..exceptions import PlanningCode, PlanningError
 from ..ik.link_kinematics import LinkKinematics
 from ..requests import MotionRequest
-from .timing import FullSpeedPath
+from ..retime import FullSpeedPath
 
 SAMPLES = 65  # places at which a motion, or a blend, is looked at
 MAX_BISECTIONS = 40  # steps to the place at which a motion crosses a sphere

@@ -1,129 +1,94 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of MoveIt's move_group that count here, by their names: what they must be."""
+"""Parameters of MoveIt's move_group that have an effect here, by their names, and their values."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 import difflib
+from functools import cache
 import math
 import re
+from typing import Any, NamedTuple
 
 from ..exceptions import ConfigError
 from .yaml_file import Place
 
-LIMITS = 'robot_description_planning.joint_limits'
-CARTESIAN = 'robot_description_planning.cartesian_limits'
-KINEMATICS = 'robot_description_kinematics'
-MANAGER = 'moveit_simple_controller_manager'
 PLANNING = 'robot_description_planning.'
+LIMITS, CARTESIAN = f'{PLANNING}joint_limits', f'{PLANNING}cartesian_limits'
+KINEMATICS = 'robot_description_kinematics'
+MANAGER, EXECUTION = 'moveit_simple_controller_manager', 'trajectory_execution'
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
-    """A parameter, or several alike."""
+class Kind(NamedTuple):
+    """What a value must be."""
 
-    pattern: str  # its name; ``*`` is one key, ``**`` one or more
-    needed: str = ''  # what its value must be, in words; empty for anything
-    fits: Callable[[object], bool] = lambda _: True  # whether a value is that
-
-    def matches(self, name: str) -> bool:
-        """Return whether a name is one of these."""
-        keys = re.escape(self.pattern).replace(r'\*\*', '.+').replace(r'\*', '[^.]+')
-        return re.fullmatch(keys, name) is not None
+    words: str  # in words
+    fits: Callable[[Any], bool]  # whether a value is that
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def number(pattern: str, least: float = -math.inf, most: float = math.inf) -> Known:
-    """Return a number within bounds."""
-    bounds = f' of {least:g} to {most:g}' if math.isfinite(most) else f' of {least:g} or more'
-    words = f'a number{bounds}' if math.isfinite(least) else 'a number'
-    return Known(
-        pattern,
-        words,
-        lambda value: _is_number(value) and least <= value <= most,  # type: ignore[operator]
-    )
-
-
-def factor(pattern: str) -> Known:
-    """Return a factor of limits."""
-    words = 'a number above 0, up to 1'
-    return Known(pattern, words, lambda value: _is_number(value) and 0.0 < value <= 1.0)  # type: ignore[operator]
-
-
-def signed(pattern: str, sign: float) -> Known:
-    """Return a number that is positive, or negative."""
-    words = 'a positive number' if sign > 0 else 'a negative number'
-    return Known(pattern, words, lambda value: _is_number(value) and value * sign > 0.0)  # type: ignore[operator]
-
-
-def flag(pattern: str) -> Known:
-    """Return parameters that are on or off."""
-    return Known(pattern, 'true or false', lambda value: isinstance(value, bool))
-
-
-def text(pattern: str) -> Known:
-    """Return parameters with a string, whatever is in it."""
-    return Known(pattern, 'a text', lambda value: isinstance(value, str))
-
-
-def texts(pattern: str) -> Known:
-    """Return parameters with strings in order."""
+def _in(least: float, most: float = math.inf, *, beyond: bool = False) -> Callable[[Any], bool]:
+    """Return whether a value is a number within bounds, or beyond the least one only."""
 
     def fits(value: object) -> bool:
-        is_list = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-        return is_list and all(isinstance(each, str) for each in value)  # type: ignore[attr-defined]
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (is_number and math.isfinite(value)):  # type: ignore[arg-type]
+            return False
+        return least <= value <= most and not (beyond and value == least)  # type: ignore[operator]
 
-    return Known(pattern, 'a list of texts', fits)
+    return fits
 
 
-KNOWN: Sequence[Known] = (
-    text('robot_description'),
-    text('robot_description_semantic'),
-    number(f'{KINEMATICS}.*.kinematics_solver_timeout', 0.0),
-    factor('robot_description_planning.default_velocity_scaling_factor'),
-    factor('robot_description_planning.default_acceleration_scaling_factor'),
-    *(
-        flag(f'{LIMITS}.*.has_{kind}_limits')
-        for kind in ('position', 'velocity', 'acceleration', 'jerk', 'deceleration', 'effort')
-    ),
-    flag(f'{LIMITS}.*.angle_wraparound'),
-    *(
-        number(f'{LIMITS}.*.{key}')
-        for key in (
-            *('min_position', 'max_position', 'max_velocity', 'max_acceleration'),
-            *('max_deceleration', 'max_jerk', 'max_effort'),
-        )
-    ),
-    signed(f'{CARTESIAN}.max_trans_vel', 1.0),
-    signed(f'{CARTESIAN}.max_trans_acc', 1.0),
-    signed(f'{CARTESIAN}.max_trans_dec', -1.0),
-    signed(f'{CARTESIAN}.max_rot_vel', 1.0),
-    texts('planning_pipelines'),
-    texts('planning_pipelines.pipeline_names'),
-    text('default_planning_pipeline'),
-    text('ompl.planner_configs.*.type'),
-    texts('ompl.*.planner_configs'),
-    text('ompl.*.default_planner_config'),
-    text('pilz_industrial_motion_planner.default_planner_config'),
-    texts(f'{MANAGER}.controller_names'),
-    text(f'{MANAGER}.*.type'),
-    text(f'{MANAGER}.*.action_ns'),
-    flag(f'{MANAGER}.*.default'),
-    texts(f'{MANAGER}.*.joints'),
-    text(f'{MANAGER}.*.command_joint'),
-    number(f'{MANAGER}.*.max_effort', 0.0),
-    number('trajectory_execution.allowed_start_tolerance', 0.0),
-    number('trajectory_execution.allowed_execution_duration_scaling', 1.0),
-    number('trajectory_execution.allowed_goal_duration_margin', 0.0),
-    flag('trajectory_execution.execution_duration_monitoring'),
-    flag('allow_trajectory_execution'),
+TEXT = Kind('a text', lambda value: isinstance(value, str))
+FLAG = Kind('true or false', lambda value: isinstance(value, bool))
+TEXTS = Kind(
+    'a list of texts',
+    lambda value: isinstance(value, list | tuple) and all(isinstance(each, str) for each in value),
 )
-"""All of them; the first that matches counts."""
+NUMBER = Kind('a number', _in(-math.inf))
+FACTOR = Kind('a number above 0, up to 1', _in(0.0, 1.0, beyond=True))
+POSITIVE = Kind('a positive number', _in(0.0, beyond=True))
+NEGATIVE = Kind('a negative number', lambda value: NUMBER.fits(value) and value < 0.0)
+FROM_ZERO = Kind('a number of 0 or more', _in(0.0))
+FROM_ONE = Kind('a number of 1 or more', _in(1.0))
+
+_LIMITED = ('position', 'velocity', 'acceleration', 'jerk', 'deceleration', 'effort')
+_BOUNDS = ('min_position', *(f'max_{each}' for each in _LIMITED))
+
+KNOWN: Mapping[str, Kind] = {
+    'robot_description': TEXT,
+    'robot_description_semantic': TEXT,
+    f'{KINEMATICS}.*.kinematics_solver_timeout': FROM_ZERO,
+    f'{PLANNING}default_velocity_scaling_factor': FACTOR,
+    f'{PLANNING}default_acceleration_scaling_factor': FACTOR,
+    **{f'{LIMITS}.*.has_{each}_limits': FLAG for each in _LIMITED},
+    **{f'{LIMITS}.*.{each}': NUMBER for each in _BOUNDS},
+    f'{LIMITS}.*.angle_wraparound': FLAG,
+    f'{CARTESIAN}.max_trans_vel': POSITIVE,
+    f'{CARTESIAN}.max_trans_acc': POSITIVE,
+    f'{CARTESIAN}.max_trans_dec': NEGATIVE,
+    f'{CARTESIAN}.max_rot_vel': POSITIVE,
+    'planning_pipelines': TEXTS,
+    'planning_pipelines.pipeline_names': TEXTS,
+    'default_planning_pipeline': TEXT,
+    'ompl.planner_configs.*.type': TEXT,
+    'ompl.*.planner_configs': TEXTS,
+    'ompl.*.default_planner_config': TEXT,
+    'pilz_industrial_motion_planner.default_planner_config': TEXT,
+    f'{MANAGER}.controller_names': TEXTS,
+    f'{MANAGER}.*.type': TEXT,
+    f'{MANAGER}.*.action_ns': TEXT,
+    f'{MANAGER}.*.default': FLAG,
+    f'{MANAGER}.*.joints': TEXTS,
+    f'{MANAGER}.*.command_joint': TEXT,
+    f'{MANAGER}.*.max_effort': FROM_ZERO,
+    f'{EXECUTION}.allowed_start_tolerance': FROM_ZERO,
+    f'{EXECUTION}.allowed_execution_duration_scaling': FROM_ONE,
+    f'{EXECUTION}.allowed_goal_duration_margin': FROM_ZERO,
+    f'{EXECUTION}.execution_duration_monitoring': FLAG,
+    'allow_trajectory_execution': FLAG,
+}
+"""Names, in which ``*`` is one key; the first that matches counts."""
 
 WITHOUT_EFFECT = frozenset(
     {
@@ -132,7 +97,7 @@ WITHOUT_EFFECT = frozenset(
         *('publish_robot_description', 'publish_robot_description_semantic'),
     }
 )
-"""Keys of MoveIt that do not count here and look like some that do."""
+"""Keys of MoveIt that have no effect here and look like some that have."""
 
 ALIKE = 0.8  # how much a key that is misspelt resembles the right one, of 1
 
@@ -140,9 +105,15 @@ CLOSED = (f'{LIMITS}.', f'{CARTESIAN}.')
 """Tables whose keys are all known: another one is misspelt."""
 
 
-def known_of(name: str) -> Known | None:
-    """Return what is known of a name."""
-    return next((each for each in KNOWN if each.matches(name)), None)
+@cache
+def _pattern(name: str) -> re.Pattern[str]:
+    return re.compile(re.escape(name).replace(r'\*', '[^.]+'))
+
+
+def known_of(name: str) -> Kind | None:
+    """Return what the value of a parameter must be; None for a name that has no effect."""
+    found = (kind for known, kind in KNOWN.items() if _pattern(known).fullmatch(name))
+    return next(found, None)
 
 
 def at(name: str, places: Mapping[str, Place]) -> str:
@@ -161,10 +132,10 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
         ConfigError: There is one; the message has its place, its name and what it must be.
     """
     for name, value in values.items():
-        found = known_of(name)
-        if found is not None:
-            if not found.fits(value):
-                raise ConfigError(f'{at(name, places)} is {value!r}; it must be {found.needed}')
+        kind = known_of(name)
+        if kind is not None:
+            if not kind.fits(value):
+                raise ConfigError(f'{at(name, places)} is {value!r}; it must be {kind.words}')
         elif name.startswith(PLANNING):
             table, _, key = name.rpartition('.')
             close = _meant(name)
@@ -175,8 +146,8 @@ def check(values: Mapping[str, object], places: Mapping[str, Place]) -> None:
 
 def _keys(table: str) -> list[str]:
     """Return the keys that are known in a table."""
-    keys = [each.pattern.rpartition('.') for each in KNOWN]
-    return [key for above, _, key in keys if above and Known(above).matches(table)]
+    keys = [name.rpartition('.') for name in KNOWN]
+    return [key for above, _, key in keys if above and _pattern(above).fullmatch(table)]
 
 
 def _meant(name: str) -> str:

@@ -25,9 +25,9 @@ from pathlib import Path
 from urdf_reader import DescriptionError, expand_xacro, find_package, MeshFileError
 
 from ..exceptions import ConfigError
+from .known import PLANNING
 from .yaml_file import FlatYaml, Place, read_flat
 
-PLANNING = 'robot_description_planning.'
 FILES: Sequence[tuple[Sequence[str], str]] = (
     (('kinematics.yaml',), 'robot_description_kinematics.'),
     (('joint_limits.yaml',), PLANNING),

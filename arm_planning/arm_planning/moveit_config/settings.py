@@ -8,13 +8,49 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..exceptions import ConfigError
-from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, MANAGER
-from .planner_configs import PlannerConfigs
+from .known import at, CARTESIAN, check, KINEMATICS, LIMITS, MANAGER, PLANNING
 from .yaml_file import Place
 
-PLANNING = 'robot_description_planning'
 TIMEOUT = 'kinematics_solver_timeout'
+TYPE = 'type'  # key of what searches, in a planner configuration
 PIPELINES = ('ompl', 'pilz_industrial_motion_planner')  # planning pipelines that are here
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerConfigs:
+    """Names under which clients ask for planners, as ompl_planning.yaml has them."""
+
+    # entries of each configuration, by its name
+    configs: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    # names of the configurations of each group
+    groups: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    # that of a group whose requests name none
+    defaults: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def ids(self) -> Sequence[str]:
+        """Names as MoveIt lists them: the group, and the group with each configuration."""
+        return [
+            name
+            for group, configs in self.groups.items()
+            for name in (group, *(f'{group}[{config}]' for config in configs))
+        ]
+
+    def name(self, planner_id: str, group: str) -> str:
+        """Return the name of a configuration.
+
+        Args:
+            planner_id: What a request has: the name, ``group[name]``, the group, or nothing.
+        """
+        name = planner_id.removeprefix(f'{group}[').removesuffix(']')
+        return self.defaults.get(group, '') if name in {'', group} else name
+
+    def search(self, name: str) -> str:
+        """Return what searches by a configuration, by OMPL's name; empty where it is unknown."""
+        listed = {each for names in self.groups.values() for each in names}
+        if not self.configs and name in listed:  # by the names of MoveIt's own configurations
+            return f'geometric::{name.removesuffix("ConfigDefault").removesuffix("k")}'
+        return str(self.configs.get(name, {}).get(TYPE, ''))
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +84,7 @@ def read_settings(
     """
     places = places or {}
     check(values, places)
-    defaults = _below(values, PLANNING)
+    defaults = _below(values, PLANNING.rstrip('.'))
     has_limits = LIMITS in places or any(name.startswith(f'{LIMITS}.') for name in values)
     listed = values.get('sensors')
     sensors = [str(each) for each in listed] if isinstance(listed, list | tuple) else []

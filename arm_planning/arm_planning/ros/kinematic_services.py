@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache, partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -12,21 +13,19 @@ from moveit_msgs.srv import GetCartesianPath, GetPositionIK
 import numpy as np
 from rclpy.node import Node
 
-from arm_model import Array, CommandError, PlanningScene, RobotModel
+from arm_model import Array, PlanningScene, RobotModel
 from arm_model.ros import seconds
 from arm_trajectory import Path
 
-from ..cartesian_path import cartesian_path, JumpThresholds, timed_rows
+from ..cartesian_path import cartesian_path, JumpThresholds
 from ..constraints import ConstraintCheck
 from ..exceptions import PlanningCode, PlanningError
-from ..ik.link_kinematics import LinkKinematics
 from ..ik.solver import DEFAULT_TIMEOUT, IkSolver
-from ..link_speed import speed_limited
 from ..moveit_config.settings import MoveItSettings
+from ..retime import speed_limited, timed_rows
 from ..validity import ValidityCheck
 from .background import Background, error_code
 from .motion_request import RequestReader, scaling_factor
-from .robot_groups import RobotGroups
 from .robot_state import state_message, trajectory_message
 from .scene_changes import scene_for
 from .scene_monitor import SceneMonitor
@@ -34,6 +33,8 @@ from .scene_snapshot import SceneSnapshot
 
 CANDIDATES = 8
 """Solutions of inverse kinematics among which one that heeds constraints is looked for."""
+
+MAX_SOLVERS = 16  # links of groups, with the joints beside them in one place, that are kept
 
 
 class KinematicServices:
@@ -46,19 +47,21 @@ class KinematicServices:
         background: Background,
         settings: MoveItSettings | None = None,
     ) -> None:
-        self._node, self._monitor = node, monitor
-        self._kinematics = GroupKinematics(monitor.robot, settings)
-        background.serve(GetPositionIK, 'compute_ik', self._ik, _refuse)
+        self._node, self._monitor, self._robot = node, monitor, monitor.robot
+        self._settings = settings or MoveItSettings()
+        self._solver = lru_cache(maxsize=MAX_SOLVERS)(IkSolver)
         background.serve(
-            GetCartesianPath, 'compute_cartesian_path', self._cartesian_path, _refuse_path
+            GetPositionIK,
+            'compute_ik',
+            lambda asked: self._prepared(self._ik, asked.ik_request, asked.ik_request.robot_state),
+            _refuse,
         )
-
-    def _ik(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401  # messages have no type
-        asked = request.ik_request
-        return self._prepared(self._kinematics.ik, asked, asked.robot_state)
-
-    def _cartesian_path(self, request: Any) -> Callable[[], Any]:  # noqa: ANN401
-        return self._prepared(self._kinematics.cartesian_path, request, request.start_state)
+        background.serve(
+            GetCartesianPath,
+            'compute_cartesian_path',
+            lambda asked: self._prepared(self._cartesian_path, asked, asked.start_state),
+            _refuse_path,
+        )
 
     def _prepared(self, answer: Any, request: Any, state: Any) -> Callable[[], Any]:  # noqa: ANN401
         """Return what answers from the scene and the joints as they are now."""
@@ -72,15 +75,7 @@ class KinematicServices:
 
         return stamped
 
-
-class GroupKinematics:
-    """Answers of one robot; belongs to one thread."""
-
-    def __init__(self, robot: RobotGroups, settings: MoveItSettings | None = None) -> None:
-        self._robot, self._settings = robot, settings or MoveItSettings()
-        self._solvers: dict[tuple[str, str], tuple[RobotModel, IkSolver]] = {}
-
-    def ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
+    def _ik(self, request: Any, snapshot: SceneSnapshot, positions: Array) -> tuple[Any, Any]:  # noqa: ANN401
         """Return the GetPositionIK.Response to a moveit_msgs/PositionIKRequest, and its state.
 
         Args:
@@ -103,10 +98,7 @@ class GroupKinematics:
         )
         solver = self._solver(model, link)
         count = 1 if constraints is None else CANDIDATES
-        try:
-            found = solver.solve(pose, reader.start, scene, timeout, count)
-        except CommandError as error:
-            raise PlanningError(PlanningCode.INVALID_GOAL_CONSTRAINTS, str(error)) from error
+        found = solver.solve(pose, reader.start, scene, timeout, count)
         if constraints is not None:
             found = _heeding(ConstraintCheck(model, constraints), found)
         everywhere = {
@@ -118,7 +110,7 @@ class GroupKinematics:
         )
         return GetPositionIK.Response(solution=solution, error_code=error_code()), solution
 
-    def cartesian_path(
+    def _cartesian_path(
         self,
         request: Any,  # noqa: ANN401
         snapshot: SceneSnapshot,
@@ -206,16 +198,9 @@ class GroupKinematics:
             nearest = int(np.abs(rows - near.positions).max(axis=1).argmin())
             rows = rows[: max(min(nearest, len(rows) - 1), 1)]
             path, reason = timed_rows(rows, limits), f'between two places {near.reason}'
-        link = LinkKinematics(model, request.cartesian_speed_limited_link)
-        path, _ = speed_limited(path, link, max(request.max_cartesian_speed, 0.0))
+        most, link = max(request.max_cartesian_speed, 0.0), request.cartesian_speed_limited_link
+        path, _ = speed_limited(path, most, link, partial(self._solver, model))
         return path, len(rows), reason
-
-    def _solver(self, model: RobotModel, link: str) -> IkSolver:
-        key = model.group, link
-        known = self._solvers.get(key)
-        if known is None or known[0] is not model:  # joints beside the group have moved
-            known = self._solvers[key] = model, IkSolver(model, link)
-        return known[1]
 
 
 def _one_pose(request: Any) -> tuple[str, PoseStamped]:  # noqa: ANN401

@@ -11,7 +11,7 @@ from moveit_msgs.srv import GetPlannerParams, QueryPlannerInterfaces, SetPlanner
 from rclpy.node import Node
 
 from ..industrial.planner import PLANNER_IDS
-from ..moveit_config.planner_configs import PlannerConfigs
+from ..moveit_config.settings import PlannerConfigs
 from ..planner import FREE_MOTION
 from .motion_request import OMPL, PILZ
 

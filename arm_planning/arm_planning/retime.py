@@ -1,17 +1,21 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""From a path at full speed to one from rest to rest within the limits of the joints."""
+"""Times of paths: from rest to rest within the limits of joints, and of the speed of a link."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 
 from arm_model import Array, frozen, JointLimits, RobotState
 from arm_trajectory import Demand, OnlineTrajectoryGenerator, Path, quintics, Timing
 
-from ..link_speed import slower
+from .exceptions import PlanningCode, PlanningError
+from .ik.link_kinematics import LinkKinematics
+from .ik.solver import IkSolver
 
 MAX_SPACING = 0.05  # greatest length of a segment of a path that is not straight in [s]
 
@@ -29,6 +33,10 @@ A path that slows down at many places is quicker at an even speed.
 SLOW = 1.5  # how much longer a path may take for its joints before an even speed is tried
 QUANTITIES = ('speed', 'acceleration', 'jerk')  # names of what is limited
 SLOWER_MARGIN = 1.001  # factor for rounding where a whole path is followed slower
+SPEED_SAMPLES = (
+    200  # places at which the speed of a link is computed, and again around its maximum
+)
+STANDSTILL = 1e-3  # how long a motion takes that has no way in [s]
 NEGLIGIBLE_SLOWDOWN = 1.01  # factor by which a path may take longer without a note
 
 
@@ -41,6 +49,15 @@ class FullSpeedPath:
     jerk: float  # greatest change of that in [1/s2]
     straight: bool = False  # whether joints keep the limits by these two alone, all in phase
     notes: tuple[str, ...] = ()  # what a person should know of it
+
+
+def standstill(positions: Array) -> FullSpeedPath:
+    """Return a path that stays where it is."""
+    coefficients = np.zeros((6, len(positions)))
+    coefficients[0] = positions
+    return FullSpeedPath(
+        Path.of(np.array([STANDSTILL]), coefficients[None]), 1.0 / STANDSTILL, 1.0 / STANDSTILL**2
+    )
 
 
 def timed(full: FullSpeedPath, limits: JointLimits) -> tuple[Path, tuple[str, ...]]:
@@ -160,3 +177,86 @@ def _evaluated(
         rate + t * (bend + t * jerk / 2.0),
         bend + t * jerk,
     )
+
+
+def timed_rows(rows: Array, limits: JointLimits) -> Path:
+    """Return a jerk-limited path from rest to rest through joint positions.
+
+    It is smooth, so that it leaves the lines at their corners, by a quarter of a step at most.
+
+    Args:
+        rows: Joint positions in [rad] (k, n), as dense as the path is to be close to the lines.
+    """
+    steps = np.diff(rows, axis=0)
+    lasts = (np.abs(steps) / limits.velocity).max(axis=1)
+    moves = lasts > 0.0
+    if not moves.any():
+        return standstill(rows[0]).path
+    rows, steps, lasts = np.concatenate((rows[:1], rows[1:][moves])), steps[moves], lasts[moves]
+    slopes = steps / lasts[:, None]
+    around = (lasts[1:] + lasts[:-1])[:, None]
+    velocity = np.concatenate(
+        (slopes[:1], (slopes[:-1] * lasts[1:, None] + slopes[1:] * lasts[:-1, None]) / around)
+    )
+    velocity = np.concatenate((velocity, slopes[-1:]))
+    acceleration = np.zeros_like(velocity)
+    acceleration[1:-1] = 2.0 * np.diff(slopes, axis=0) / around
+    path = Path.of(lasts, quintics(lasts, rows, velocity, acceleration))
+    most = float((limits.acceleration / limits.velocity).min())
+    jerk = float((limits.jerk / limits.velocity).min())
+    return timed(FullSpeedPath(path, most, jerk), limits)[0]
+
+
+def speed_limited(
+    path: Path, most: float, link_name: str, solver: Callable[[str], IkSolver]
+) -> tuple[Path, tuple[str, ...]]:
+    """Return a path whose link is not too fast, and a note if that makes it slower.
+
+    The places of the path stay the same.
+
+    Args:
+        most: Greatest speed of the link in [m/s]; 0 for no limit.
+        solver: Returns the inverse kinematics of a link; of the tip for an empty name.
+
+    Raises:
+        PlanningError: The speed is negative, or no finite number; or there is no such link.
+    """
+    if not most:
+        return path, ()
+    if not 0.0 < most < math.inf:
+        raise PlanningError(
+            PlanningCode.INVALID_GOAL_CONSTRAINTS,
+            f'max_cartesian_speed is {most:g} m/s; it must be positive, or 0 for no limit',
+        )
+    link = solver(link_name).link
+    factor = _greatest_speed(path, link) / most
+    if factor <= 1.0:
+        return path, ()
+    limited = slower(path, factor * SLOWER_MARGIN)
+    note = (
+        f'takes {limited.duration:.3f} s instead of {path.duration:.3f} s, for link'
+        f' {link.link} may move at {most:g} m/s'
+    )
+    return limited, (note,)
+
+
+def slower(path: Path, factor: float) -> Path:
+    """Return the same path with more time everywhere."""
+    powers = (factor ** -np.arange(6.0))[:, None]
+    return Path.of(path.durations * factor, path.coefficients * powers)
+
+
+def _greatest_speed(path: Path, link: LinkKinematics) -> float:
+    times = np.linspace(0.0, path.duration, SPEED_SAMPLES)
+    fastest = int(_speeds(path, link, times).argmax())
+    beside = times[max(fastest - 1, 0)], times[min(fastest + 1, SPEED_SAMPLES - 1)]
+    return float(_speeds(path, link, np.linspace(*beside, SPEED_SAMPLES)).max())
+
+
+def _speeds(path: Path, link: LinkKinematics, times: Array) -> Array:
+    speeds = []
+    for time in times.tolist():
+        point = path.at(time)
+        _, jacobian = link.pose_and_jacobian(point.position)
+        speeds.append(np.linalg.norm(jacobian[:3] @ point.velocity))
+    return np.array(speeds)
