@@ -12,7 +12,6 @@ from processes import executable
 import pytest
 import rclpy
 from ros_client import RosClient
-from std_srvs.srv import Trigger
 from teleop_robot import Robot, TEST_TIMEOUT
 
 from operator_input.ros import serve_teleop
@@ -73,15 +72,6 @@ def test_deadman_stick_and_turbo(pad: InjectedDevice, robot: Robot) -> None:
     robot.wait_until_silent()
 
 
-def test_unplugged_while_moving(pad: InjectedDevice, robot: Robot) -> None:
-    """The cable is pulled, or the battery is empty, with the deadman held: zeros leave."""
-    pad.press(LEFT_SHOULDER)
-    pad.move(ABS_Y, -32768)
-    robot.wait_for(FORWARD)
-    pad.unplug()
-    robot.wait_until_stopped()
-
-
 def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
     """With the deadman, A asks to stand and the d-pad lifts the body."""
     pad.press(LEFT_SHOULDER)
@@ -90,29 +80,6 @@ def test_modes_and_body(pad: InjectedDevice, robot: Robot) -> None:
     pad.move(ABS_HAT0Y, -1)
     robot.client.spin_until(lambda: bool(robot.poses), TEST_TIMEOUT, 'body pose')
     assert robot.poses[0].position.z == pytest.approx(0.005)
-
-
-def test_select_clears_a_fault(pad: InjectedDevice, robot: Robot) -> None:
-    """By the service of the controller; nothing has to be held for it."""
-    cleared: list[Trigger.Request] = []
-
-    def clear(request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        cleared.append(request)
-        response.success = True
-        return response
-
-    service = robot.client.node.create_service(Trigger, 'controller_node/clear_fault', clear)
-
-    def press() -> None:  # again, until the client has found the service
-        pad.press(SELECT)
-        pad.release(SELECT)
-
-    timer = robot.client.node.create_timer(0.2, press)
-    try:
-        robot.client.spin_until(lambda: bool(cleared), TEST_TIMEOUT, 'clear_fault')
-    finally:
-        robot.client.node.destroy_timer(timer)
-        robot.client.node.destroy_service(service)
 
 
 def test_program_without_a_gamepad_waits_and_ends(isolation: Isolation) -> None:

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from collections.abc import Callable
 import math
 from typing import Any
 
@@ -17,8 +18,7 @@ from operator_input import (
     KeyEvent,
     ProgramRequest,
 )
-from operator_input.key_decoder import KeyDecoder
-from quad_teleop import BodyPose, Mode, SettingError, Speeds, Velocity
+from quad_teleop import BodyPose, SettingError, Speeds, Velocity
 from quad_teleop.key_map import (
     HELP,
     MODES,
@@ -59,32 +59,68 @@ def published(target: KeyboardTeleop, start: float, end: float) -> list[Velocity
     return [velocity for velocity in found if isinstance(velocity, Velocity)]
 
 
+WAYS = {
+    'i': (V, 0, 0),
+    'o': (V, 0, -W),
+    'j': (0, 0, W),
+    'l': (0, 0, -W),
+    'u': (V, 0, W),
+    ',': (-V, 0, 0),
+    '.': (-V, 0, W),
+    'm': (-V, 0, -W),
+    'I': (V, 0, 0),
+    'O': (V, -V, 0),
+    'J': (0, V, 0),
+    'L': (0, -V, 0),
+    'U': (V, V, 0),
+    '<': (-V, 0, 0),
+    '>': (-V, -V, 0),
+    'M': (-V, V, 0),
+}
+
+
+def test_map_of_teleop_twist_keyboard() -> None:
+    """Each key goes where it goes there, and no key has two meanings."""
+    for key, way in WAYS.items():
+        target = teleop()
+        feed(target, key)
+        assert target.step(0.0) == Velocity(*way), key
+    tables = [set(MOVES), set(SPEEDS), set(MODES), set(POSES), set(NEUTRAL_KEYS), set(STOP_KEYS)]
+    assert sum(map(len, tables)) == len(set().union(*tables))
+    assert HELP.isascii()
+    assert max(map(len, HELP.splitlines())) < 80
+
+
 @pytest.mark.parametrize(
-    ('key', 'x', 'y', 'yaw'),
+    ('key', 'requests'),
     [
-        ('i', V, 0, 0),
-        ('o', V, 0, -W),
-        ('j', 0, 0, W),
-        ('l', 0, 0, -W),
-        ('u', V, 0, W),
-        (',', -V, 0, 0),
-        ('.', -V, 0, W),
-        ('m', -V, 0, -W),
-        ('I', V, 0, 0),
-        ('O', V, -V, 0),
-        ('J', 0, V, 0),
-        ('L', 0, -V, 0),
-        ('U', V, V, 0),
-        ('<', -V, 0, 0),
-        ('>', -V, -V, 0),
-        ('M', -V, V, 0),
+        *((key, [mode]) for key, mode in MODES.items()),
+        *((key, [ProgramRequest.QUIT]) for key in ('ctrl+c', 'ctrl+d', 'ctrl+\\')),
+        ('ctrl+z', [ProgramRequest.SUSPEND]),
+        ('?', [HELP]),
+        ('space', [RobotRequest.STOP]),
+        ('k', []),
+        ('backspace', [RobotRequest.CLEAR_FAULT]),
     ],
 )
-def test_map_that_everybody_knows(key: str, x: float, y: float, yaw: float) -> None:
-    """Each key of teleop_twist_keyboard goes where it goes there."""
+def test_keys_that_request_something_do_so_once(key: str, requests: list[Request]) -> None:
+    """A held key is one question; where the robot then stands still, the motion ends too."""
+    target = teleop()
+    feed(target, 'i', PRESSED)
+    target.step(0.0)
+    assert feed(target, key, PRESSED, 1.0) == requests
+    assert feed(target, key, KeyAction.REPEATED, 1.1) == []
+    assert feed(target, key, RELEASED, 1.2) == []
+    goes_on = key == '?' or (key in MODES and MODES[key].moves)
+    assert target.step(1.2) == (Velocity(V) if goes_on else ZERO)
+
+
+@pytest.mark.parametrize('key', sorted(STOP_KEYS))
+def test_stop_key_says_zero_even_when_idle(key: str) -> None:
+    """Something else may be driving the robot."""
     target = teleop()
     feed(target, key)
-    assert target.step(0.0) == Velocity(x, y, yaw)
+    assert published(target, 0.0, 1.0) == [ZERO] * 3
 
 
 EVENTS = st.lists(
@@ -127,37 +163,6 @@ def test_never_two_speeds(events: list[tuple[str, KeyAction, float]]) -> None:
         feed(target, key, action, now)
 
 
-@given(st.lists(st.tuples(st.binary(max_size=30), st.sampled_from([0.0, 0.03, 0.3, 1.0]))))
-def test_noise_of_an_old_terminal_never_leaves_it_moving(reads: list[tuple[bytes, float]]) -> None:
-    """Any bytes at any pace, as from a broken line: when they end, so does the motion."""
-    target, decoder, now = teleop(), KeyDecoder(), 0.0
-    for data, gap in reads:
-        now += gap
-        for event in decoder.feed(data, now):
-            if isinstance(event, KeyEvent):
-                target.feed(event)
-    assert target.wanted(now + LONGEST) is None
-
-
-def test_tap_moves_and_stops_by_itself() -> None:
-    """One character over SSH: motion for the first time-out, three zeros, silence."""
-    target = teleop()
-    feed(target, 'i')
-    words = published(target, 0.0, 2.0)
-    moving = words.count(Velocity(V, 0, 0))
-    assert words == [Velocity(V, 0, 0)] * moving + [ZERO] * 3
-    assert moving == pytest.approx(10, abs=1)
-
-
-def test_true_release_stops_at_once() -> None:
-    """Where the release is known, the zero does not wait for anything."""
-    target = teleop()
-    feed(target, 'i', PRESSED)
-    assert target.step(30.0) == Velocity(V, 0, 0)
-    feed(target, 'i', RELEASED, 30.01)
-    assert target.step(30.01) == ZERO
-
-
 @pytest.mark.parametrize('key', ['s', 'p', 'enter', 'escape', 'f5', 'ctrl+a', 'ш'])
 def test_any_other_key_stops(key: str) -> None:
     """A person who hits anything in fright stops the robot; an idle one stays silent."""
@@ -168,14 +173,6 @@ def test_any_other_key_stops(key: str) -> None:
     target.step(1.0)
     feed(target, key, TYPED, 2.0)
     assert target.step(2.0) == ZERO
-
-
-@pytest.mark.parametrize('key', ['space', 'k'])
-def test_stop_key_says_zero_even_when_idle(key: str) -> None:
-    """Something else may be driving the robot."""
-    target = teleop()
-    assert feed(target, key) == ([RobotRequest.STOP] if key == 'space' else [])
-    assert published(target, 0.0, 1.0) == [ZERO] * 3
 
 
 def test_stop_is_not_undone_by_a_key_that_is_still_down() -> None:
@@ -215,36 +212,10 @@ def test_speeds_stay_within_their_limits(keys: list[str]) -> None:
     """However often: not above the limits, and never so slow that it is stuck at zero."""
     target = teleop()
     for key in keys:
-        feed(target, key)
+        before = target.speeds
+        assert bool(feed(target, key)) is (target.speeds == before), 'a limit is reported'
     assert 0.01 <= target.speeds.linear <= target.speeds.linear_limit
     assert 0.01 <= target.speeds.angular <= target.speeds.angular_limit
-
-
-def test_limit_is_reported() -> None:
-    """At the limit a key does nothing, and says so."""
-    target = teleop()
-    answers = [feed(target, 'w') for _ in range(20)]
-    assert answers[0] == []
-    assert answers[-1] == ['this speed is the limit']
-
-
-@pytest.mark.parametrize(('key', 'mode'), MODES.items())
-def test_mode_keys_ask_once(key: str, mode: Mode) -> None:
-    """A held mode key is one question, not twenty a second."""
-    target = teleop()
-    assert feed(target, key, PRESSED) == [mode]
-    assert feed(target, key, KeyAction.REPEATED) == []
-    assert feed(target, key, RELEASED) == []
-
-
-def test_standing_and_lying_end_the_motion() -> None:
-    """Asked to stand or lie while walking: the velocity ends too, at once."""
-    for key in '01':
-        target = teleop()
-        feed(target, 'i', PRESSED)
-        target.step(0.0)
-        feed(target, key, PRESSED, 1.0)
-        assert target.step(1.0) == ZERO
 
 
 def test_pose_keys_move_step_by_step() -> None:
@@ -266,52 +237,16 @@ def test_pose_stays_within_its_limits_and_says_so() -> None:
     assert feed(target, 'g') == [NEUTRAL]
 
 
-def test_leaving_keys() -> None:
-    """Ctrl-C, Ctrl-D and Ctrl-backslash quit, Ctrl-Z suspends, the question mark helps."""
-    target = teleop()
-    for key in ('ctrl+c', 'ctrl+d', 'ctrl+\\'):
-        assert feed(target, key) == [ProgramRequest.QUIT]
-    assert feed(target, 'ctrl+z') == [ProgramRequest.SUSPEND]
-    assert feed(target, '?') == [HELP]
-
-
-def test_no_key_has_two_meanings() -> None:
-    """The tables do not overlap."""
-    tables = [set(MOVES), set(SPEEDS), set(MODES), set(POSES), set(NEUTRAL_KEYS), set(STOP_KEYS)]
-    assert sum(map(len, tables)) == len(set().union(*tables))
-
-
-def test_help_fits_the_narrowest_terminal() -> None:
-    """79 columns, plain characters."""
-    assert HELP.isascii()
-    assert max(map(len, HELP.splitlines())) < 80
-
-
-@pytest.mark.parametrize('quaternion_of', [NEUTRAL, BodyPose(0.01, 0.3, -0.2, 0.1)])
-def test_quaternion_is_the_attitude(quaternion_of: BodyPose) -> None:
-    """Roll, pitch and yaw come back from the quaternion by the textbook's formulas."""
-    x, y, z, w = quaternion_of.quaternion()
-    assert math.hypot(x, y, z, w) == pytest.approx(1.0)
-    assert math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) == pytest.approx(
-        quaternion_of.roll
-    )
-    assert math.asin(2 * (w * y - z * x)) == pytest.approx(quaternion_of.pitch)
-    assert math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(
-        quaternion_of.yaw
-    )
-
-
 @pytest.mark.parametrize(
-    ('arguments', 'word'),
-    [({'linear': 0.5}, 'speed'), ({'angular': 3.0}, 'turn'), ({'linear': 0.0}, 'speed')],
+    ('make', 'word'),
+    [
+        (lambda: Speeds(linear=0.5), 'speed is'),
+        (lambda: Speeds(angular=3.0), 'turn is'),
+        (lambda: Speeds(linear=0.0), 'speed is'),
+        (lambda: PoseSteps(angle_step=0.5), 'angle_step is'),
+    ],
 )
-def test_speed_above_its_limit_is_refused(arguments: dict[str, float], word: str) -> None:
-    """A start speed that is none, or above its limit, is refused by name."""
-    with pytest.raises(SettingError, match=f'^{word} is'):
-        Speeds(**arguments)
-
-
-def test_pose_step_above_its_limit_is_refused() -> None:
-    """A step that the limit does not allow is refused by name."""
-    with pytest.raises(SettingError, match='angle_step'):
-        PoseSteps(angle_step=0.5)
+def test_settings_above_their_limits_are_refused(make: Callable[[], object], word: str) -> None:
+    """By name."""
+    with pytest.raises(SettingError, match=f'^{word}'):
+        make()

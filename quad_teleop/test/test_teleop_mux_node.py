@@ -98,20 +98,6 @@ def diagnostic(client: RosClient) -> list[Any]:
     return messages if locked else []
 
 
-def test_no_number_is_not_forwarded(isolation: Isolation, client: RosClient) -> None:
-    """NaN is dropped with a warning that names the source; what follows is forwarded."""
-    with mux(isolation) as process:
-        received = client.listen(Twist, 'cmd_vel_out')
-        keyboard = publisher(client, Twist, 'key_vel')
-        count = client.node.count_publishers
-        client.spin_until(lambda: count('cmd_vel_out') > 0, TEST_TIMEOUT, 'output')
-        keyboard.publish(forward(float('nan')))
-        process.wait_for('keyboard sends .*nan.* not finite')
-        keyboard.publish(forward(0.5))
-        wait_for(client, received, 0.5)
-        assert len(received) == 1
-
-
 def test_stamped_in_and_out(isolation: Isolation, client: RosClient) -> None:
     """With use_stamped the messages pass as they are, header too; the zero has a time."""
     with mux(isolation, '-p', 'use_stamped:=true'):

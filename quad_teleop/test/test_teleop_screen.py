@@ -49,9 +49,9 @@ def teleop(robot: Robot, *keys: str) -> KeyboardTeleop:
     return made
 
 
-def line(robot: Robot, *keys: str, colour: bool = False) -> str:
+def line(robot: Robot, *keys: str) -> str:
     """Return the status line after keys were pressed."""
-    return status_text(teleop(robot, *keys).status(0.0), colour=colour)
+    return status_text(teleop(robot, *keys).status(0.0), colour=False)
 
 
 def test_what_matters_most_stands_first() -> None:
@@ -63,13 +63,6 @@ def test_what_matters_most_stands_first() -> None:
     assert line(Robot(has_subscriber=False), 'q') == (
         f'mode ? | 0.17 m/s 0.66 rad/s | {idle} | no subscriber'
     )
-
-
-def test_colours_change_no_words() -> None:
-    """With colours the line reads the same."""
-    coloured = line(Robot(), 'i', colour=True)
-    assert re.sub('\x1b\\[[0-9;]*m', '', coloured) == line(Robot(), 'i')
-    assert coloured != line(Robot(), 'i')
 
 
 def test_state_of_the_controller_is_shown() -> None:

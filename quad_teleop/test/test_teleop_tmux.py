@@ -83,21 +83,6 @@ def test_driving_with_real_key_presses(pane: Pane, isolation: Isolation) -> None
     }
 
 
-def test_held_key_over_a_terminal_without_releases(pane: Pane, isolation: Isolation) -> None:
-    """Repeats keep it moving; their end stops it, with three zeros."""
-    with RosClient(isolation.domain_id) as client:
-        robot = Robot(client)
-        pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
-        pane.wait_for('idle')
-        robot.wait_until_linked()
-        pane.wait_for(LINKED)
-        for _ in range(12):
-            pane.press('i')
-            robot.listen_for(0.02)
-        robot.wait_until_silent()
-    assert robot.velocities[-4:] == [(0.15, 0.0, 0.0), STILL, STILL, STILL]
-
-
 def test_nobody_there(pane: Pane) -> None:
     """Without a controller the screen says so, for the velocities and for the modes."""
     pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
@@ -128,14 +113,3 @@ def test_suspended_like_any_program(pane: Pane, isolation: Isolation) -> None:
         robot.wait_for((0.0, 0.0, -0.6), after=count)
         pane.press('C-c')
         robot.wait_until_stopped()
-
-
-def test_narrow_pane(pane: Pane) -> None:
-    """In a pane of 40 columns the status line is cut and stays one line."""
-    pane.tmux('resize-window', '-x', '40', '-y', '24')
-    pane.press('ros2 run quad_teleop teleop_keyboard', 'Enter')
-    pane.wait_for('0.15 m/s')
-    for _ in range(3):
-        pane.press('q')
-    screen = pane.wait_for(r'0\.20 m/s')
-    assert screen.count('m/s') == 1

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from operator_input import all_released, AutoRepeat, HeldKeys, KeyAction, KeyEvent
+from operator_input import AutoRepeat, HeldKeys, KeyAction, KeyEvent
 
 KEYS = 'ijkl'
 STEPS = st.lists(
@@ -93,14 +93,6 @@ def test_there_is_one_command_and_one_typed_key_at_most(
         assert keys.current(now) == (held[-1] if held else None)
 
 
-def test_pressed_key_is_held_until_its_release() -> None:
-    """No time-out ends a key whose release will be reported."""
-    keys, _ = fed('0 press i')
-    assert keys.current(3600.0) == 'i'
-    keys.feed(KeyEvent('i', KeyAction.RELEASED, 3600.0))
-    assert keys.current(3600.0) is None
-
-
 def test_typed_key_times_out_in_two_stages() -> None:
     """One character holds for the delay of the repeat; repeats hold for a much shorter time."""
     keys, _ = fed('0 type i')
@@ -147,23 +139,6 @@ def test_earlier_key_counts_again() -> None:
     assert keys.current(1.0) == 'l'
     keys.feed(KeyEvent('l', KeyAction.RELEASED, 2.0))
     assert keys.current(2.0) == 'i'
-
-
-def test_cleared_key_needs_a_new_press() -> None:
-    """After a stop, the repeats of a key that is still down move nothing."""
-    keys, _ = fed('0 press i')
-    keys.clear()
-    keys.feed(KeyEvent('i', KeyAction.REPEATED, 0.1))
-    assert keys.current(0.1) is None
-    keys.feed(KeyEvent('i', KeyAction.PRESSED, 0.2))
-    assert keys.current(0.2) == 'i'
-
-
-def test_all_released_ends_everything() -> None:
-    """When the window loses the focus nothing is held."""
-    keys, _ = fed('0 press i, 0 type l')
-    keys.feed(all_released(0.1))
-    assert keys.held(0.1) == ()
 
 
 @pytest.mark.parametrize(('first', 'repeat'), [(0.1, 0.2), (0.5, 0.0), (0.0, 0.0)])

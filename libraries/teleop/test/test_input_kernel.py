@@ -28,9 +28,15 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def test_folder_without_devices(tmp_path: Path) -> None:
-    """A container has no /dev/input; that is no error."""
+@pytest.mark.parametrize('exists', [True, False])
+def test_what_cannot_be_opened_is_reported(exists: bool, tmp_path: Path) -> None:
+    """With its path and the remedy: no device, or one that went away; no folder is no error."""
     assert InputDevices(str(tmp_path / 'input')).paths() == []
+    file = tmp_path / 'event0'
+    if exists:
+        file.touch()
+    with pytest.raises(DeviceError, match=r'event0.*group input' if exists else 'event0'):
+        InputDevices(str(tmp_path)).open(str(file))
 
 
 def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
@@ -39,20 +45,6 @@ def test_devices_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     paths = InputDevices(str(tmp_path)).paths()
     assert [Path(path).name for path in paths] == ['event9', 'event10']
-
-
-def test_file_that_is_no_device(tmp_path: Path) -> None:
-    """What cannot be opened is reported with its path and the remedy."""
-    file = tmp_path / 'event0'
-    file.touch()
-    with pytest.raises(DeviceError, match=r'event0.*group input'):
-        InputDevices(str(tmp_path)).open(str(file))
-
-
-def test_vanished_device(tmp_path: Path) -> None:
-    """A device that went away between looking and opening is a DeviceError too."""
-    with pytest.raises(DeviceError, match='event3'):
-        InputDevices(str(tmp_path)).open(str(tmp_path / 'event3'))
 
 
 def test_problems_are_reported_with_their_remedy(

@@ -37,16 +37,6 @@ def test_half_a_protocol_is_none(got: Kitty) -> None:
     assert dialogue.stage is Stage.ABSENT
 
 
-def test_terminal_that_stops_answering_the_flags() -> None:
-    """Both attributes without the second flags: taken back."""
-    dialogue = TerminalDialogue()
-    dialogue.start()
-    dialogue.take(flags(0))
-    dialogue.take(ATTRIBUTES)
-    assert dialogue.take(ATTRIBUTES) == POP
-    assert dialogue.stage is Stage.ABSENT
-
-
 REPORTS = st.one_of(
     st.integers(0, 31).map(flags), st.just(ATTRIBUTES), st.just(Report(ReportKind.STATUS))
 )

@@ -31,14 +31,6 @@ def test_character_gets_the_release_of_its_key() -> None:
     assert actions(matcher.key_up(KEY_I, 1.6)) == [('i', KeyAction.RELEASED)]
 
 
-def test_layout_does_not_matter() -> None:
-    """On a Dvorak keyboard the character c sits on the key I; its release is that key's."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_I, 1.0)
-    matcher.terminal(typed('c', 1.0))
-    assert actions(matcher.key_up(KEY_I, 1.2)) == [('c', KeyAction.RELEASED)]
-
-
 def test_shift_is_not_taken_for_the_letter() -> None:
     """Shift types nothing: down before or after the letter, it is never the key."""
     matcher = ReleaseMatcher()
@@ -71,28 +63,12 @@ def test_tap_that_was_over_before_its_character_came() -> None:
     assert actions(events) == [('i', KeyAction.PRESSED), ('i', KeyAction.RELEASED)]
 
 
-def test_keys_of_another_window_move_nothing() -> None:
-    """What the terminal does not report is no command."""
-    matcher = ReleaseMatcher()
-    assert matcher.key_down(KEY_I, 1.0) == []
-    assert matcher.key_up(KEY_I, 1.5) == []
-
-
 def test_character_without_a_key_stays_typed() -> None:
     """Over the network, no key of this machine went down: the time-outs apply."""
     matcher = ReleaseMatcher()
     matcher.key_down(KEY_I, 1.0)
     late = typed('i', 1.0 + WINDOW + 0.01)
     assert matcher.terminal(late) == [late]
-
-
-def test_lost_keyboard_releases_its_keys() -> None:
-    """A keyboard that is unplugged with a key down does not leave the robot walking."""
-    matcher = ReleaseMatcher()
-    matcher.key_down(KEY_I, 1.0)
-    matcher.terminal(typed('i', 1.0))
-    assert actions(matcher.lose_all(2.0)) == [('i', KeyAction.RELEASED)]
-    assert matcher.lose_all(2.0) == []
 
 
 def test_focus_lost_forgets_the_match() -> None:

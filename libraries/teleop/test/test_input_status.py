@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from operator_input import StatusLine
+from operator_input import status_text, StatusLine, Style
 from operator_input.status import fitted
 
 
@@ -56,11 +56,14 @@ def test_line_never_wraps() -> None:
 
 @given(st.text(st.characters(codec='ascii', categories=['L', 'N', 'P', 'Zs'])), st.integers(0, 80))
 def test_cut_text_is_a_beginning(text: str, width: int) -> None:
-    """What fits is kept whole; else as many columns as there are."""
+    """What fits is kept whole; else as many columns as there are: a wide character has two."""
     assert fitted(text, width) == text[:width]
-
-
-def test_wide_characters_count_twice() -> None:
-    """A wide character that does not fit is left out, never cut in half."""
     assert fitted('狗ab', 3) == '狗a'
     assert fitted('狗狗', 3) == '狗'
+
+
+def test_colours_change_no_words() -> None:
+    """Of the parts of a line."""
+    parts = [('idle', Style.DIM), ('0.15 m/s', Style.PLAIN)]
+    assert status_text(parts, colour=False) == 'idle | 0.15 m/s'
+    assert status_text(parts, colour=True) == '\x1b[2midle\x1b[0m | 0.15 m/s'

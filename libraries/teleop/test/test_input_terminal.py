@@ -47,21 +47,9 @@ def negotiate(keyboard: TerminalKeyboard) -> Stage:
     return keyboard.stage
 
 
-def fail_in_the_middle(terminal: ScriptedTerminal) -> None:
-    """Be a program with a defect."""
-    with TerminalKeyboard(terminal.path) as keyboard:
-        negotiate(keyboard)
-        raise ZeroDivisionError
-
-
 def actions(events: list[KeyEvent]) -> list[tuple[str, KeyAction]]:
     """Leave the times out."""
     return [(event.key, event.action) for event in events]
-
-
-def pressed(events: list[KeyEvent]) -> set[str]:
-    """Name the keys whose release will be reported."""
-    return {event.key for event in events if event.action is KeyAction.PRESSED}
 
 
 @pytest.mark.parametrize('kitty', [True, False])
@@ -80,17 +68,6 @@ def test_terminal_is_given_back_as_it_was(kitty: bool) -> None:
         assert terminal.unread() == b''
 
 
-def test_terminal_is_given_back_after_an_error() -> None:
-    """An exception in the program does not leave a dead terminal behind."""
-    with ScriptedTerminal(kitty=True) as terminal:
-        before = terminal.settings()
-        with pytest.raises(ZeroDivisionError):
-            fail_in_the_middle(terminal)
-        terminal.wait_written(rb'\x1b\[<u')
-        assert terminal.settings() == before
-        assert terminal.flags == []
-
-
 def test_quick_exit_leaves_no_answer_behind() -> None:
     """Left before a slow terminal answered: its answers do not appear at the shell's prompt."""
     with ScriptedTerminal(kitty=True, delay=0.05) as terminal:
@@ -100,17 +77,6 @@ def test_quick_exit_leaves_no_answer_behind() -> None:
         terminal.wait_written(rb'2004l')
         assert terminal.unread() == b''
         assert terminal.flags == []
-
-
-def test_true_releases() -> None:
-    """With the protocol, press, repeat and release arrive as such."""
-    with ScriptedTerminal(kitty=True) as terminal, TerminalKeyboard(terminal.path) as keyboard:
-        assert negotiate(keyboard) is Stage.ACTIVE
-        for event in (1, 2, 3):
-            terminal.key('i', event)
-        events = read_until(keyboard, lambda found: len(found) == 3)
-    names = [KeyAction.PRESSED, KeyAction.REPEATED, KeyAction.RELEASED]
-    assert actions(events) == [('i', name) for name in names]
 
 
 @pytest.mark.parametrize('answers', [True, False])
@@ -125,26 +91,6 @@ def test_old_terminal(answers: bool) -> None:
         terminal.send('i\x03\x1b[A')
         events = read_until(keyboard, lambda found: len(found) == 3)
     assert actions(events) == [(key, KeyAction.TYPED) for key in ('i', 'ctrl+c', 'up')]
-
-
-def test_terminal_with_half_of_the_protocol() -> None:
-    """A terminal that does not report the releases of letters is an old one."""
-    with (
-        ScriptedTerminal(kitty=True, supported=1) as terminal,
-        TerminalKeyboard(terminal.path) as keyboard,
-    ):
-        assert negotiate(keyboard) is Stage.ABSENT
-        terminal.wait_written(rb'\x1b\[<u')
-        assert terminal.flags == []
-
-
-def test_escape_key() -> None:
-    """A lone escape is read as the key, in the end."""
-    with ScriptedTerminal(kitty=False) as terminal, TerminalKeyboard(terminal.path) as keyboard:
-        negotiate(keyboard)
-        terminal.send('\x1b')
-        events = read_until(keyboard, bool)
-    assert actions(events) == [('escape', KeyAction.TYPED)]
 
 
 def test_cut_line_releases_the_held_key() -> None:
@@ -291,15 +237,3 @@ def test_keyboards_are_not_read_over_ssh() -> None:
         events = read_until(keyboard, bool)
         assert keyboard.release_source is ReleaseSource.TIME_OUT
     assert actions(events) == [('i', KeyAction.TYPED)]
-
-
-def test_devices_that_are_no_keyboards_are_closed() -> None:
-    """A power button is no keyboard."""
-    button = InjectedDevice('Power Button', {116})
-    with (
-        ScriptedTerminal(kitty=False) as terminal,
-        Keyboard(terminal.path, devices=InjectedDevices(button), environment={}) as keyboard,
-    ):
-        keyboard.wait(0.0)
-        assert keyboard.release_source is ReleaseSource.TIME_OUT
-    assert button.is_closed
