@@ -23,7 +23,7 @@ from quad_description import (
 )
 from quad_hardware.joints import JointCommander, JointMap, LimiterSettings, servo_of
 from quad_hardware.joints.command import MAX_PERIOD
-from quad_hardware.joints.command_loss import CommandLoss, LossReaction, SPEED
+from quad_hardware.joints.commander import CommandLoss, LossReaction, SPEED
 
 JOINTS = JointMap(servo_of(joint) for joint in movable_joints(robot_urdf('lite')))
 NAMES = JOINTS.names

@@ -2,17 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """From joints of the URDF to servos and back, and what is let through to them."""
 
-from .command import Command, CommandLimiter, LimiterSettings
-from .command_loss import CommandLoss, LossReaction, MAX_TILT
-from .commander import CommandCounters, JointCommander
+from .command import CommandLimiter, LimiterSettings
+from .commander import CommandCounters, JointCommander, LossReaction, MAX_TILT
 from .mapping import JointMap, JointServo, servo_of
 
 __all__ = [
     'MAX_TILT',
-    'Command',
     'CommandCounters',
     'CommandLimiter',
-    'CommandLoss',
     'JointCommander',
     'JointMap',
     'JointServo',

@@ -5,15 +5,139 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from enum import Enum
 import math
 
+from quad_description import Pose, pose_positions, STREAM_TIMEOUT
+
 from ..exceptions import CommandError
-from .command import Command, CommandLimiter, LimiterSettings
-from .command_loss import CommandLoss, LossReaction
+from .command import Command, CommandLimiter, LimiterSettings, MAX_PERIOD
 from .mapping import JointMap
 
 START_BAND = 0.3  # [rad] between leg and target; a controller that is relaxed keeps to 0.25
+MIN_STREAM = 0.5  # [s] a person who tries out a servo sends no stream
+SPEED = 1.0  # [rad/s] of the fastest joint on the way down
+MIN_DURATION = 1.0  # [s]
+MAX_TILT = 0.9  # [rad] beyond which legs find no ground
+
+
+class LossReaction(Enum):
+    """What the robot does; the value is that of the parameter."""
+
+    LIE = 'lie'  # folds its legs
+    HOLD = 'hold'  # stays as it is
+
+
+class CommandLoss:
+    """Watches a stream of commands, and brings the robot down when they leave a leg in the air.
+
+    A controller that dies in the middle of a trot leaves two legs in the air, and the servos hold
+    them there; so does one that held there for a fault, and then ended. A robot on all its feet
+    stays as it is, whether it moved or was put into a posture.
+    """
+
+    def __init__(
+        self,
+        joints: JointMap,
+        raised: Callable[[Sequence[float]], Sequence[str]],
+        reaction: LossReaction = LossReaction.LIE,
+        timeout: float = STREAM_TIMEOUT,
+    ) -> None:
+        """Begin without a stream.
+
+        Args:
+            raised: Names the feet that are in the air at targets of the legs [rad].
+        """
+        self.timeout = timeout  # a pause after which a stream has ended [s]
+        self._joints, self._legs = joints, joints.names[: joints.leg_count]
+        servos = joints.servos[: joints.leg_count]
+        pose = pose_positions(Pose.LIE)
+        self._lying = {s.joint: min(max(pose[s.joint], s.lower), s.upper) for s in servos
+                       if s.joint in pose}  # fmt: skip
+        self._raised, self._reaction = raised, reaction
+        self._began_at = self._last_at = -math.inf
+        self._last: Sequence[float] = ()
+        self._place: Mapping[str, float] | None = None  # where the way down began [rad]
+        self._duration = self._elapsed = self._stepped_at = 0.0  # of the way down [s]
+
+    @property
+    def goes_down(self) -> bool:
+        """Whether the robot is on its way down."""
+        return self._place is not None
+
+    def is_commanded(self, now: float) -> bool:
+        """Whether the last command is no longer ago than a pause."""
+        return now - self._last_at < self.timeout
+
+    def commanded(self, targets: Sequence[float], now: float) -> None:
+        """Take note of targets that were sent [rad]; whoever commands ends the way down."""
+        if not self.is_commanded(now) and not (self.goes_down or self.hazard):
+            self._began_at = now  # a pause with a foot in the air is part of a stream
+        self._place = None
+        self._last_at, self._last = now, targets[: len(self._legs)]
+
+    def forget(self) -> None:
+        """Forget the stream: the robot was lost or let go, and is not moved unasked."""
+        self._place = None
+        self._began_at = self._last_at = -math.inf
+        self._last = ()
+
+    @property
+    def hazard(self) -> str:
+        """How the last stream ended, if that is nothing to be left so; else nothing."""
+        if not self._last or self._last_at - self._began_at < MIN_STREAM:
+            return ''
+        raised = self._raised(self._last)
+        return f'with {" or ".join(raised)} in the air' if raised else ''
+
+    def begin(self, place: Mapping[str, float], tilt: float | None, now: float) -> str:
+        """Go down from now on, or return why not. The stream is forgotten.
+
+        Args:
+            place: Where the joints are [rad]; empty when nobody knows.
+            tilt: Of the body [rad]; None when nobody knows.
+
+        Returns:
+            Why the robot holds; empty when it goes down.
+        """
+        began_at = self._began_at
+        self.forget()
+        if reason := self._refusal(place, tilt):
+            return reason
+        travel = max(abs(self._lying[name] - place[name]) for name in self._legs)
+        # a cosine is pi / 2 times as fast in its middle as on average
+        self._duration = max(MIN_DURATION, travel * math.pi / 2 / SPEED)
+        self._place, self._elapsed = dict(place), 0.0
+        self._stepped_at, self._began_at = now, began_at
+        return ''
+
+    def step(self, now: float) -> list[float] | None:
+        """Return positions of the legs [rad]; None when there is nothing to do any more.
+
+        They are on a path with a soft start and end, which waits while it is not stepped: what is
+        sent keeps up with it, to its end.
+        """
+        start = self._place
+        if start is None:
+            return None
+        self._elapsed += min(max(now - self._stepped_at, 0.0), MAX_PERIOD)
+        self._stepped_at = now
+        share = 0.5 * (1.0 - math.cos(math.pi * min(self._elapsed / self._duration, 1.0)))
+        if self._elapsed >= self._duration:
+            self.forget()
+        return [start[name] + share * (self._lying[name] - start[name]) for name in self._legs]
+
+    def _refusal(self, place: Mapping[str, float], tilt: float | None) -> str:
+        if self._reaction is LossReaction.HOLD:
+            return 'the parameter command_loss is hold'
+        if unknown := [name for name in self._legs if name not in self._lying]:
+            return f'no lying pose is known of {", ".join(unknown)}'
+        if missing := [name for name in self._legs if name not in place]:
+            return f'no report of {", ".join(missing)}'
+        if tilt is not None and tilt > MAX_TILT:
+            return f'the body is tilted by {math.degrees(tilt):.0f} degrees'
+        return ''
 
 
 @dataclass(slots=True)
@@ -25,12 +149,12 @@ class CommandCounters:
     clamped: int = 0  # went beyond limits and were taken to them
     slowed: int = 0  # asked for more speed than allowed, and were approached
     reason: str = ''  # why the last one was refused, or which joints were clamped
-    troubled: bool = field(default=False)  # something was refused or clamped since the last look
+    troubled: bool = False  # something was refused or clamped since the last look
     largest_step: float = 0.0  # of a target since the last look [rad]
     loss: str = ''  # what became of the robot when commands broke off; empty while they come
 
 
-class JointCommander:
+class JointCommander(CommandLoss):
     """Lets joint commands through to the servos; times are on the monotonic clock [s]."""
 
     def __init__(
@@ -53,36 +177,17 @@ class JointCommander:
             obstacle: Says why nothing is sent.
             warn: Takes what is the matter with a command.
         """
+        super().__init__(joints, raised, reaction, limiter.stream_timeout)
         self.counters = CommandCounters()  # what became of them
-        self._joints = joints
-        # two streams: one that wakes after the way down begins anew, however the legs moved
-        self._commanded = CommandLimiter(joints, limiter)
-        self._descent = CommandLimiter(joints, limiter)
-        self._loss = CommandLoss(joints, raised, reaction, limiter.stream_timeout)
+        self._limiter = CommandLimiter(joints, limiter)
+        self._limits_descent = False  # the last command was one of the way down
         self._send_angles, self._obstacle, self._warn = send, obstacle, warn
         self._last_targets: tuple[float, ...] = ()
         self._moved_by = ''  # what took the legs from where the commands of before left them
-        # time after the last command at which :meth:`miss` is to be called [s]
-        self.timeout = self._loss.timeout
-
-    @property
-    def hazard(self) -> str:
-        """How the last stream ended, if that is nothing to be left so; else nothing."""
-        return self._loss.hazard
-
-    @property
-    def goes_down(self) -> bool:
-        """Whether the robot is on its way down, because commands broke off."""
-        return self._loss.goes_down
-
-    def is_commanded(self, now: float) -> bool:
-        """Whether commands come."""
-        return self._loss.is_commanded(now)
 
     def lose(self) -> None:
         """Begin anew with the next command, for the robot was lost; any thread may call it."""
-        self._commanded.reset()
-        self._descent.reset()
+        self._limiter.reset()
 
     def let_go(self) -> None:
         """Send nothing more until a command begins where the legs are.
@@ -90,7 +195,7 @@ class JointCommander:
         What a controller streams is where they were: the robot would rise unasked. A pause of
         the stream is no new request; a stalled process makes one, too.
         """
-        self._forget()
+        self._begin_anew()
         self._moved_by, self.counters.loss = 'the servos were let go', ''
 
     def refuse(self, error: CommandError) -> None:
@@ -107,10 +212,10 @@ class JointCommander:
             positions: Targets of the first joints, in the order of the URDF [rad], [m].
             place: Where the joints are [rad], [m]; empty when the robot was not seen lately.
         """
-        command = self._send(self._commanded, positions, place, now)
+        command = self._send(positions, place, now, descent=False)
         if command is not None:
             self._moved_by = ''
-            self._loss.commanded(command.targets, now)
+            self.commanded(command.targets, now)
             self.counters.loss = ''
         return command
 
@@ -121,12 +226,12 @@ class JointCommander:
             place: As in :meth:`take`.
             tilt: Of the body [rad]; None when nobody knows.
         """
-        hazard = self._loss.hazard
+        hazard = self.hazard
         if not hazard:
             return ''
-        reason = self._loss.begin(place, tilt, now)
+        reason = self.begin(place, tilt, now)
         if not reason:  # commands that only did not arrive raise no robot that lies, either
-            self._commanded.reset()
+            self._limiter.reset()
             self._moved_by = 'joint commands broke off and the robot was laid down'
         does = f'holds as it is, for {reason}' if reason else 'lies down'
         self.counters.loss = (
@@ -136,30 +241,36 @@ class JointCommander:
 
     def go_down(self, place: Mapping[str, float], now: float) -> Command | None:
         """Send the next targets on the way down; None for nothing, at its end too."""
-        positions = self._loss.step(now)
+        positions = self.step(now)
         if positions is None:
             return None
-        command = self._send(self._descent, positions, place, now)
+        command = self._send(positions, place, now, descent=True)
         if command is None:
-            self._loss.forget()
+            self.forget()
         return command
 
     def _send(
         self,
-        stream: CommandLimiter,
         positions: Sequence[float],
         place: Mapping[str, float],
         now: float,
+        *,
+        descent: bool,
     ) -> Command | None:
+        limiter = self._limiter
         try:
-            stream.check(positions)
+            limiter.check(positions)
             if not place:
                 self._drop(self._obstacle())
                 return None
-            if self._moved_by and stream is self._commanded:
+            if self._moved_by and not descent:
                 self._check_start(positions, place)
+            if descent is not self._limits_descent:
+                # the way down begins anew, and so does a stream that wakes after it
+                limiter.reset()
+                self._limits_descent = descent
             measured = [place.get(name) for name in self._joints.names]
-            command = stream.step(positions, measured, now)
+            command = limiter.step(positions, measured, now)
         except CommandError as error:
             self.refuse(error)
             return None
@@ -195,14 +306,14 @@ class JointCommander:
             default=(math.inf, ''),
         )
 
-    def _forget(self) -> None:
+    def _begin_anew(self) -> None:
         """Begin anew with the next command, and do not miss it: the robot does not get it."""
         self.lose()
-        self._loss.forget()
+        self.forget()
         self._last_targets = ()
 
     def _drop(self, reason: str) -> None:
-        self._forget()
+        self._begin_anew()
         self._trouble(f'joint command not sent: {reason}')
 
     def _count(self, command: Command) -> None:
