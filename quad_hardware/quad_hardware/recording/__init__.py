@@ -3,8 +3,15 @@
 """What went over a serial line: kept in memory, written as a log, read again."""
 
 from .fault_watch import FAULT_TEXTS, FaultWatch, LossWatch
-from .memory import SerialMemory
-from .serial_log import Entry, Opened, read_serial_log, SerialLogFile, StateEntered, Transfer
+from .serial_log import (
+    Entry,
+    Opened,
+    read_serial_log,
+    SerialLogFile,
+    SerialMemory,
+    StateEntered,
+    Transfer,
+)
 
 __all__ = [
     'FAULT_TEXTS',

@@ -75,11 +75,7 @@ class LossWatch:
 
     def is_lost(self, state: LinkState) -> bool:
         """Take the state that a link has entered; return whether that is a fault."""
-        if state in _FOUND:
-            self._found = True
-            return False
         was_found = self._found
-        if state in {LinkState.CONNECTING, LinkState.STOPPED}:
-            self._found = False
-            return was_found and state is LinkState.CONNECTING
-        return state in _LOST
+        if state in _FOUND or state in {LinkState.CONNECTING, LinkState.STOPPED}:
+            self._found = state in _FOUND
+        return state in _LOST or (was_found and state is LinkState.CONNECTING)

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""The log of a serial session: lines of text, each with its time on the wall clock in [s].
+"""The log of a serial session, and what writes it: at once, or from memory after a fault.
 
-::
+Lines of text, each with its time on the wall clock in [s]::
 
     # serial log of quad_hardware, version 1: < is from the robot, > to it
     (1764144123.000102) open {"port": "/dev/ttyAMA0", "baud": 2000000, "protocol": "v2", ...}
@@ -16,101 +16,32 @@ comments.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from heapq import merge
+from itertools import islice
 import json
 import logging
+from operator import itemgetter
 from pathlib import Path
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 import re
 import threading
 import time
-from typing import TextIO, TypeAlias
+from typing import TypeAlias, TypeVar
+
+from black_box import Pause
 
 from ..exceptions import RecordingError
 from ..link import LinkState
 from ..protocol import Model
 
-FLUSH_PERIOD = 0.5  # [s] of which a program that is killed loses at most
 CLOSE_TIMEOUT = 10.0  # [s] for what is still to be written when the program ends
+LOG = 'serial.log'
+EVENTS = 1000  # changes of the link that are kept at most; in a minute there are some dozens
+_CHUNK = 32  # lines that are written at once
 _log = logging.getLogger(__name__)
-
-
-class SerialLogFile:
-    """Writes all that happens on a line. A disk that is full ends the log, and nothing else."""
-
-    def __init__(self, path: Path) -> None:
-        """Open a new file.
-
-        Raises:
-            RecordingError: There is one already, or it cannot be made.
-        """
-        self._path = path
-        self._lines: SimpleQueue[str | None] = SimpleQueue()
-        self._ended = False  # nobody takes lines out of the queue any more
-        # one offset for all: the log runs evenly also when somebody sets the clock
-        self._offset = time.time() - time.monotonic()
-        try:
-            self._file = path.open('x', encoding='utf-8')
-        except FileExistsError as error:
-            raise RecordingError(f'{path} exists; choose another name for the log') from error
-        except OSError as error:
-            raise RecordingError(f'{path} cannot be written: {error.strerror}') from error
-        self._file.write(HEADER)
-        self._thread = threading.Thread(target=self._run, name='serial log', daemon=True)
-        self._thread.start()
-
-    def transfer(self, now: float, data: bytes, sent: bool) -> None:
-        """Take bytes that were read, or written."""
-        if not self._ended:
-            self._lines.put(format_transfer(now + self._offset, data, sent=sent))
-
-    def event(self, event: Opened | StateEntered) -> None:
-        """Take a robot that was found, or a change of the link's state."""
-        if not self._ended:
-            self._lines.put(format_event(event, event.time + self._offset))
-
-    def close(self) -> None:
-        """Write what is left, and close the file; never raises."""
-        if not self._ended:
-            self._lines.put(None)
-        self._thread.join(CLOSE_TIMEOUT)
-        if self._thread.is_alive():
-            _log.warning(
-                '%s: the disk did not take the end of the serial log within %g s',
-                self._path,
-                CLOSE_TIMEOUT,
-            )
-
-    def _run(self) -> None:
-        try:
-            with self._file as file:
-                self._write(file)
-        except OSError as error:
-            _log.warning(
-                '%s: %s; the serial log ends here. Make room, or choose another disk by the '
-                'parameter serial_log',
-                self._path,
-                error.strerror,
-            )
-        finally:
-            self._ended = True
-            while not self._lines.empty():
-                self._lines.get()
-
-    def _write(self, file: TextIO) -> None:
-        while (line := self._lines.get()) is not None:
-            file.write(line)
-            flush_at = time.monotonic() + FLUSH_PERIOD
-            while (left := flush_at - time.monotonic()) > 0.0:
-                try:
-                    more = self._lines.get(timeout=left)
-                except Empty:
-                    break
-                if more is None:
-                    return
-                file.write(more)
-            file.flush()
 
 
 HEADER = '# serial log of quad_hardware, version 1: < is from the robot, > to it\n'
@@ -148,7 +79,9 @@ class StateEntered:
     detail: str  # in words
 
 
+Event: TypeAlias = Opened | StateEntered
 Entry: TypeAlias = Transfer | Opened | StateEntered
+Kind = TypeVar('Kind', Opened, StateEntered)
 
 
 def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
@@ -156,7 +89,7 @@ def format_transfer(time: float, data: bytes, *, sent: bool) -> str:
     return f'({time:.6f}) {SENT if sent else RECEIVED} {data.hex(" ")}\n'
 
 
-def format_event(event: Opened | StateEntered, time: float) -> str:
+def format_event(event: Event, time: float) -> str:
     """Return the line of what is no transfer, with its end.
 
     Args:
@@ -213,3 +146,161 @@ def _parse(line: str) -> Entry:
         str(values['firmware']),
         None if model is None else Model(model),
     )
+
+
+class SerialLogFile:
+    """Writes all that happens on a line. A disk that is full ends the log, and nothing else."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a new file.
+
+        Raises:
+            RecordingError: There is one already, or it cannot be made.
+        """
+        self._path = path
+        self._lines: SimpleQueue[str | None] = SimpleQueue()
+        self._ended = False  # nobody takes lines out of the queue any more
+        # one offset for all: the log runs evenly also when somebody sets the clock
+        self._offset = time.time() - time.monotonic()
+        try:
+            self._file = path.open('x', buffering=1, encoding='utf-8')  # by line
+        except FileExistsError as error:
+            raise RecordingError(f'{path} exists; choose another name for the log') from error
+        except OSError as error:
+            raise RecordingError(f'{path} cannot be written: {error.strerror}') from error
+        self._file.write(HEADER)
+        self._thread = threading.Thread(target=self._run, name='serial log', daemon=True)
+        self._thread.start()
+
+    def transfer(self, now: float, data: bytes, sent: bool) -> None:
+        """Take bytes that were read, or written."""
+        if not self._ended:
+            self._lines.put(format_transfer(now + self._offset, data, sent=sent))
+
+    def event(self, event: Event) -> None:
+        """Take a robot that was found, or a change of the link's state."""
+        if not self._ended:
+            self._lines.put(format_event(event, event.time + self._offset))
+
+    def close(self) -> None:
+        """Write what is left, and close the file; never raises."""
+        if not self._ended:
+            self._lines.put(None)
+        self._thread.join(CLOSE_TIMEOUT)
+        if self._thread.is_alive():
+            _log.warning(
+                '%s: the disk did not take the end of the serial log within %g s',
+                self._path,
+                CLOSE_TIMEOUT,
+            )
+
+    def _run(self) -> None:
+        try:
+            with self._file as file:
+                for line in iter(self._lines.get, None):
+                    file.write(line)
+        except OSError as error:
+            _log.warning(
+                '%s: %s; the serial log ends here. Make room, or choose another disk by the '
+                'parameter serial_log',
+                self._path,
+                error.strerror,
+            )
+        finally:
+            self._ended = True
+            while not self._lines.empty():
+                self._lines.get()
+
+
+class SerialMemory:
+    """Keeps what was read and written, and the states of the link.
+
+    Bytes are kept as tuples of plain values, which the garbage collector does not follow. One
+    thread records, another one may write meanwhile; nothing is locked.
+    """
+
+    def __init__(self, port: str, window: float) -> None:
+        """Begin with nothing.
+
+        Args:
+            window: How far back it reaches [s].
+        """
+        self._port, self._window = port, window
+        self._transfers: deque[tuple[float, bytes, bool]] = deque()
+        self._events: deque[Event] = deque(maxlen=EVENTS)
+
+    def transfer(self, now: float, data: bytes, sent: bool) -> None:
+        """Keep bytes, and drop those that are older than the window."""
+        transfers = self._transfers
+        transfers.append((now, data, sent))
+        begin = now - self._window
+        while transfers[0][0] < begin:
+            transfers.popleft()
+
+    def event(self, event: Event) -> None:
+        """Keep a robot that was found, or a change of the link's state."""
+        self._events.append(event)
+
+    @property
+    def size(self) -> int:
+        """How many bytes of the line are kept."""
+        return sum(len(data) for _, data, _ in tuple(self._transfers))
+
+    @property
+    def about(self) -> str:
+        """The port, and how much of it is kept."""
+        robot = 'no robot was found'
+        if (opened := _last(tuple(self._events), Opened)) is not None:
+            robot = f'robot: {opened.firmware}, protocol {opened.protocol} at {opened.baud} baud'
+        return (
+            f'black box of the serial port {self._port}: the last {self._window:g} s, in {LOG}\n'
+            f'{robot}'
+        )
+
+    def save(self, folder: Path, pause: Pause) -> Path:
+        """Write what the window has, in the order in which it happened.
+
+        The robot that was found before, and the state of then, stand at its beginning.
+
+        Args:
+            pause: Called after each small piece of work.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        now = time.monotonic()
+        offset, begin = time.time() - now, now - self._window
+        transfers, events = tuple(self._transfers), tuple(self._events)  # each in one step
+        lines = merge(
+            (
+                (at, format_transfer(at + offset, data, sent=sent))
+                for at, data, sent in transfers
+                if at >= begin
+            ),
+            ((at, format_event(event, at + offset)) for at, event in _since(events, begin)),
+            key=itemgetter(0),
+        )
+        path = folder / LOG
+        with path.open('w', encoding='utf-8') as file:
+            file.write(HEADER)
+            while chunk := list(islice(lines, _CHUNK)):
+                file.write(''.join(line for _, line in chunk))
+                pause()
+        return path
+
+    def usage(self, path: Path) -> str:
+        """Return the commands that show the log."""
+        return f'less {path}\nros2 run quad_hardware replay --ros-args -p log:={path}'
+
+
+def _since(events: tuple[Event, ...], begin: float) -> list[tuple[float, Event]]:
+    """Return events with their times, those that still held at the beginning as if of then."""
+    before = tuple(event for event in events if event.time < begin)
+    last = _last(before, Opened), _last(before, StateEntered)
+    held: list[Event] = [event for event in last if event is not None]
+    later = [(event.time, event) for event in events if event.time >= begin]
+    return [(begin, event) for event in sorted(held, key=lambda event: event.time)] + later
+
+
+def _last(events: tuple[Event, ...], kind: type[Kind]) -> Kind | None:
+    return next((event for event in reversed(events) if isinstance(event, kind)), None)
