@@ -13,7 +13,7 @@ from quad_bringup.bringup import parse
 from quad_bringup.exceptions import ArgumentError
 from quad_bringup.launching import argv, LAUNCH_ARGUMENTS
 from quad_hardware.calibration.odometry import BRING_UP
-from quad_hardware.doctor.graph_checks import check_graph, Observation
+from quad_hardware.doctor.graph import check_graph, Observation
 
 DEFAULTS = {argument.name: argument.default for argument in LAUNCH_ARGUMENTS}
 

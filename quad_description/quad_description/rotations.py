@@ -19,6 +19,7 @@ __all__ = [
     'Vector',
     'about',
     'about_z',
+    'angle_between',
     'axes_from_rpy',
     'conjugate',
     'down_in_body',
@@ -102,3 +103,9 @@ def rotation_vector(rotation: Quaternion) -> Vector:
     # near zero, angle / sin(angle / 2) is 2
     factor = 2.0 * math.atan2(length, w) / length if length > 1e-12 else 2.0
     return x * factor, y * factor, z * factor
+
+
+def angle_between(one: Vector, other: Vector) -> float:
+    """Return the angle between two vectors that are not zero."""
+    cosine = sum(a * b for a, b in zip(one, other, strict=True))
+    return math.acos(min(max(cosine / (math.hypot(*one) * math.hypot(*other)), -1.0), 1.0))

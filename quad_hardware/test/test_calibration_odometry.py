@@ -26,7 +26,7 @@ from rclpy.node import Node
 from quad_calibration_script import Script
 from quad_hardware.calibration import odometry
 from quad_hardware.calibration.main import run_calibrate
-from quad_hardware.calibration.odometry import Axis, Place
+from quad_hardware.calibration.odometry import Place, way
 from quad_hardware.calibration.parameter_file import read_parameters
 
 PERIOD = 0.01  # [s]
@@ -164,11 +164,10 @@ def test_a_way_is_taken_in_the_heading_of_its_start(
     x: float, y: float, yaw: float, ahead: float, aside: float
 ) -> None:
     """Both axes, from any place."""
-    start = Place(x, y, yaw)
-    end = Place(
+    end = (
         x + math.cos(yaw) * ahead - math.sin(yaw) * aside,
         y + math.sin(yaw) * ahead + math.cos(yaw) * aside,
         0.0,
     )
-    assert start.way(end, Axis.X) == pytest.approx(ahead, abs=1e-9)
-    assert start.way(end, Axis.Y) == pytest.approx(aside, abs=1e-9)
+    assert way((x, y, yaw), end, 'x') == pytest.approx(ahead, abs=1e-9)
+    assert way((x, y, yaw), end, 'y') == pytest.approx(aside, abs=1e-9)

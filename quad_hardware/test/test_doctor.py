@@ -15,9 +15,14 @@ import pytest
 
 from quad_description import movable_joints, robot_urdf
 from quad_hardware.doctor import Finding, Severity
-from quad_hardware.doctor.graph_checks import check_graph, links_without_place, Observation
-from quad_hardware.doctor.host_checks import check_environment, check_memory
-from quad_hardware.doctor.port_checks import check_latency, check_port, port_users
+from quad_hardware.doctor.graph import check_graph, links_without_place, Observation
+from quad_hardware.doctor.machine_checks import (
+    check_environment,
+    check_latency,
+    check_memory,
+    check_port,
+    port_users,
+)
 from quad_hardware.link import latency_timer, SerialPort
 from quad_hardware.protocol import V1
 from quad_pty_peer import PtyPeer

@@ -209,9 +209,9 @@ class XgoDog:
             self._connection.port.write(frame.encode(self._connection.protocol))
 
     def _read(self, value: Value) -> bytes:
-        port, protocol, _ = self._connection
+        port = self._connection.port
         with _as_xgo_errors():
-            answer = read_value(port, protocol, value, TIMEOUT, attempts=1)
+            answer = read_value(port, self._connection.protocol, value, TIMEOUT, attempts=1)
         if answer is None:
             raise XgoTimeoutError(f'no answer from {port.path} within {TIMEOUT} s')
         return answer

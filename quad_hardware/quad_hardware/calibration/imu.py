@@ -14,6 +14,7 @@ import itertools
 import math
 
 from quad_description.rotations import (
+    angle_between,
     conjugate,
     from_rpy,
     multiply,
@@ -195,7 +196,7 @@ def _misfit(mounting: ImuMounting, readings: Readings) -> str:
         if reading.acceleration is not None
     }
     for stance, force in by_force.items():
-        if (off := _angle(by_attitude[stance], force)) > MAX_DISAGREEMENT:
+        if (off := angle_between(by_attitude[stance], force)) > MAX_DISAGREEMENT:
             return (
                 f'{stance.name.lower()}: attitude and accelerometer disagree by '
                 f'{math.degrees(off):.0f} degrees'
@@ -206,7 +207,7 @@ def _misfit(mounting: ImuMounting, readings: Readings) -> str:
 def _wrong_tilt(up: Mapping[Stance, Vector]) -> str:
     """Return which stance is not as it was requested, by the direction of up in the body."""
     level = up[Stance.LEVEL]
-    if (tilt := _angle(level, (0.0, 0.0, 1.0))) > MAX_LEVEL_TILT:
+    if (tilt := angle_between(level, (0.0, 0.0, 1.0))) > MAX_LEVEL_TILT:
         return f'level: tilted by {math.degrees(tilt):.0f} degrees'
     for stance, (x, y) in TILTS.items():
         dx, dy = up[stance][0] - level[0], up[stance][1] - level[1]
@@ -216,8 +217,3 @@ def _wrong_tilt(up: Mapping[Stance, Vector]) -> str:
         if off > MAX_OFF:
             return f'{stance.name.lower()}: tilted {math.degrees(off):.0f} degrees another way'
     return ''
-
-
-def _angle(one: Vector, other: Vector) -> float:
-    cosine = sum(a * b for a, b in zip(one, other, strict=True))
-    return math.acos(min(max(cosine / (math.hypot(*one) * math.hypot(*other)), -1.0), 1.0))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 import math
 from pathlib import Path
 import signal
@@ -15,20 +15,13 @@ from quad_description import movable_joints, PRESETS, robot_urdf
 
 from ..exceptions import CommandError, HardwareError
 from ..joints import servo_of
-from ..link import DEFAULT_PORT, LinkOptions
-from ..protocol import Model, Protocol, PROTOCOLS
+from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
 from .imu import calibrate_imu
 from .parameter_file import imu_parameters, servo_parameters, write_parameters
-from .robot import LimpRobot
+from .robot import limp_robot
 from .wizard import calibrate_joints, CancelledError, Console, zero_all
 
 DEFAULT_FILE = Path('quad_calibration.yaml')
-AUTO = 'auto'
-_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
-    AUTO: PROTOCOLS,
-    **{protocol.name: (protocol,) for protocol in PROTOCOLS},
-}
-_MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
 
 
 def run_calibrate(argv: Sequence[str], console: Console) -> int:
@@ -64,7 +57,7 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
     chosen = [servo for servo in servos if not options.joint or servo.joint in options.joint]
     console.write(f'{len(chosen)} joints. The servos will let go: support the robot.')
     motors = [servo.motor for servo in servos]
-    with LimpRobot(_link(options), motors) as robot:
+    with limp_robot(_link(options), motors) as robot:
         console.prompt('Enter takes their torque away; Ctrl-C leaves')
         with robot.limp():
             if options.zero_only:
@@ -80,28 +73,22 @@ def _joints(options: argparse.Namespace, console: Console) -> None:
 
 def _imu(options: argparse.Namespace, console: Console) -> None:
     console.write('The servos stay as they are. Hold the robot by its body, not by its legs.')
-    with LimpRobot(_link(options), ()) as robot:
+    with limp_robot(_link(options), ()) as robot:
         found = imu_parameters(calibrate_imu(console, robot))
     console.write(f'found: {found["imu"]}')
     write_parameters(options.output, found)
 
 
 def _link(options: argparse.Namespace) -> LinkOptions:
-    return LinkOptions(
-        options.port, protocols=_PROTOCOLS[options.protocol], model=_MODELS[options.model]
-    )
+    protocols, model = PROTOCOL_CHOICES[options.protocol], MODEL_CHOICES[options.model]
+    return LinkOptions(options.port, protocols, model=model)
 
 
 def _odometry(options: argparse.Namespace, console: Console) -> None:
-    from .odometry import Axis, calibrate_odometry, Walker
+    from .odometry import calibrate_odometry
 
-    key, axis = f'scale_{options.axis}', Axis(options.axis)
-    with Walker() as walker:
-        before = walker.scale(axis)
-        found = calibrate_odometry(console, walker, axis, options.distance, options.speed)
-    scale = round(found, 4)
-    console.write(f'odometry.{key}: {before:.4f} -> {scale:.4f}')
-    write_parameters(options.output, {'odometry': {key: scale}})
+    found = calibrate_odometry(console, options.axis, options.distance, options.speed)
+    write_parameters(options.output, {'odometry': {f'scale_{options.axis}': found}})
 
 
 _PARTS = {'joints': _joints, 'imu': _imu, 'odometry': _odometry}
@@ -120,13 +107,13 @@ def _parser() -> argparse.ArgumentParser:
         kind.add_argument('--port', default=DEFAULT_PORT, help='of the robot (%(default)s)')
         kind.add_argument(
             '--protocol',
-            choices=_PROTOCOLS,
+            choices=PROTOCOL_CHOICES,
             default=AUTO,
             help='what the robot speaks (%(default)s)',
         )
         kind.add_argument(
             '--model',
-            choices=_MODELS,
+            choices=MODEL_CHOICES,
             default=AUTO,
             help='ranges of protocol v1 (%(default)s)',
         )

@@ -60,7 +60,12 @@ def write_parameters(path: Path, changes: Mapping[str, object]) -> None:
 
 def servo_parameters(servos: Iterable[JointServo]) -> Tree:
     """Return what was measured of servos, by joint as hardware_node reads it."""
-    return {'joints': {servo.joint: _servo(servo) for servo in servos}}
+    joints: dict[str, Tree] = {}
+    for servo in servos:
+        numbers = {'offset': servo.offset, 'lower': servo.lower, 'upper': servo.upper}
+        finite = {name: round(value, 5) for name, value in numbers.items() if math.isfinite(value)}
+        joints[servo.joint] = {'motor': servo.motor, 'sign': servo.sign, **finite}
+    return {'joints': joints}
 
 
 def imu_parameters(mounting: ImuMounting) -> Tree:
@@ -79,12 +84,6 @@ def imu_parameters(mounting: ImuMounting) -> Tree:
             **gyro,
         }
     }
-
-
-def _servo(servo: JointServo) -> Tree:
-    numbers = {'offset': servo.offset, 'lower': servo.lower, 'upper': servo.upper}
-    finite = {name: round(value, 5) for name, value in numbers.items() if math.isfinite(value)}
-    return {'motor': servo.motor, 'sign': servo.sign, **finite}
 
 
 def _merged(old: Mapping[str, object], new: Mapping[str, object]) -> Tree:

@@ -5,24 +5,18 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 import math
 from statistics import fmean, median
 import threading
-from typing import TYPE_CHECKING
 
 from quad_description.rotations import Vector
 
 from ..exceptions import NoAnswerError
 from ..link import Driver, LinkOptions, LinkState
 from ..report import Report
-
-if TYPE_CHECKING:
-    from types import TracebackType
-
-    from typing_extensions import Self
 
 SAMPLES = 15  # reports that one reading is the median of
 MAX_REPORTS = 6000  # reports between two readings, the newest; two minutes
@@ -43,16 +37,10 @@ class LimpRobot:
     """Reads angles, takes torque away and gives it back."""
 
     def __init__(self, options: LinkOptions, motors: Collection[int]) -> None:
-        """Look for the robot; use it in a with statement.
-
-        Args:
-            motors: Ids of those that it has; a board may refuse a command for any other.
-        """
         self._motors = frozenset(motors)
-        self._recent: deque[Mapping[int, float]] = deque(maxlen=SAMPLES)
-        self._imu: deque[Report] = deque(maxlen=MAX_REPORTS)
+        self._reports: deque[Report] = deque(maxlen=MAX_REPORTS)  # since the reading before
         self._changed = threading.Condition()
-        self._driver = Driver(options, self._take, self._forget)
+        self.driver = Driver(options, self._take, self._forget)
 
     def angles(self) -> dict[int, float]:
         """Return the servo angles [deg] by motor, as they are from now on.
@@ -60,12 +48,12 @@ class LimpRobot:
         Raises:
             NoAnswerError: The robot does not report; the message has the reason.
         """
-        with self._changed:
-            self._recent.clear()
-            if not self._changed.wait_for(lambda: len(self._recent) == SAMPLES, REPORT_TIMEOUT):
-                raise NoAnswerError(self._driver.status().detail)
-            motors = set[int].intersection(*(set(angles) for angles in self._recent))
-            return {m: median(angles[m] for angles in self._recent) for m in sorted(motors)}
+        _, reports = self._read()
+        found = {
+            motor: [report.positions.get(motor, math.nan) for report in reports]
+            for motor in sorted(self._motors)
+        }
+        return {m: median(each) for m, each in found.items() if all(map(math.isfinite, each))}
 
     def imu(self) -> ImuReading:
         """Return what the IMU reports from now on, as a mean.
@@ -73,16 +61,11 @@ class LimpRobot:
         Raises:
             NoAnswerError: The robot does not report, or no number; the message has the reason.
         """
-        with self._changed:
-            way = tuple(self._imu)
-            self._imu.clear()
-            if not self._changed.wait_for(lambda: len(self._imu) >= SAMPLES, REPORT_TIMEOUT):
-                raise NoAnswerError(self._driver.status().detail)
-            states = list(self._imu)
-        roll, pitch, yaw = map(_mean_angle, zip(*(s.attitude for s in states), strict=True))
+        way, reports = self._read()
+        roll, pitch, yaw = map(_mean_angle, zip(*(r.attitude for r in reports), strict=True))
         if not all(map(math.isfinite, (roll, pitch, yaw))):
             raise NoAnswerError('the IMU reports no number; switch the robot off and on')
-        forces = [state.acceleration for state in states if state.acceleration is not None]
+        forces = [each.acceleration for each in reports if each.acceleration is not None]
         if not forces:
             return ImuReading((roll, pitch, yaw), None, way)
         x, y, z = map(fmean, zip(*forces, strict=True))
@@ -95,56 +78,53 @@ class LimpRobot:
         Raises:
             NoAnswerError: The robot does not report; the message has the reason.
         """
-        if not self._driver.torque(on=False):
-            raise NoAnswerError(self._driver.status().detail)
+        if not self.driver.torque(on=False):
+            raise NoAnswerError(self.driver.status().detail)
         self.angles()  # by then it has gone out
         try:
             yield
         finally:
-            self._driver.command(self.angles())  # a servo that wakes goes to its last target
-            self._driver.torque(on=True)
+            self.driver.command(self.angles())  # a servo that wakes goes to its last target
+            self.driver.torque(on=True)
             self.angles()
 
-    def _take(self, state: Report) -> str:
+    def _read(self) -> tuple[Sequence[Report], Sequence[Report]]:
+        """Return the reports since the reading before, and new ones."""
         with self._changed:
-            self._imu.append(state)
-            self._recent.append(
-                {
-                    motor: angle
-                    for motor, angle in state.positions.items()
-                    if motor in self._motors and math.isfinite(angle)
-                }
-            )
+            way = tuple(self._reports)
+            self._reports.clear()
+            if not self._changed.wait_for(lambda: len(self._reports) >= SAMPLES, REPORT_TIMEOUT):
+                raise NoAnswerError(self.driver.status().detail)
+            return way, tuple(self._reports)
+
+    def _take(self, report: Report) -> str:
+        with self._changed:
+            self._reports.append(report)
             self._changed.notify_all()
         return ''
 
     def _forget(self, _state: LinkState, _detail: str) -> None:
         with self._changed:
-            self._recent.clear()
-            self._imu.clear()
+            self._reports.clear()
 
-    def __enter__(self) -> Self:
-        """Look for the robot.
 
-        Raises:
-            NoAnswerError: It is not found.
-        """
-        self._driver.start()
-        try:
-            self.angles()
-        except NoAnswerError:
-            self._driver.stop()
-            raise
-        return self
+@contextmanager
+def limp_robot(options: LinkOptions, motors: Collection[int]) -> Iterator[LimpRobot]:
+    """Find a robot, and leave it in the end.
 
-    def __exit__(
-        self,
-        exc_type: type[BaseException] | None,
-        exc: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """Leave the robot."""
-        self._driver.stop()
+    Args:
+        motors: Ids of those that it has; a board may refuse a command for any other.
+
+    Raises:
+        NoAnswerError: It is not found; the message has the reason.
+    """
+    robot = LimpRobot(options, motors)
+    robot.driver.start()
+    try:
+        robot.angles()
+        yield robot
+    finally:
+        robot.driver.stop()
 
 
 def _mean_angle(degrees: Iterable[float]) -> float:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 
 class Severity(Enum):
@@ -32,21 +33,7 @@ class Finding:
         return f'{line}\n{"":9}-> {self.remedy}' if self.remedy else line
 
 
-def good(subject: str, message: str) -> Finding:
-    """Return that something is as it should be."""
-    return Finding(Severity.GOOD, subject, message)
-
-
-def note(subject: str, message: str, remedy: str = '') -> Finding:
-    """Return something worth knowing."""
-    return Finding(Severity.NOTE, subject, message, remedy)
-
-
-def warning(subject: str, message: str, remedy: str) -> Finding:
-    """Return something that may be wrong."""
-    return Finding(Severity.WARNING, subject, message, remedy)
-
-
-def error(subject: str, message: str, remedy: str) -> Finding:
-    """Return something that cannot work."""
-    return Finding(Severity.ERROR, subject, message, remedy)
+good = partial(Finding, Severity.GOOD)  # as it should be
+note = partial(Finding, Severity.NOTE)  # worth knowing
+warning = partial(Finding, Severity.WARNING)  # may be wrong
+error = partial(Finding, Severity.ERROR)  # cannot work

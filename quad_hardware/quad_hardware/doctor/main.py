@@ -14,8 +14,7 @@ import sys
 
 from ..link import DEFAULT_PORT
 from .finding import error, Finding, note, Severity
-from .host_checks import check_environment, check_library, check_memory
-from .port_checks import check_port
+from .machine_checks import check_environment, check_library, check_memory, check_port
 
 INTERRUPTED = 130  # exit code of a program that Ctrl-C ended
 
@@ -65,8 +64,7 @@ def _findings(port: str, duration: float) -> Iterator[Finding]:
     if not has_ros:
         return
     try:
-        from .graph_checks import check_graph
-        from .listening import observe
+        from .graph import check_graph, observe
     except ImportError as problem:
         yield error('ROS', str(problem), 'source the workspace first: source env.sh')
         return

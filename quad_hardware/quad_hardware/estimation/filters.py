@@ -10,6 +10,7 @@ import math
 from statistics import median
 
 from quad_description.rotations import (
+    angle_between,
     conjugate,
     down_in_body,
     multiply,
@@ -61,11 +62,7 @@ class GravityCheck:
             return None
         down = _mean([down_in_body(attitude) for attitude, _ in reports])
         felt = gravity_from_acceleration(_mean([felt for _, felt in reports]))
-        length = math.hypot(*down)
-        if felt is None or length == 0.0:
-            return None
-        cosine = sum(a * b for a, b in zip(down, felt, strict=True)) / length
-        return math.acos(min(max(cosine, -1.0), 1.0))
+        return None if felt is None or not any(down) else angle_between(down, felt)
 
 
 def _mean(vectors: Sequence[Vector]) -> Vector:

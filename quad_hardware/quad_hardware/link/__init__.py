@@ -5,11 +5,14 @@
 from .dialect import Dialect, LinkState, LinkStatus
 from .driver import Driver, QUIET_TIME, STALE_TIME
 from .open import (
+    AUTO,
     BATTERY,
     connect,
     FIRMWARE,
     LinkOptions,
     make_dialect,
+    MODEL_CHOICES,
+    PROTOCOL_CHOICES,
     read_value,
     Session,
     Value,
@@ -17,9 +20,12 @@ from .open import (
 from .port import DEFAULT_PORT, latency_problem, latency_timer, SerialPort
 
 __all__ = [
+    'AUTO',
     'BATTERY',
     'DEFAULT_PORT',
     'FIRMWARE',
+    'MODEL_CHOICES',
+    'PROTOCOL_CHOICES',
     'QUIET_TIME',
     'STALE_TIME',
     'Dialect',

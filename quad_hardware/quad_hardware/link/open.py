@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 import select
@@ -43,6 +43,14 @@ class Value(NamedTuple):
     register: Register  # of protocol v1
     size: int  # of the answer [B]
 
+
+AUTO = 'auto'
+PROTOCOL_CHOICES: Mapping[str, tuple[Protocol, ...]] = {
+    AUTO: PROTOCOLS,
+    **{protocol.name: (protocol,) for protocol in PROTOCOLS},
+}
+MODEL_CHOICES: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
+"""What people call protocols, and models whose ranges scale protocol v1."""
 
 FIRMWARE = Value(Code.VERSION, Register.FIRMWARE, 10)
 BATTERY = Value(Code.BATTERY, Register.BATTERY, 1)
@@ -88,7 +96,8 @@ def open_session(options: LinkOptions) -> Session:
         except LinkError:
             vendor.close()
             raise
-    port, protocol, firmware = connect(options.path, options.protocols, options.baud)
+    connection = connect(options.path, options.protocols, options.baud)
+    port, protocol, firmware = connection.port, connection.protocol, connection.firmware
     try:
         model = None if protocol is V2 else _model(firmware, options)
     except LinkError:
@@ -119,7 +128,8 @@ def _model(firmware: str, options: LinkOptions) -> Model:
     return model
 
 
-class Connection(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Connection:
     """A robot that answered."""
 
     port: SerialPort  # the open port, owned by the holder of the connection

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,19 +21,12 @@ from quad_description.rotations import from_rpy, Vector
 from ..estimation import EstimatorSettings, ImuMounting, OdometrySettings, RateSource, SCALES
 from ..exceptions import CommandError
 from ..joints import JointMap, JointServo, LimiterSettings, LossReaction, servo_of
-from ..link import DEFAULT_PORT, LinkOptions
+from ..link import AUTO, DEFAULT_PORT, LinkOptions, MODEL_CHOICES, PROTOCOL_CHOICES
 from ..link.vendor import is_installed, VENDOR
-from ..protocol import Model, Protocol, PROTOCOLS
+from ..protocol import Protocol, PROTOCOLS
 from ..serial_robot import RobotSettings
 
-AUTO = 'auto'
 THREAD_PRIORITY = 50  # SCHED_FIFO: replies of the robot are read and commands sent at once
-_PROTOCOLS: Mapping[str, tuple[Protocol, ...]] = {
-    AUTO: PROTOCOLS,
-    VENDOR.name: (),
-    **{protocol.name: (protocol,) for protocol in PROTOCOLS},
-}
-_MODELS: Mapping[str, Model | None] = {AUTO: None} | {model.value: model for model in Model}
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +73,7 @@ def declare_parameters(node: Node) -> NodeSettings:
     protocols = read.choice(
         'protocol',
         AUTO,
-        _PROTOCOLS,
+        {AUTO: PROTOCOLS, VENDOR.name: (), **PROTOCOL_CHOICES},
         'auto: detected; vendor: through the vendor’s xgo_lib2',
     )
     method = read.text('vendor_servo_method', '', 'of the vendor’s XgoDog, writes one servo angle')
@@ -89,7 +81,9 @@ def declare_parameters(node: Node) -> NodeSettings:
         path=read.text('port', DEFAULT_PORT, 'serial port of the robot'),
         protocols=protocols,
         baud=read.whole('baud', 0, (0, 4_000_000), 'speed [bit/s]; 0: that of the protocol'),
-        model=read.choice('model', AUTO, _MODELS, 'ranges of protocol v1; auto: by firmware'),
+        model=read.choice(
+            'model', AUTO, MODEL_CHOICES, 'ranges of protocol v1; auto: by firmware'
+        ),
         rate=read.whole('rate', 50, (10, 100), 'reports a second [Hz]'),
         vendor=_vendor(protocols, method),
         vendor_method=method,

@@ -1,15 +1,27 @@
 # SPDX-FileCopyrightText: 2026 The arm and quad developers
 # SPDX-License-Identifier: Apache-2.0
-"""What is received on ROS topics, judged: nodes, rates, joint names, transforms."""
+"""What is received on ROS topics in a while, judged: nodes, rates, joint names, transforms."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
+import time
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
 from urdf_reader import DescriptionError, read_urdf
 
+from process_supervisor import CallError
+from process_supervisor.graph_client import GraphClient
 from quad_description import movable_joints
+from quad_msgs.msg import JointCommand
 
 from .finding import error, Finding, good, note, warning
 
@@ -144,3 +156,68 @@ def _check_transforms(seen: Observation) -> Iterator[Finding]:
         yield error('tf', f'no way from odom to {", ".join(lost)}', remedy)
     else:
         yield good('tf', f'{len(seen.parents)} transforms, complete from odom')
+
+
+SETTLING = 1.0  # [s] until topics are connected
+DISCOVERY = 5.0  # [s] until the others are found, if they are there at all
+_KINDS = {
+    'joint_states': JointState,
+    'imu': Imu,
+    'odom': Odometry,
+    'joint_command': JointCommand,
+}
+_LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def observe(duration: float) -> Observation:
+    """Listen to the topics of the robot for a while."""
+    with closing(GraphClient('quad_doctor', lambda: False)) as client:
+        node, seen = client.node, Observation(duration)
+        _subscribe(node, seen)
+        with suppress(CallError):
+            client.wait_until(lambda: not _running(node).isdisjoint(NODES), DISCOVERY, 'a robot')
+        client.listen(SETTLING)
+        seen.counts.clear()
+        began = time.monotonic()
+        client.listen(duration)
+        seen.duration = time.monotonic() - began
+        seen.nodes = _running(node)
+        for topic in _KINDS:
+            infos = node.get_publishers_info_by_topic(topic)
+            seen.publishers[topic] = [info.node_name for info in infos]
+        return seen
+
+
+def _running(node: Node) -> set[str]:
+    return set(node.get_node_names())
+
+
+def _subscribe(node: Node, seen: Observation) -> None:
+    for topic, kind in _KINDS.items():
+        node.create_subscription(kind, topic, _count(seen, topic), qos_profile_sensor_data)
+
+    def description(message: String) -> None:
+        seen.urdf = message.data
+
+    def transforms(message: TFMessage) -> None:
+        seen.parents.update({t.child_frame_id: t.header.frame_id for t in message.transforms})
+
+    def diagnostics(message: DiagnosticArray) -> None:
+        names = {status.name for status in message.status}
+        kept = [entry for entry in seen.diagnostics if entry[1].split(' (')[0] not in names]
+        bad = (s for s in message.status if s.level != DiagnosticStatus.OK)
+        seen.diagnostics = [*kept, *((s.level[0], f'{s.name} ({s.message})') for s in bad)]
+
+    node.create_subscription(String, 'robot_description', description, _LATCHED)
+    node.create_subscription(TFMessage, '/tf', transforms, 100)
+    node.create_subscription(TFMessage, '/tf_static', transforms, _LATCHED)
+    node.create_subscription(DiagnosticArray, 'diagnostics', diagnostics, 10)
+
+
+def _count(seen: Observation, topic: str) -> Callable[[object], None]:
+    def take(message: object) -> None:
+        seen.counts[topic] = seen.counts.get(topic, 0) + 1
+        if isinstance(message, JointState):
+            seen.joints = tuple(message.name)
+
+    return take
